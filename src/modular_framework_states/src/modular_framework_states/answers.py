@@ -18,7 +18,7 @@ KeptFields = Annotated[Mapping[str, str], OutputKeys()]
 
 @dataclass(frozen=True, slots=True)
 class AnswerRules:
-    """How an outcome and userdata follow from an answer.
+    """Rules that map an answer to an outcome and userdata.
 
     Attributes:
         outcome_field: Field that decides about the outcome; empty when none does.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a URDF says of a robot, as plain records; `urdf_reader.read_urdf` makes them."""
+"""The contents of a URDF as plain records; `urdf_reader.read_urdf` makes them."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ class Joint:
 
 
 class LocatedText(NamedTuple):
-    """What an element holds, without the white space around it, and its line."""
+    """Text of an element, without the white space around it, and its line."""
 
     text: str
     line: int

@@ -66,7 +66,7 @@ class EndEffector:
 
 @dataclass(frozen=True, slots=True)
 class VirtualJoint:
-    """How the root of the robot is fixed to the world."""
+    """Connection of the robot's root to the world."""
 
     name: str
     kind: str

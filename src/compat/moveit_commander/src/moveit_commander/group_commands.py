@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class MoveGroupInfoLevel:
-    """How an answer is meant."""
+    """The kind of an answer."""
 
     FAIL = 1
     WARN = 2

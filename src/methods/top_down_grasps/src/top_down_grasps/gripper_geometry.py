@@ -279,7 +279,7 @@ class _Model:
 
 
 def _motion(joint: Joint, state: dict[str, float]) -> Array:
-    """What a joint adds to its origin (4, 4)."""
+    """Returns the transform of a joint's position relative to its origin (4, 4)."""
     value = state.get(joint.name, 0.0)
     if joint.mimic is not None:
         value = joint.mimic.multiplier * state.get(joint.mimic.leader, 0.0) + joint.mimic.offset

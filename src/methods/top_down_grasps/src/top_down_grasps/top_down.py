@@ -35,7 +35,7 @@ SAME_DIRECTION_RAD = math.radians(3.0)
 
 @dataclass(frozen=True, slots=True)
 class TopDownSettings:
-    """What counts as a usable grasp.
+    """Limits of a usable grasp.
 
     Attributes:
         approach_distance_m: Height of the pregrasp pose over the grasp pose [m].
@@ -295,7 +295,7 @@ def _lowest_height(
 
 
 def _alignment(flat: _Slice, side: npt.NDArray[np.bool_], sign: float) -> float:
-    """How squarely the outermost points face a pad: the mean cosine of those that face it at all."""
+    """Returns the mean cosine between the pad's normal and the surface at the outermost points that face the pad."""
     facing = sign * flat.facing[side]
     facing = facing[facing > 0.3]
     return float(facing.mean()) if facing.size else 0.0

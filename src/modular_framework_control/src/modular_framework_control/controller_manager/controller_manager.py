@@ -93,7 +93,7 @@ class ControllerManager:
 
     @property
     def fault(self) -> str:
-        """Why the hardware could not follow in the last cycle; "" when it could."""
+        """The fault of the hardware in the last cycle; "" without one."""
         return self._watch.text
 
     # ---- control loop ----

@@ -32,7 +32,7 @@ class ControllerState(Enum):
 
 
 class Strictness(IntEnum):
-    """What a switch does with an item that cannot be done: leave it out, or refuse the whole switch."""
+    """Handling of items of a switch that cannot be done: leave them out, or refuse the whole switch."""
 
     BEST_EFFORT = 1
     STRICT = 2
@@ -148,7 +148,7 @@ class LoadedController:
 
 @dataclass(frozen=True, slots=True)
 class SwitchPlan:
-    """What a switch will do, after the rules of its strictness.
+    """The result of the rules of STRICT and BEST_EFFORT for a request.
 
     Attributes:
         start: controllers to start.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a robot offers to controllers: handles, interfaces, limits, transmissions, and the hardware itself."""
+"""The interface of robots to controllers: `RobotHW`, handles, interfaces, limits and transmissions."""
 
 from modular_framework_control.hardware_interface.handles import (
     ActuatorHandle,

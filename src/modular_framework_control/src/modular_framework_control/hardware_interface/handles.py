@@ -170,7 +170,7 @@ class SpeedScalingHandle:
 
 
 class ForceTorqueSensorHandle:
-    """What a force-torque sensor measures.
+    """Measurement of a force-torque sensor.
 
     Attributes:
         name: of the sensor; it is also the name of its topic.
@@ -189,7 +189,7 @@ class ForceTorqueSensorHandle:
 
 
 class ImuSensorHandle:
-    """What an inertial measurement unit measures.
+    """Measurement of an inertial measurement unit.
 
     Attributes:
         name: of the sensor; it is also the name of its topic.

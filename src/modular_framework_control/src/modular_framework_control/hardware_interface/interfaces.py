@@ -27,7 +27,7 @@ class HardwareInterfaceError(Exception):
 
 
 class _Named(Protocol):
-    """What every handle has."""
+    """Protocol of every handle."""
 
     @property
     def name(self) -> str:

@@ -33,7 +33,7 @@ from modular_framework_ros.node_handle import NodeHandle
 
 
 class JointLimiter(Protocol):
-    """What keeps the command of one handle within limits."""
+    """Protocol of the objects that keep the command of one handle within limits."""
 
     handle: Any
 
@@ -236,7 +236,7 @@ def limit_handle(
     limits: JointLimits,
     soft_limits: SoftJointLimits | None = None,
 ) -> JointLimiter:
-    """What keeps the commands of a handle within limits, by what the handle commands; the handle then says its limits.
+    """Returns the limiter for the commanded quantity of a handle, and sets `handle.limits`.
 
     Args:
         interface_class: interface the handle belongs to.
@@ -255,7 +255,7 @@ def limit_handle(
 
 
 def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[JointLimits]:
-    """What is known of the limits of joints.
+    """Returns the known limits of joints.
 
     Those their hardware enforces; where it enforces none, those of `robot_description` and `joint_limits/<joint>/...`.
 

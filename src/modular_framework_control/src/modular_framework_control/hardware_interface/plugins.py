@@ -81,7 +81,7 @@ class PluginIndex:
 
     @property
     def faults(self) -> list[str]:
-        """What is wrong with descriptions that could not be read in full."""
+        """Faults of the descriptions that could not be read in full."""
         self._plugins()
         return list(self._faults)
 

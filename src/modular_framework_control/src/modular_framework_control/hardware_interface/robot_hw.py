@@ -27,7 +27,7 @@ InterfaceT = TypeVar("InterfaceT", bound=HardwareInterface[Any])
 
 
 class SwitchState(Enum):
-    """How far the hardware is with changing its mode for a switch of controllers."""
+    """State of the hardware's mode change for a switch of controllers."""
 
     ONGOING = "ongoing"
     DONE = "done"
@@ -36,7 +36,7 @@ class SwitchState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class HardwareFault:
-    """Why some joints cannot be moved at the moment.
+    """The reason why some joints cannot be moved at the moment.
 
     Attributes:
         reason: for a human: "protective stop", "link to 10.0.0.2 lost".
@@ -143,7 +143,7 @@ class RobotHW:
         )
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
-        """Why these controllers may not run together; "" when they may.
+        """Returns why these controllers may not run together; "" when they may.
 
         The rule of the base class: a joint may be claimed once, by one controller through one interface. Hardware with
         another rule overrides this.

@@ -65,7 +65,7 @@ class RobotHWConformance(ABC):
         """Limits of the joints of that hardware, by name."""
 
     def advance(self, period_s: float) -> None:
-        """What happens between two cycles: time passes, in hardware that moves by itself; physics go on, elsewhere."""
+        """Advances time between two cycles: real time for real hardware, physics for simulated hardware."""
         if self.real_time:
             time.sleep(period_s)
 

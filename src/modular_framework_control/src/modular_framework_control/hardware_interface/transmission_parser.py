@@ -59,7 +59,7 @@ class TransmissionInfo:
 
     @property
     def where(self) -> str:
-        """How a message about it begins."""
+        """The beginning of messages about it."""
         return f"{WHERE}:{self.line}: transmission '{self.name}'"
 
 

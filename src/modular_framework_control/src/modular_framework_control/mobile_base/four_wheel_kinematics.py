@@ -39,7 +39,7 @@ class PlanarTwist:
 
 @dataclass(frozen=True, slots=True)
 class FourWheelGeometry:
-    """Where the wheels are.
+    """Geometry of the wheels.
 
     Attributes:
         track: distance between left and right wheels [m].

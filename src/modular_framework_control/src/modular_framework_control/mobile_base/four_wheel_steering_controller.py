@@ -53,7 +53,7 @@ class SteeringCommand:
 
 @dataclass(frozen=True, slots=True)
 class SteeringSnapshot:
-    """What the base does, in the words of four_wheel_steering_msgs.
+    """Motion of the base, in the terms of four_wheel_steering_msgs.
 
     Attributes:
         time_s: time of the cycle [s].
@@ -69,7 +69,7 @@ class SteeringSnapshot:
 
 
 class _Rate:
-    """How fast a value changes, averaged over some cycles."""
+    """Rate of change of a value, averaged over some cycles."""
 
     def __init__(self, window: int) -> None:
         self._changes: deque[float] = deque(maxlen=window)

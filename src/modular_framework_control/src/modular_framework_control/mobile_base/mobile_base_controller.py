@@ -41,7 +41,7 @@ AT_REST = BaseVelocity()
 
 @dataclass(frozen=True, slots=True)
 class OdometrySnapshot:
-    """Where the base is and how fast it moves.
+    """Pose and velocity of the base.
 
     Attributes:
         time_s: time of the cycle [s].

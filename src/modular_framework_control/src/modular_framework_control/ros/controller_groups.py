@@ -21,7 +21,7 @@ Groups = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True, slots=True)
 class GroupPlan:
-    """What has to be loaded, started and stopped so that one group runs.
+    """The controllers to load, start and stop so that one group runs.
 
     Attributes:
         load: controllers of the group that are not loaded, in its order.

@@ -56,7 +56,7 @@ class JointCommandRosInterface:
 
 
 def joint_control_to_msg(snapshot: JointControlSnapshot, ahead_s: float) -> JointControllerState:
-    """What a controller of one joint did; its stamp is `ahead_s` [s] ahead of the loop's time."""
+    """Converts the state of a controller of one joint; the stamp is `ahead_s` [s] ahead of the loop's time."""
     gains = snapshot.gains
     message = JointControllerState(
         set_point=snapshot.set_point,

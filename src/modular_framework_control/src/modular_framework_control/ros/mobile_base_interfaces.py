@@ -164,7 +164,7 @@ class FourWheelSteeringRosInterface(MobileBaseRosInterface):
 
 
 def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> Odometry:
-    """Where the base is; the stamp is `ahead_s` [s] ahead of the loop's time."""
+    """Converts the pose and velocity of the base; the stamp is `ahead_s` [s] ahead of the loop's time."""
     message = Odometry()
     message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     message.header.frame_id, message.child_frame_id = frames.odom, frames.base
@@ -210,7 +210,7 @@ def fill_steering(message: Any, snapshot: SteeringSnapshot, frame_id: str, ahead
 
 
 def wheels_to_msg(stamp_s: float, names: list[str], states: list[WheelState]) -> JointTrajectoryControllerState:
-    """What the wheels do and what they are commanded; efforts are not commanded, hence not numbers."""
+    """Converts states and commands of the wheels; efforts are not commanded, hence NaN."""
     message = JointTrajectoryControllerState(joint_names=names)
     message.header.stamp = rospy.Time.from_sec(stamp_s)
     unknown = [math.nan] * len(states)

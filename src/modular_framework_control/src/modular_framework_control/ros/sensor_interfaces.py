@@ -59,7 +59,7 @@ class SensorRosInterface:
 
 
 def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamped:
-    """What a force-torque sensor measured at `time_s` of the ROS clock [s]."""
+    """Converts the measurement of a force-torque sensor at `time_s` of the ROS clock [s]."""
     message = _stamped(WrenchStamped(), time_s, handle.frame_id)
     message.wrench.force = Vector3(*handle.force)
     message.wrench.torque = Vector3(*handle.torque)
@@ -67,7 +67,7 @@ def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamp
 
 
 def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
-    """What an inertial unit measured at `time_s` of the ROS clock [s]."""
+    """Converts the measurement of an inertial unit at `time_s` of the ROS clock [s]."""
     message = _stamped(Imu(), time_s, handle.frame_id)
     message.orientation = Quaternion(*handle.orientation)
     message.angular_velocity = Vector3(*handle.angular_velocity)

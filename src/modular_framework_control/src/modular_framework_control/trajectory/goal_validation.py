@@ -44,7 +44,7 @@ class ValidatedGoal:
 
 @dataclass(frozen=True, slots=True)
 class GoalRules:
-    """What a goal is checked against.
+    """The rules that a goal is checked against.
 
     Attributes:
         joint_names: the controller's joints.

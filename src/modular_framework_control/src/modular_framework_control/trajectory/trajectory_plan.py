@@ -84,7 +84,7 @@ class TrajectoryPlan:
         return state
 
     def elapsed_s(self, time_s: float) -> float:
-        """How far the trajectory in force at `time_s` [s] has come since its time_from_start 0 [s]."""
+        """Returns the time since time_from_start 0 of the trajectory in force at `time_s` [s]."""
         track = self._stage_at(time_s).tracks[-1]
         return max(0.0, min(time_s, track.end_s) - track.origin_s)
 

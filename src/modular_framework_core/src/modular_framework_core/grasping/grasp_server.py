@@ -41,7 +41,7 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Where the fingers ended.
+    """Final positions of the fingers, and how the motion ended.
 
     Attributes:
         positions: {joint: position} after the motion [rad or m].

@@ -14,7 +14,7 @@ import roslaunch.xmlloader
 import rospkg
 
 BOOLEANS = ("true", "false", "1", "0")
-"""What roslaunch takes for a bool, in any case."""
+"""Texts that roslaunch accepts as a bool, in upper or lower case."""
 METHOD, CONFIGURATION = "method_launch_file", "config_directory"
 
 

@@ -18,7 +18,7 @@ MessageT = TypeVar("MessageT")
 
 
 class Action(Enum):
-    """What happened to a store."""
+    """The kind of a change of a store."""
 
     ADDED = 0
     REPLACED = 1

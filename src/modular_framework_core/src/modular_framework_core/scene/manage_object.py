@@ -20,7 +20,7 @@ class ObjectRequestError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ObjectRequest:
-    """What to do with which object.
+    """A request to spawn or delete an object.
 
     Attributes:
         delete: True to delete the object, False to spawn it.

@@ -73,7 +73,7 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What a scene file holds: its name and its objects in file order."""
+    """Contents of a scene file: its name and its objects in file order."""
 
     name: str
     objects: tuple[SceneObject, ...]

@@ -76,7 +76,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Length:
-    """How many items a list has."""
+    """The required number of items of a list."""
 
     items: int
 

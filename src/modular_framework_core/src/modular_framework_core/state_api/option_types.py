@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What values an option of a state may have, and what is wrong with a value that does not fit."""
+"""Types of the options of states, with checks that describe what is wrong with a value."""
 
 from __future__ import annotations
 

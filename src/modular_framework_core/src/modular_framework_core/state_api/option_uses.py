@@ -13,7 +13,7 @@ from dataclasses import dataclass
 FROM_USERDATA = "userdata"
 """Name that stands for a message in userdata, under ``selected_<kind>``."""
 USERDATA_PREFIX = "userdata."
-"""What a reference to userdata in the fields of a message begins with; its key follows, and fields of what is there."""
+"""Prefix of a reference to userdata in the fields of a message; the key follows, and then fields of its value."""
 GRASP_STAGES = ("pregrasp", "grasp", "postgrasp")
 
 

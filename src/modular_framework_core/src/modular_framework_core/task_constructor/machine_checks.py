@@ -13,7 +13,7 @@ from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kin
 
 @dataclass(frozen=True, slots=True)
 class ChildLinks:
-    """How a child is linked, as written.
+    """Links of a child as they are written in the task.
 
     Attributes:
         label: The child's name.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a checked task consists of. Templates are filled from these objects and from nothing else."""
+"""The parts of a checked task. Templates are filled from these objects and from nothing else."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ _RENAMED = {
     "parameters": "fields of state_machine (outcomes, default_outcome, outcome_map, shares_userdata), and "
     "options.<key>",
 }
-"""What templates of the original framework read of ``state_machine``, and what stands for it here."""
+"""Attributes of ``state_machine`` in templates of the original framework, and their replacements here."""
 _OLD_NAME = re.compile(rf"\bstate_machine\.({'|'.join(_RENAMED)})\b")
 _PROVIDES = re.compile(r"\{#\s*userdata:\s*([\w\s,]*?)\s*#\}")
 

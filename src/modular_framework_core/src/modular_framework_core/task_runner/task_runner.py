@@ -23,7 +23,7 @@ LOCATION_MARK = "(  # defined in "
 
 @dataclass(frozen=True, slots=True)
 class TaskResult:
-    """How a task ended.
+    """Result of a task.
 
     Attributes:
         name: Name of the task.

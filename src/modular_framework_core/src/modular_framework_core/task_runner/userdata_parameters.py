@@ -17,7 +17,7 @@ class UserdataParameterError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class UserdataParameters:
-    """What the arm commander and the manipulator's client are made from.
+    """Parameters of the arm commander and of the manipulator's client.
 
     Attributes:
         planner_name: Planner to ask move_group for.

@@ -79,7 +79,7 @@ class Finger:
 
     @property
     def opening(self) -> float:
-        """How far the fingers are open, from the closed stop [ticks]."""
+        """Opening of the fingers from the closed stop [ticks]."""
         return self.angle - self.model.closed_ticks
 
     def advance(self, duration_s: float) -> None:

@@ -87,7 +87,7 @@ class DynamixelLine:
 
     @property
     def commands(self) -> Mapping[str, Command]:
-        """What the command port offers."""
+        """The commands of the command port."""
         return {
             "plug": self.plug,
             "unplug": self.unplug,

@@ -241,7 +241,7 @@ class DynamixelServo:
         return errors
 
     def _faults(self, places: frozenset[int]) -> ServoErrors:
-        """What is wrong with the words written at `places`."""
+        """Returns the errors of the words written at `places`."""
         errors = ServoErrors.NONE
         for register, largest in LARGEST.items():
             if register.address in places and self.get(register) > largest:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the nodes of emulators share: their main function, and the commands as ROS services."""
+"""Shared parts of the emulator nodes: their main function, and the commands as ROS services."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class EmulatedArm:
         return dict(pair.split("=") for pair in self.command("state").split())
 
     def positions(self) -> list[float]:
-        """Where the joints are [rad]."""
+        """Returns the joint positions [rad]."""
         return [float(value) for value in self.state()["q"].split(",")]
 
     def kill(self) -> None:

@@ -116,7 +116,7 @@ class Links:
             listener.close()
 
     def wait(self, timeout_s: float) -> list[selectors.SelectorKey]:
-        """What has something to read, after at most `timeout_s` [s]."""
+        """Returns the sockets with data to read, after at most `timeout_s` [s]."""
         return [key for key, _ in self._selector.select(max(0.0, timeout_s))]
 
     def serve(self, ready: list[selectors.SelectorKey], now_s: float) -> None:
@@ -150,7 +150,7 @@ class Links:
 
     @property
     def connections(self) -> int:
-        """How many connections are open."""
+        """Number of open connections."""
         return len(self._connections)
 
     def _accept(self, key: selectors.SelectorKey, now_s: float) -> None:

@@ -74,7 +74,7 @@ class ArmMotion:
 
     @property
     def servo_error(self) -> float:
-        """How far the joint that is most behind is from its servo target [rad]; 0 when there is none."""
+        """Largest distance of a joint from its servo target [rad]; 0 without a target."""
         if self.command.drive is not Drive.SERVO:
             return 0.0
         return max(abs(goal - position) for goal, position in zip(self.command.target, self.positions, strict=True))

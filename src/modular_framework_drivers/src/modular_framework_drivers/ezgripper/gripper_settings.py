@@ -18,7 +18,7 @@ FULL_TORQUE = 800
 
 @dataclass(frozen=True, slots=True)
 class GripperSettings:
-    """How to reach a gripper and how to treat it.
+    """Connection and behaviour of a gripper.
 
     Attributes:
         port_name: serial port.

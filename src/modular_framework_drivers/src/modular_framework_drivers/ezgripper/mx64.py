@@ -95,7 +95,7 @@ MOTOR_FAULTS = ServoErrors.VOLTAGE | ServoErrors.OVERHEATING | ServoErrors.OVERL
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a servo measures.
+    """Measurements of a servo.
 
     Attributes:
         position: [ticks], signed in multi-turn mode.
@@ -135,7 +135,7 @@ def direction_word(value: int) -> int:
 
 
 def parse_reading(data: bytes, errors: ServoErrors) -> Reading:
-    """What the eight bytes of `READING` say."""
+    """Parses the eight bytes of `READING`."""
     return Reading(
         signed(from_bytes(data[0:2])),
         directed(from_bytes(data[2:4])) * SPEED_UNIT_TICKS_S,

@@ -23,7 +23,7 @@ Six = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class ArmState:
-    """What the arm's controller reports.
+    """State that the arm's controller reports.
 
     Attributes:
         received_s: when the process that reads got it, on the monotonic clock [s].

@@ -22,7 +22,7 @@ _UR_LIMITS = JointLimits(-2.0 * math.pi, 2.0 * math.pi, max_velocity=math.pi, ma
 
 
 def read_prefix(nh: NodeHandle) -> str:
-    """What the joint names begin with: `robot_id` and an underscore, or nothing.
+    """Returns the prefix of the joint names: `robot_id` and an underscore, or "".
 
     Raises:
         ParameterError: it is no text.
@@ -34,7 +34,7 @@ def read_prefix(nh: NodeHandle) -> str:
 
 
 def read_link_settings(nh: NodeHandle) -> LinkSettings:
-    """How to reach the arm, from the parameters below `nh`.
+    """Returns the connection settings from the parameters below `nh`.
 
     Raises:
         ParameterError: something is missing or not allowed.

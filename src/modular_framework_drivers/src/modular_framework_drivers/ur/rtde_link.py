@@ -40,7 +40,7 @@ _FINAL_STOP_S = 0.1  # for a process that is ended to send its stop, behind all 
 
 @dataclass(frozen=True, slots=True)
 class LinkSettings:
-    """How to reach an arm.
+    """Connection settings of an arm.
 
     Attributes:
         address: of its controller.

@@ -30,7 +30,7 @@ Objection = Callable[[Array, Array], str]
 
 @dataclass(frozen=True, slots=True)
 class JumpThresholds:
-    """What counts as a jump between two steps; 0 leaves a test out.
+    """Thresholds of a joint-space jump between two steps; 0 switches a test off.
 
     Attributes:
         factor: a step further than this times the mean step of its line, in joint space.

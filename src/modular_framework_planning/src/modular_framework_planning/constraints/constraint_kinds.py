@@ -25,7 +25,7 @@ Row = tuple[Array, float]  # one linearised condition: (gradient over the joints
 
 
 class Parameterization(Enum):
-    """How the three tolerances of an orientation are read; numbers as in moveit_msgs/OrientationConstraint."""
+    """Parameterization of the tolerances of an orientation; numbers as in moveit_msgs/OrientationConstraint."""
 
     XYZ_EULER_ANGLES = 0
     ROTATION_VECTOR = 1

@@ -13,7 +13,7 @@ NUMERIC = "numeric"
 
 @dataclass(frozen=True, slots=True)
 class KinematicsSettings:
-    """How one group is solved; the keys of kinematics.yaml without their prefix.
+    """Kinematics settings of one group; the keys of kinematics.yaml without their prefix.
 
     Attributes:
         solver: plugin name of a config package, or "numeric" to leave closed forms out.

@@ -29,7 +29,7 @@ BOUND_TOLERANCE = 1.0e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkMotion:
-    """How a link moves at one moment, in the planning frame: shape (6,), linear before angular.
+    """Velocity and acceleration of a link in the planning frame: shape (6,), linear before angular.
 
     Attributes:
         velocity: [m/s, rad/s].

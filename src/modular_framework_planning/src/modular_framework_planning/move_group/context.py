@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the endpoints of the node share."""
+"""Parts of the node that its endpoints share."""
 
 from __future__ import annotations
 

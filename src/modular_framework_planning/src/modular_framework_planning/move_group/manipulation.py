@@ -34,7 +34,7 @@ MAX_REASONS = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What pickup and place differ in.
+    """The differences between pickup and place.
 
     Attributes:
         kind: of the report.

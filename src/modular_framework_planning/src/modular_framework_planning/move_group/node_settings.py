@@ -11,7 +11,7 @@ from modular_framework_planning.pick_place.settings import PickPlaceSettings
 
 @dataclass(frozen=True, slots=True)
 class SceneMonitorSettings:
-    """What is below ~planning_scene_monitor.
+    """Parameters below ~planning_scene_monitor.
 
     Attributes:
         publish_planning_scene: whether anything is published on ~monitored_planning_scene.
@@ -29,7 +29,7 @@ class SceneMonitorSettings:
 
 @dataclass(frozen=True, slots=True)
 class PlanExecutionSettings:
-    """What is below ~plan_execution.
+    """Parameters below ~plan_execution.
 
     Attributes:
         max_replan_attempts: how often a goal is planned anew where it asks for that and does not say how often.

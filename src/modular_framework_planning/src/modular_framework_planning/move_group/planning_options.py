@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What moveit_msgs/PlanningOptions mean to the actions that plan and execute."""
+"""Reads moveit_msgs/PlanningOptions for the actions that plan and execute."""
 
 from __future__ import annotations
 

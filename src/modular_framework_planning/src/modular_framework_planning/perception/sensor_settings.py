@@ -16,7 +16,7 @@ COUNTS = ("point_subsample", "queue_size")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpdaterSettings:
-    """What all updaters of the octomap have; keys and defaults are MoveIt's.
+    """Settings of every octomap updater; keys and defaults are MoveIt's.
 
     Attributes:
         max_update_rate: messages processed a second at most [Hz]; 0 for all.

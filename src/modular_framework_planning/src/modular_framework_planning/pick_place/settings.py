@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PickPlaceSettings:
-    """What is below ~pick_place.
+    """Parameters below ~pick_place.
 
     Attributes:
         max_attempted_states_per_pose: postures of the arm that are tried for one grasp or place.

@@ -81,7 +81,7 @@ class ConstraintGoal:
 
 @dataclass(frozen=True, slots=True)
 class SamplingSettings:
-    """What is below ~ompl: whether the paths that are found are shortened."""
+    """Parameters below ~ompl: whether the paths that are found are shortened."""
 
     simplify_solutions: bool = True
 

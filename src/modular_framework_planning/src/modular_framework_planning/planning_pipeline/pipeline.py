@@ -77,7 +77,7 @@ class PlanningPipeline:
 
     @property
     def planner_ids(self) -> tuple[str, ...]:
-        """What the planner takes as planner_id; empty where it takes anything."""
+        """Values of planner_id that the planner accepts; empty if it accepts any."""
         return tuple(getattr(self._planner, "planner_ids", ()))
 
     @property

@@ -23,7 +23,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 @dataclass(frozen=True, slots=True)
 class PipelineSpec:
-    """How a pipeline is built; can be sent to another process.
+    """Specification of a pipeline; can be sent to another process.
 
     Attributes:
         name: what `pipeline_id` calls it.

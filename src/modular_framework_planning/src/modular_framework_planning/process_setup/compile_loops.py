@@ -61,7 +61,7 @@ def _robot() -> RobotModel:
 
 
 def _voxels() -> VoxelMap:
-    """What a sensor saw, written and read again in both encodings."""
+    """Inserts a point cloud, and writes and reads the map in both encodings."""
     point = np.array([[1.5, 0.0, 0.0]])
     seen = empty_map(0.1).with_point_cloud(np.zeros(3), point, point + 0.5, point + 1.0)
     return read_stream(write_binary(read_stream(write_full(seen), seen.resolution, False)), seen.resolution, True)

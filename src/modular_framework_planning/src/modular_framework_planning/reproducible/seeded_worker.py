@@ -43,7 +43,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 @dataclass(frozen=True, slots=True)
 class WorkerSetup:
-    """What the process needs to plan as its parent does.
+    """Set-up of the process, so that it plans as its parent does.
 
     Attributes:
         robot: arguments of RobotModel.

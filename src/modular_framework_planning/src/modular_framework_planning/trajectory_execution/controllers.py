@@ -18,7 +18,7 @@ FAKE_KINDS = ("interpolate", "via points", "last point")
 
 @dataclass(frozen=True, slots=True)
 class JointTolerance:
-    """How far a joint may be off [rad or m, and their derivatives]; 0 leaves it to the controller."""
+    """Tolerances of a joint [rad or m, and their derivatives]; 0 leaves them to the controller."""
 
     joint: str
     position: float = 0.0

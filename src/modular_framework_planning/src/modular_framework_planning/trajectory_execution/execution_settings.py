@@ -10,7 +10,7 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class ExecutionSettings:
-    """What is below ~trajectory_execution.
+    """Parameters below ~trajectory_execution.
 
     Attributes:
         execution_duration_monitoring: whether a motion that takes too long is stopped.

@@ -35,7 +35,7 @@ EXECUTION_MARGIN_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """How motions are asked for; 0 and empty leave the choice to move_group."""
+    """Options of motion requests; 0 and empty leave the choice to move_group."""
 
     allowed_time_s: float = 5.0
     velocity_scaling: float = 0.0

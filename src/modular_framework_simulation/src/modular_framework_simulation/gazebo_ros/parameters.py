@@ -14,7 +14,7 @@ from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting
 
 @dataclass(frozen=True, slots=True)
 class SimulationParameters:
-    """What to simulate and how.
+    """Parameters of the simulation node.
 
     Attributes:
         robot_description: `robot_description`: URDF; empty for a world without a robot.

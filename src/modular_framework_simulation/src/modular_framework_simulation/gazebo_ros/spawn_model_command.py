@@ -13,7 +13,7 @@ from modular_framework_simulation.models.poses import Pose
 
 @dataclass(frozen=True, slots=True)
 class SpawnCommand:
-    """What spawn_model was asked to do.
+    """The parsed command line of spawn_model.
 
     Attributes:
         model: Instance name.
@@ -50,7 +50,7 @@ class Format(Enum):
 
 
 class Source(Enum):
-    """Where a model description comes from."""
+    """Source of a model description."""
 
     FILE = "file"
     PARAM = "param"

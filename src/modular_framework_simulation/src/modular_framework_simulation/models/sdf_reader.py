@@ -25,7 +25,7 @@ from modular_framework_simulation.models.sdf_shapes import (
 from modular_framework_simulation.models.xml_nodes import XmlNode, parse_xml, read_xml
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.8)
-"""What SDF defines for a world that names no gravity [m/s^2]."""
+"""SDF's default gravity [m/s^2]."""
 
 _MAX_INCLUDE_DEPTH = 8
 

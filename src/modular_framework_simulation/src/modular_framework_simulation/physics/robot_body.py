@@ -36,7 +36,7 @@ class Role(Enum):
 
 
 class Mode(Enum):
-    """How a driven joint takes its command."""
+    """Control mode of a driven joint."""
 
     POSITION = "position"
     VELOCITY = "velocity"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the endpoints of the node have in common: a capability offers a service, an action or whatever it connects."""
+"""Base classes of the node's endpoints: a capability offers a service, an action, or whatever its `connect` opens."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the actions pickup and place have in common."""
+"""Base class of the actions pickup and place."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ WORTH_ANOTHER_TRY = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedMotion:
-    """What one attempt to plan came to.
+    """Result of one planning attempt.
 
     Attributes:
         result: of the action; its code says whether there is a plan.
