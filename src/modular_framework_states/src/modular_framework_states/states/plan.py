@@ -6,16 +6,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Unpack
 
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import JointState
+
 from modular_framework_core.commander.arm_commander import CommanderError
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
-from modular_framework_core.state_api.option_uses import FROM_USERDATA, Named, kind_of
-from modular_framework_states.grasp_stages import (
-    StageError,
-    arrival_fingers,
-    near_joints,
-    stage_joints,
-)
+from modular_framework_core.state_api.option_uses import FROM_USERDATA, GRASP_STAGES, Named, kind_of
+from modular_framework_states.grasp_stages import StageError, arrival_fingers, near_joints, stage_joints
 from modular_framework_states.manager_clients import ManagerError, fetch, store_plan
 
 StateType = Literal["pose", "joint_state", "pregrasp", "grasp", "postgrasp"]
@@ -82,26 +80,18 @@ class Plan(FrameworkState):
         if not self._start_type:
             return None
         message = self._message(userdata, self._start_type, self._start_name)
-        match self._start_type:
-            case "joint_state":
-                return joint_values(message, self._start_name)
-            case "pose":
-                return pose_joints(commander, message, None)
-            case stage:
-                return stage_joints(commander, message, stage) | arrival_fingers(message)
+        if self._start_type in GRASP_STAGES:
+            return stage_joints(commander, message, self._start_type) | arrival_fingers(message)
+        return message_joints(commander, message, self._start_name, None)
 
     def _target(self, userdata: Any, commander: Any, start: Mapping[str, float] | None) -> dict[str, float]:
         """Returns {joint: position} to go to."""
         message = self._message(userdata, self._target_type, self._target_name)
-        match self._target_type:
-            case "joint_state":
-                return joint_values(message, self._target_name)
-            case "pose":
-                return pose_joints(commander, message, start)
-            case stage if start is None and stage == "pregrasp":
-                return stage_joints(commander, message, stage)
-            case stage:
-                return near_joints(commander, message, stage, start or commander.current_joints())
+        if self._target_type not in GRASP_STAGES:
+            return message_joints(commander, message, self._target_name, start)
+        if start is None and self._target_type == "pregrasp":
+            return stage_joints(commander, message, self._target_type)
+        return near_joints(commander, message, self._target_type, start or commander.current_joints())
 
     def _message(self, userdata: Any, state_type: str, name: str) -> Any:
         kind = kind_of(state_type)
@@ -125,27 +115,29 @@ class Plan(FrameworkState):
         return f"plan '{self._plan_name}' from {start} to {self._target_type} {self._target_name}".rstrip()
 
 
-def joint_values(message: Any, name: str) -> dict[str, float]:
-    """Returns {joint: position} of a joint state message.
+def message_joints(
+    commander: Any, message: JointState | PoseStamped, name: str, seed: Mapping[str, float] | None
+) -> dict[str, float]:
+    """Returns the joint positions of a joint state, or those of a pose that are nearest to a seed.
+
+    Args:
+        commander: Solves inverse kinematics.
+        message: The joint state or pose.
+        name: Name of the joint state, for errors.
+        seed: {joint: position} [rad or m]; None for the current state.
 
     Raises:
-        ManagerError: The message has no positions, or not one for each name.
-    """
-    if not message.name or len(message.name) != len(message.position):
-        raise ManagerError(
-            f"joint state '{name}' has {len(message.name)} names and {len(message.position)} positions; "
-            "it needs as many of each, at least one"
-        )
-    return dict(zip(message.name, message.position, strict=True))
-
-
-def pose_joints(commander: Any, pose: Any, seed: Mapping[str, float] | None) -> dict[str, float]:
-    """Returns the joint positions of a pose that are nearest to a seed (None: to the current state).
-
-    Raises:
+        ManagerError: The joint state has no positions, or not one for each name.
         StageError: The pose cannot be reached.
     """
-    result = commander.solve_ik(pose, seed)
+    if isinstance(message, JointState):
+        if not message.name or len(message.name) != len(message.position):
+            raise ManagerError(
+                f"joint state '{name}' has {len(message.name)} names and {len(message.position)} positions; "
+                "it needs as many of each, at least one"
+            )
+        return dict(zip(message.name, message.position, strict=True))
+    result = commander.solve_ik(message, seed)
     if not result:
         raise StageError(result.reason)
     return dict(result.joints)
