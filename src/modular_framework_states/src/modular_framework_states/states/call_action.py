@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Unpack
 
-import actionlib
 import roslib.message
 import rospy
 import rostopic
@@ -15,6 +14,7 @@ from actionlib_msgs.msg import GoalStatus
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
+from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result, wait_until
 from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
@@ -67,7 +67,7 @@ class CallAction(FrameworkState):
             action_type = self._type_of(name)
             goal = filled(type(action_type().action_goal.goal), self._goal, userdata)
             expected = with_userdata(self._expected, userdata)
-            client = actionlib.SimpleActionClient(name, action_type)
+            client = SteadyActionClient(name, action_type)
             wait_for_action(client, name, self._server_timeout_s)
         except (CallError, FillingError) as error:
             return self.fail(f"action '{name}': {error}")
