@@ -130,6 +130,13 @@ def place_of(pose: PoseStamped) -> list[float]:
     return conversions.pose_to_list(pose.pose)[:3]
 
 
+def at_rest(arm: MoveGroupCommander) -> bool:
+    """Whether no joint moves within a fifth of a second."""
+    before = arm.get_current_joint_values()
+    time.sleep(0.2)
+    return arm.get_current_joint_values() == pytest.approx(before, abs=1e-4)
+
+
 # ---------------------------------------------------------------- the robot
 def test_the_robot(robot: RobotCommander) -> None:
     assert robot.get_robot_name() == "panda" and robot.get_planning_frame() == "panda_link0"
@@ -312,9 +319,12 @@ def test_motions(arm: MoveGroupCommander) -> None:
     ends = [item.joint_trajectory.points[-1].time_from_start.to_sec() for item in (trajectory, slow)]
     assert ends[1] > 1.2 * ends[0]
     assert arm.execute(trajectory)
+    reached = arm.get_current_joint_values()
     assert arm.go(READY, wait=False)
+    until(lambda: arm.get_current_joint_values() != pytest.approx(reached, abs=0.01), "the arm moves")
     arm.stop()
-    time.sleep(0.5)
+    until(lambda: at_rest(arm), "the arm stands still")
+    assert arm.get_current_joint_values() != pytest.approx(READY, abs=0.05)
     assert arm.go(READY) and arm.get_current_joint_values() == pytest.approx(READY, abs=2e-3)
 
 
