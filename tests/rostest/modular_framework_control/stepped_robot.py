@@ -121,7 +121,7 @@ class SteppedRobot:
         self.step(round(duration_s / PERIOD_S))
 
     def flush(self) -> None:
-        """Let everything be published that the controllers have told so far."""
+        """Waits until everything that the controllers have queued is published."""
         self._manager.flush(WAIT_S)
 
     def count_submissions(self, name: str) -> list[float]:

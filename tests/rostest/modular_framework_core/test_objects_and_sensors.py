@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Objects enter and leave everywhere or nowhere, exit codes tell, and the sensors' frames are on TF."""
+"""Objects enter and leave everywhere or nowhere, exit codes report it, and the sensors' frames are on TF."""
 
 from __future__ import annotations
 

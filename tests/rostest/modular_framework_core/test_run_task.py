@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""run_task on a real master: makes the state machine of a task, runs it, tells how it ended, and stops when asked."""
+"""run_task on a real master: makes the state machine of a task, runs it, reports how it ended, and stops on request."""
 
 from __future__ import annotations
 

@@ -249,7 +249,7 @@ def test_the_chosen_planner_is_asked_for(rviz: Rviz) -> None:
 
 
 class WatchedLock:
-    """A lock that tells when somebody waits for it."""
+    """A lock that reports when a thread waits for it."""
 
     def __init__(self) -> None:
         self._lock, self.awaited = threading.Lock(), threading.Event()

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("ros_session")
 
 
 class Stay(smach.State):
-    """Runs until it is told to go on."""
+    """Runs until it is allowed to continue."""
 
     def __init__(self) -> None:
         super().__init__(["done"], ["speed"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a controller's updates cost is measured, and who made the loop late is told."""
+"""The update times of controllers are measured, and overruns are reported with their controller."""
 
 from __future__ import annotations
 

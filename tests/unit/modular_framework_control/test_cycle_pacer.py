@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The beat of the control loop: fixed times, cycles left out are counted, and no memory is used up."""
+"""The pace of the control loop: fixed times, missed cycles are counted, and memory use is constant."""
 
 from __future__ import annotations
 

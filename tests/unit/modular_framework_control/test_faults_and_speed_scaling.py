@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What controllers do while their hardware cannot follow, and while it lets itself be moved slowly or not at all."""
+"""Controllers during hardware faults, and with speed scaling down to 0."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hardware that cannot follow: those controllers are told whose joints it has, once, and again when it can."""
+"""Hardware faults: the controllers of its joints are notified once, and again when the hardware recovers."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fake hardware does exactly what it is told."""
+"""Mock hardware follows its commands exactly."""
 
 from __future__ import annotations
 

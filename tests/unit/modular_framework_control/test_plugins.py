@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Classes of other packages are found under the name they offer them by, and what is wrong is told."""
+"""Classes of other packages are found by their plugin names, and faults are reported."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The witnesses of `benchmarks/control_loop` tell when processors were away, and which cycles nobody could have run."""
+"""The witnesses of `benchmarks/control_loop` report when processors were away, and which cycles could not run."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Text scenes of both layouts are read and written, and what is wrong in one is told with its line."""
+"""Text scenes of both layouts are read and written, and faults are reported with their line."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Orders to an emulator over its command port: what is understood, and what is answered to what is not."""
+"""Commands to an emulator over its command port, and the answers to invalid ones."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When the fingers count as arrived or held up, without a motor: positions go in, orders to the motor come out."""
+"""When the fingers count as arrived or held up, without a motor: positions go in, commands to the motor come out."""
 
 from __future__ import annotations
 

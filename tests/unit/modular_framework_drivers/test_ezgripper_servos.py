@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the servos of a gripper are told, word for word, and what is believed of them when an answer is lost."""
+"""The instructions to the servos of a gripper, word for word, and their assumed state when an answer is lost."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which controllers execute a motion, and what a controller is told."""
+"""Choice of the controllers that execute a motion, and the goals they get."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Motions of a robot that is not there."""
+"""Motions of a robot with fake controllers."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Depth images and clouds become points in the right places, and robot and known objects are told from the rest."""
+"""Depth images and clouds become points at the right positions; the robot and known objects are filtered out."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""STOMP bends motions round obstacles, repeats itself with a seed, keeps path constraints and says why it failed."""
+"""STOMP deforms motions around obstacles, repeats itself with a seed, keeps path constraints and says why it failed."""
 
 from __future__ import annotations
 

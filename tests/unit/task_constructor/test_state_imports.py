@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Modules that a state imports and Python does not find are told before the run, and nothing is imported for that."""
+"""Modules that a state imports and Python does not find are reported before the run, without importing anything."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parameters of a framework state machine: all that is wrong with them is told at once, with the file."""
+"""The parameters of a framework state machine: all faults are reported at once, with the file."""
 
 from __future__ import annotations
 

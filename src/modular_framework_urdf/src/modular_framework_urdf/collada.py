@@ -7,7 +7,7 @@ from modular_framework_urdf import xml_text
 from modular_framework_urdf.xml_text import Element
 
 _MOST_NODES = 100_000
-_LOOKS = ("library_images", "library_effects", "library_materials")
+_MATERIAL_LIBRARIES = ("library_images", "library_effects", "library_materials")
 
 
 def parse(content: bytes, where: str) -> Element:
@@ -37,7 +37,7 @@ def without_materials(root: Element) -> bytes:
     """Returns the file without materials, because a reader drops a part whose texture is missing."""
     root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")
     for parent in list(root.iter()):
-        for child in [one for one in parent if one.tag == "bind_material" or one.tag in _LOOKS]:
+        for child in [one for one in parent if one.tag == "bind_material" or one.tag in _MATERIAL_LIBRARIES]:
             parent.remove(child)
     return xml_text.to_text(root).encode()
 

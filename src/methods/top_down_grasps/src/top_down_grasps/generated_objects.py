@@ -23,7 +23,7 @@ def same_place(one: SceneObject, other: SceneObject, tolerance_m: float) -> bool
 
 
 def at_rest(before: Sequence[SceneObject], now: Sequence[SceneObject]) -> bool:
-    """Returns whether the same objects are seen twice, at the same places."""
+    """Returns whether the same objects are seen twice, at the same poses."""
     return len(before) == len(now) and all(
         same_place(one, other, REST_M) for one, other in zip(before, now, strict=True)
     )

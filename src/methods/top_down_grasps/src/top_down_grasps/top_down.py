@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds and ranks ways to grasp an object from above with a two-finger gripper.
 
-The hand points straight down. For several closing directions and places along the object, the part of the object
+The hand points straight down. For several closing directions and positions along the object, the part of the object
 between the pads is measured: it must fit the opening with room to spare, its sides must face the pads, and the
 fingertips must stay above the support. No other part of the hand may touch the object, neither on the way down nor
 while the pads close: where it would, the hand opens wider or stays higher. What remains is ranked by how squarely the
 sides face the pads, how near the grasp is to the centre of mass, how much room there is, how much of the pads touches,
-and how comfortable the place is for the arm.
+and how convenient the position is for the arm.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ def top_down_grasps(
         flat = _Slice(
             x, y, surface.points[:, 2], facing, np.column_stack([top[:, :2] @ closing, top[:, :2] @ across, top[:, 2]])
         )
-        for place in _places(y, float(surface.centroid[:2] @ across), settings.place_step_m):
-            grasp = _grasp_at(flat, place, yaw, surface, support_z, gripper, settings)
+        for y_grasp in _grasp_positions(y, float(surface.centroid[:2] @ across), settings.place_step_m):
+            grasp = _grasp_at(flat, y_grasp, yaw, surface, support_z, gripper, settings)
             if grasp is not None:
                 grasps.append(grasp)
     return sorted(grasps, key=lambda grasp: -grasp.quality)
@@ -132,7 +132,7 @@ class _Slice:
     top: Array
 
     def top_around(self, x: float, y: float) -> Array:
-        """Returns the highest points relative to a place in the plane."""
+        """Returns the highest points relative to a point in the plane."""
         return self.top - [x, y, 0.0]
 
 
@@ -155,28 +155,28 @@ def _directions(surface: Surface, step: float) -> list[float]:
     return chosen
 
 
-def _places(y: Array, centre: float, step: float) -> Iterable[float]:
-    """Places along the object: at its centre of mass, then outwards to both ends."""
+def _grasp_positions(y: Array, centre: float, step: float) -> Iterable[float]:
+    """Yields positions along the object [m]: at its centre of mass, then outwards to both ends."""
     yield centre
     for index in range(1, 1 + int(max(y.max() - centre, centre - y.min()) / step)):
-        for place in (centre + index * step, centre - index * step):
-            if y.min() < place < y.max():
-                yield place
+        for y_grasp in (centre + index * step, centre - index * step):
+            if y.min() < y_grasp < y.max():
+                yield y_grasp
 
 
 def _grasp_at(
     flat: _Slice,
-    place: float,
+    y_grasp: float,
     yaw: float,
     surface: Surface,
     support_z: float,
     gripper: GripperGeometry,
     settings: TopDownSettings,
 ) -> TopDownGrasp | None:
-    between = np.abs(flat.y - place) <= gripper.pad_half_width
+    between = np.abs(flat.y - y_grasp) <= gripper.pad_half_width
     if not between.any():
         return None
-    hold = _highest_hold(flat, place, between, float(surface.centroid[2]), support_z, gripper, settings)
+    hold = _highest_hold(flat, y_grasp, between, float(surface.centroid[2]), support_z, gripper, settings)
     if hold is None:
         return None
     alignment = min(
@@ -187,7 +187,7 @@ def _grasp_at(
         return None
     closing, across = (math.cos(yaw), math.sin(yaw)), (math.sin(yaw), -math.cos(yaw))
     middle = (hold.low + hold.high) / 2
-    position = (middle * closing[0] + place * across[0], middle * closing[1] + place * across[1], hold.z)
+    position = (middle * closing[0] + y_grasp * across[0], middle * closing[1] + y_grasp * across[1], hold.z)
     offset = math.dist((position[0], position[1], hold.pad_z), tuple(surface.centroid))
     quality = _quality(
         alignment,
@@ -202,7 +202,7 @@ def _grasp_at(
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
-    """How the hand holds the object at a place.
+    """Pose of the hand at one position along the object, and its contact.
 
     Attributes:
         z: Height of the grasp frame [m].
@@ -224,7 +224,7 @@ class _Hold:
 
 def _highest_hold(
     flat: _Slice,
-    place: float,
+    y_grasp: float,
     between: npt.NDArray[np.bool_],
     centroid_z: float,
     support_z: float,
@@ -237,7 +237,7 @@ def _highest_hold(
     settle both, since the hand only ever goes up.
     """
     pad_offset = gripper.pad_centre_at(min(float(np.ptp(flat.x[between])), gripper.max_opening))
-    top = float(flat.z[np.abs(flat.y - place) <= gripper.pad_half_width + 0.01].max())
+    top = float(flat.z[np.abs(flat.y - y_grasp) <= gripper.pad_half_width + 0.01].max())
     z = max(
         min(centroid_z, top - gripper.pad_half_height / 2) + pad_offset,
         support_z + gripper.max_tip + settings.tip_clearance_m,
@@ -256,7 +256,7 @@ def _highest_hold(
         )
         if needed > gripper.max_opening:
             return None
-        lowest, opening = _lowest_height(flat.top_around(middle, place), high - low, needed, z, gripper, settings)
+        lowest, opening = _lowest_height(flat.top_around(middle, y_grasp), high - low, needed, z, gripper, settings)
         if lowest <= z + HEIGHT_TOLERANCE_M:
             return _Hold(z, pad_z, low, high, overlap, opening, touching)
         z = lowest

@@ -238,8 +238,8 @@ def _whole_turns(position: Array, target: Array) -> Array:
     Both of shape (joints,) [rad].
     """
     turns = (position - target) / (2.0 * math.pi)
-    whole = np.where(np.abs(np.abs(turns) % 1.0 - 0.5) < 1e-9, np.trunc(turns), np.round(turns))
-    return whole * (2.0 * math.pi)
+    full_turns = np.where(np.abs(np.abs(turns) % 1.0 - 0.5) < 1e-9, np.trunc(turns), np.round(turns))
+    return full_turns * (2.0 * math.pi)
 
 
 def _agrees(spline: Spline, point: int, time_s: float, state: Array, offset: Array) -> bool:

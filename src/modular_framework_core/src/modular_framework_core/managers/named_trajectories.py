@@ -83,7 +83,7 @@ def time_trajectory(name: str, waypoints: list[Waypoint], lookup: JointLookup) -
         lookup: Gives {joint: position} of a joint state's name, None when there is none.
 
     Returns:
-        The trajectory; a pause adds a second point at the same place.
+        The trajectory; a pause adds a second point with the same positions.
 
     Raises:
         EntryError: A joint state is unknown, or its joints differ from those of the first waypoint.

@@ -56,7 +56,7 @@ class SceneObject:
         position: x, y, z in the planning frame [m].
         quaternion_xyzw: Orientation in the planning frame.
         shapes: What it is made of.
-        subframes: (name, position, quaternion_xyzw) of named places on the object, in its frame.
+        subframes: (name, position, quaternion_xyzw) of named frames on the object, in its frame.
     """
 
     name: str
@@ -165,8 +165,8 @@ def _read_object(name: str, lines: _Lines) -> SceneObject:
     shapes = tuple(_read_shape(lines) for _ in range(count))
     subframes: list[tuple[str, Vector, Vector]] = []
     if has_pose:
-        (places,) = lines.counts(1, f"the number of subframes of object '{name}'")
-        for _ in range(places):
+        (subframe_count,) = lines.counts(1, f"the number of subframes of object '{name}'")
+        for _ in range(subframe_count):
             subframes.append(
                 (
                     lines.next_line("the name of a subframe"),

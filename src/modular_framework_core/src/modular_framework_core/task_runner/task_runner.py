@@ -152,5 +152,5 @@ class TaskRun:
 def _where_defined(error: Exception) -> str:
     """Returns the location in the task of the state whose constructor raised, and ": "; "" where it is not known."""
     lines = [frame.line or "" for frame in traceback.extract_tb(error.__traceback__)]
-    places = [line.partition(LOCATION_MARK)[2] for line in lines if LOCATION_MARK in line]
-    return f"{places[-1]}: " if places else ""
+    locations = [line.partition(LOCATION_MARK)[2] for line in lines if LOCATION_MARK in line]
+    return f"{locations[-1]}: " if locations else ""

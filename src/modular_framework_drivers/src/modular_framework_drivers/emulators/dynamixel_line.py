@@ -256,8 +256,8 @@ class DynamixelLine:
         if faults.lose_every and self._answered % faults.lose_every == 0:
             return
         if faults.corrupt_every and self._answered % faults.corrupt_every == 0:
-            place = self._random.randrange(2, len(answer))
-            answer = answer[:place] + bytes([answer[place] ^ 1 << self._random.randrange(7)]) + answer[place + 1 :]
+            index = self._random.randrange(2, len(answer))
+            answer = answer[:index] + bytes([answer[index] ^ 1 << self._random.randrange(7)]) + answer[index + 1 :]
         answer = self._random.randbytes(faults.garbage) + answer
         servo = next(
             finger.servo for finger in self.fingers if instruction.servo_id in (finger.servo.servo_id, BROADCAST)

@@ -223,30 +223,30 @@ class DynamixelServo:
     def _write(self, parameters: bytes) -> ServoErrors:
         """Writes bytes, parameters[0] being the address; all or nothing."""
         address, data = parameters[0], parameters[1:]
-        places = range(address, address + len(data))
-        if places.stop > TABLE_SIZE or READ_ONLY & set(places):
+        addresses = range(address, address + len(data))
+        if addresses.stop > TABLE_SIZE or READ_ONLY & set(addresses):
             return ServoErrors.RANGE
-        if places.start < EEPROM_END and self.get(mx64.LOCK):
+        if addresses.start < EEPROM_END and self.get(mx64.LOCK):
             return ServoErrors.RANGE
         before = bytes(self._table)
-        self._table[places.start : places.stop] = data
-        errors = self._faults(frozenset(places))
+        self._table[addresses.start : addresses.stop] = data
+        errors = self._faults(frozenset(addresses))
         if errors:
             self._table[:] = before
             return errors
-        if mx64.TORQUE_LIMIT.address in places and self.get(mx64.TORQUE_LIMIT):
+        if mx64.TORQUE_LIMIT.address in addresses and self.get(mx64.TORQUE_LIMIT):
             self.errors &= ~ServoErrors.OVERLOAD
-        if mx64.GOAL_POSITION.address in places and not self.get(mx64.TORQUE_CONTROL_MODE):
+        if mx64.GOAL_POSITION.address in addresses and not self.get(mx64.TORQUE_CONTROL_MODE):
             self.set(mx64.TORQUE_ENABLE, 1)
         return errors
 
-    def _faults(self, places: frozenset[int]) -> ServoErrors:
-        """Returns the errors of the words written at `places`."""
+    def _faults(self, addresses: frozenset[int]) -> ServoErrors:
+        """Returns the errors of the words written at `addresses`."""
         errors = ServoErrors.NONE
         for register, largest in LARGEST.items():
-            if register.address in places and self.get(register) > largest:
+            if register.address in addresses and self.get(register) > largest:
                 errors |= ServoErrors.RANGE
-        if mx64.GOAL_POSITION.address in places and not self._goal_allowed():
+        if mx64.GOAL_POSITION.address in addresses and not self._goal_allowed():
             errors |= ServoErrors.ANGLE_LIMIT
         return errors
 

@@ -96,7 +96,7 @@ class ControlScript:
         if command != Command.NONE:
             self._last_command_s = self._controller.time_s
         elif 0.0 < self._watchdog_s < self._controller.time_s - self._last_command_s:
-            LOGGER.warning("no order for %.3f s: the watchdog ends the program", self._watchdog_s)
+            LOGGER.warning("no command for %.3f s: the watchdog ends the program", self._watchdog_s)
             return False
         if command == Command.NONE or command in _STREAMED:
             self._executing = False
@@ -159,7 +159,7 @@ class ControlScript:
             case Command.SET_TCP | Command.KICK_WATCHDOG:
                 pass
             case _:
-                LOGGER.error("order %d of the control script is not emulated: the program ends", command)
+                LOGGER.error("command %d of the control script is not emulated: the program ends", command)
                 return False
         self._report(DONE)
         return True

@@ -87,11 +87,11 @@ def matrix_from_rows(
         )
     if len(set(names)) != len(names):
         raise ValueError("allowed_collision_matrix: a name stands twice in entry_names; list each body once")
-    place = {name: number for number, name in enumerate(names)}
+    index_of = {name: number for number, name in enumerate(names)}
     entries: dict[frozenset[str], bool] = {}
     for index, name in enumerate(names):
         for other in names[index:]:
-            verdict = bool(rows[index][place[other]])
+            verdict = bool(rows[index][index_of[other]])
             if verdict != _default(defaults, name, other):
                 entries[frozenset((name, other))] = verdict
     return AllowedCollisionMatrix(entries, dict(defaults), tuple(dict.fromkeys((*names, *defaults))))

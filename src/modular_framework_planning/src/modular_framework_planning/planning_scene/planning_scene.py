@@ -176,7 +176,7 @@ class PlanningScene:
                     f"moving '{name}': {len(shape_poses)} poses of shapes for {len(shapes)} shapes; "
                     "give one for each shape, or none to move the object as a whole"
                 )
-            shapes = tuple((shape, place) for (shape, _), place in zip(shapes, shape_poses, strict=True))
+            shapes = tuple((shape, shape_pose) for (shape, _), shape_pose in zip(shapes, shape_poses, strict=True))
         return self._changed(objects={**self.objects, name: replace(body, pose=pose, shapes=shapes)})
 
     def without_object(self, name: str) -> PlanningScene:

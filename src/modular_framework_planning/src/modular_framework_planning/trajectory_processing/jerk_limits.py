@@ -93,8 +93,8 @@ def _integrals(trajectory: Trajectory, times: Array) -> Array:
     powers = np.arange(1.0, 7.0)
     coefficients = trajectory.coefficients() / powers[:, None]
     spans = np.diff(trajectory.times)
-    whole = np.einsum("npj,np->nj", coefficients, spans[:, None] ** powers)
-    areas = np.concatenate([np.zeros_like(whole[:1]), np.cumsum(whole, axis=0)])
+    piece_integrals = np.einsum("npj,np->nj", coefficients, spans[:, None] ** powers)
+    areas = np.concatenate([np.zeros_like(piece_integrals[:1]), np.cumsum(piece_integrals, axis=0)])
     inner = np.clip(times, 0.0, trajectory.duration_s)
     segment = np.clip(np.searchsorted(trajectory.times, inner, side="right") - 1, 0, len(spans) - 1)
     offsets = (inner - trajectory.times[segment])[:, None]

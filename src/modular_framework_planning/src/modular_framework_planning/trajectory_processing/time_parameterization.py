@@ -37,8 +37,8 @@ def point_times(wanted: Array, end: float, longest_period_s: float = LONGEST_PER
     kept.append(end)
     spans = np.diff(kept)
     counts = np.ceil(spans / longest_period_s).astype(int)
-    places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.append(np.repeat(kept[:-1], counts) + places * np.repeat(spans / counts, counts), end)
+    indices = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.append(np.repeat(kept[:-1], counts) + indices * np.repeat(spans / counts, counts), end)
 
 
 def overrun(trajectory: Trajectory, velocity: Array, acceleration: Array) -> float:

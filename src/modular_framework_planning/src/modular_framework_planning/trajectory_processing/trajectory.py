@@ -94,8 +94,8 @@ class Trajectory:
             * np.maximum(np.abs(self.velocities[:-1]).max(axis=1), np.abs(self.velocities[1:]).max(axis=1)),
         )
         counts = np.maximum(1, np.ceil(reach / step)).astype(int)
-        places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        times = np.repeat(self.times[:-1], counts) + places * np.repeat(np.diff(self.times) / counts, counts)
+        indices = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        times = np.repeat(self.times[:-1], counts) + indices * np.repeat(np.diff(self.times) / counts, counts)
         return np.vstack([self.positions_at(times), self.positions[-1:]])
 
     def chords(self, first: int = 0) -> list[Array]:
