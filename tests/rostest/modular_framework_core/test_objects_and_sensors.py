@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import rospy
+import rosservice
 import tf2_ros
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from ros_session import executable
+from ros_session import Launch, executable
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
@@ -175,23 +177,34 @@ def test_the_sensors_node_needs_its_file(simulation: FakeSimulation) -> None:
     assert "expected one" in done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(
-    ("executable", "service"),
-    [
-        ("joint_state_manager_server", "get_joint_state"),
-        ("joint_trajectory_manager_server", "get_trajectory"),
-        ("pose_stamped_manager_server", "get_pose"),
-        ("moveit_plan_manager_server", "get_plan"),
-        ("standardised_grasp_manager_server", "get_grasp"),
-        ("robot_pose_manager_server", "get_robot_pose"),
-        ("acm_manager_server", "get_modified_acm"),
-        ("gazebo_mapping_server", "get_object_type"),
-    ],
-)
-def test_every_manager_runs_as_a_node_of_its_own(simulation: FakeSimulation, executable: str, service: str) -> None:
-    launch = simulation.session.launch(
-        f'<launch><group ns="alone"><node name="{executable}" pkg="modular_framework_core" type="{executable}" '
-        'required="true" output="screen"/></group></launch>'
+MANAGERS = {  # node: one of its services
+    "joint_state_manager_server": "get_joint_state",
+    "joint_trajectory_manager_server": "get_trajectory",
+    "pose_stamped_manager_server": "get_pose",
+    "moveit_plan_manager_server": "get_plan",
+    "standardised_grasp_manager_server": "get_grasp",
+    "robot_pose_manager_server": "get_robot_pose",
+    "acm_manager_server": "get_modified_acm",
+    "gazebo_mapping_server": "get_object_type",
+}
+
+
+@pytest.fixture(scope="module")
+def separate_managers(simulation: FakeSimulation) -> Iterator[Launch]:
+    """Every manager as a node of its own, in a namespace of theirs."""
+    nodes = "".join(
+        f'<node name="{name}" pkg="modular_framework_core" type="{name}" required="true" output="screen"/>'
+        for name in MANAGERS
     )
-    simulation.session.wait_for_service(f"/alone/{service}", 60)
+    launch = simulation.session.launch(f'<launch><group ns="alone">{nodes}</group></launch>')
+    yield launch
     launch.stop()
+
+
+@pytest.mark.parametrize(("node", "service"), MANAGERS.items())
+def test_every_manager_runs_as_a_node_of_its_own(
+    simulation: FakeSimulation, separate_managers: Launch, node: str, service: str
+) -> None:
+    simulation.session.wait_for_service(f"/alone/{service}", 60)
+    assert rosservice.get_service_node(f"/alone/{service}") == f"/alone/{node}"
+    assert separate_managers.alive()
