@@ -123,7 +123,7 @@ def _wait_for_text(launch: Launch, text: str, timeout_s: float) -> None:
 
 
 def _pid_of(session: RosSession, node: str) -> int:
-    """The process of a node, as the node itself tells it through its slave interface once it has one."""
+    """The process id of a node, from its slave interface once that is open."""
     master = rosgraph.Master("/test", master_uri=session.env["ROS_MASTER_URI"])
     end = time.monotonic() + 60.0
     while True:

@@ -29,8 +29,8 @@ class Stay(FrameworkState):
         self._until = until
 
     def execute(self, userdata):
-        told = self.wait_until(lambda: rospy.has_param(f"/go_on/{self._until}"), 60.0, 0.1)
-        return self.succeed() if told else self.fail("nobody said go on")
+        allowed = self.wait_until(lambda: rospy.has_param(f"/go_on/{self._until}"), 60.0, 0.1)
+        return self.succeed() if allowed else self.fail("nobody said go on")
 """
 
 PICK = """

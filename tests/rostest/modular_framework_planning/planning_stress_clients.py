@@ -41,7 +41,7 @@ FLIPPER = "flipper"  # the client that changes the scene all the time
 
 @dataclass(frozen=True)
 class Answer:
-    """What a client was told: in which worlds it may have been planned, its own walls, the code it had to be."""
+    """An answer of a client: the worlds in which it may have been planned, its own walls, the expected code."""
 
     begun: float
     ended: float

@@ -69,7 +69,7 @@ until = functools.partial(wait_until, timeout_s=10.0)
 
 
 class FakePlanningScene:
-    """Stands where move_group does: keeps what it was told."""
+    """A fake of move_group that stores what it receives."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()

@@ -160,7 +160,7 @@ def test_a_joint_and_a_link(robot: RobotCommander) -> None:
     assert link.name() == "panda_link1" and place_of(link.pose()) == pytest.approx([0.0, 0.0, 0.333])
 
 
-# ---------------------------------------------------------------- a group: what it knows and is told
+# ---------------------------------------------------------------- a group: its state and its settings
 def test_what_a_group_knows(arm: MoveGroupCommander) -> None:
     assert arm.get_name() == "panda_arm" and arm.get_planning_frame() == "panda_link0"
     assert arm.get_variable_count() == 7

@@ -47,7 +47,7 @@ def combined(parameters: dict[str, Any] = PARAMETERS, make: Callable[[str], Robo
 
 
 class Recorder(RobotHW):
-    """Hardware with given interfaces and joints; records what it is asked, answers what it is told."""
+    """Hardware with given interfaces and joints; records its calls and returns the given answers."""
 
     def __init__(self, interface_class: type[Any] = PositionJointInterface, joints: Sequence[str] = ("j",)) -> None:
         super().__init__()

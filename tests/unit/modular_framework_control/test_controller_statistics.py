@@ -20,7 +20,7 @@ from modular_framework_ros.node_handle import MappingNodeHandle
 
 
 class Clock:
-    """Time that passes only when it is told to."""
+    """A clock that advances only on request."""
 
     def __init__(self) -> None:
         self.now_s = 50.0
@@ -30,7 +30,7 @@ class Clock:
 
 
 class Slow(Controller):
-    """Takes as long as it is told."""
+    """A controller whose update takes a given time."""
 
     interface_class = JointStateInterface
 

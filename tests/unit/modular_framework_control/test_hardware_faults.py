@@ -63,7 +63,7 @@ class Fragile(MockRobotHW):
 
 
 class Listener(Controller):
-    """Notes what it is told."""
+    """Records its notifications."""
 
     interface_class = PositionJointInterface
 

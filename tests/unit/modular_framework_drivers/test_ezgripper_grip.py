@@ -18,7 +18,7 @@ PERIOD_S = 0.02
 
 
 class Fingers:
-    """Fingers that go where they are told at 1 rad/s, unless something is in the way."""
+    """Fingers that follow their commands at 1 rad/s, unless an object blocks them."""
 
     def __init__(self, position: float, goal: float, torque: int = 300) -> None:
         self.position, self.time_s = position, 0.0

@@ -252,7 +252,7 @@ def test_wrong_parameters_are_an_error_that_says_so(caplog: pytest.LogCaptureFix
 
 
 class SteadyGripper(EzGripper):
-    """Has no servos; says what it is told to say."""
+    """A fake device without servos, with given states."""
 
     def start(self) -> None:
         self.say("")

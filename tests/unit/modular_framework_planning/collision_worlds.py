@@ -61,7 +61,7 @@ def random_pose(rng: np.random.Generator) -> pin.SE3:
 
 
 def world_with(model: RobotModel, second: IndependentChecker, rng: np.random.Generator, held: int) -> PlanningScene:
-    """Ten shapes of all kinds around the robot and one held object, told to both checkers."""
+    """Ten shapes of all kinds around the robot and one held object, for both checkers."""
     scene, world = empty_scene(model), []
     for number in range(10):
         shape, solid = shape_of(number % 5, rng.uniform(0.17, 0.3, 3))  # nothing fits inside a link

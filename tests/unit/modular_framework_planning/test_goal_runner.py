@@ -71,7 +71,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(work: Callable[..., Any], *names: str, all_sent: threading.Event | None = None) -> list[Handle]:
-    """Sends goals one right after the other, tells that they are sent, and waits for their ends."""
+    """Sends goals one right after the other, reports that they are sent, and waits for their ends."""
     GoalRunner("some_action", ExecuteTrajectoryAction, work)
     handles = [Handle(name) for name in names]
     for handle in handles:
@@ -105,7 +105,7 @@ def test_a_goal_that_comes_while_the_one_before_is_cleared_away_does_not_lock_th
     clearing = threading.Event()
 
     class SlowToName(Handle):
-        """Tells its name so late, once it has ended, that the next goal arrives meanwhile."""
+        """Returns its name so late, once it has ended, that the next goal arrives meanwhile."""
 
         def get_goal_id(self) -> Any:
             if self.ended.is_set():

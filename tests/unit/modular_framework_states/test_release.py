@@ -15,7 +15,7 @@ from modular_framework_states.states.release import Release
 
 @pytest.fixture
 def hand(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A hand that holds a can, in a scene that lets it go when told, or by itself after some reads."""
+    """A hand that holds a can, in a scene that detaches it on request, or by itself after some reads."""
     state = SimpleNamespace(simulation=False, sent=[], held={"can__link": "palm"}, reads_left=0, problem="")
 
     def send(client: Any, stage: str, grasp: Any, *_: Any) -> None:

@@ -23,7 +23,7 @@ class Give(smach.State):
 
 
 class Stay(smach.State):
-    """Runs until it is asked to stop; services the request unless told not to."""
+    """Runs until it is asked to stop; services the request unless configured otherwise."""
 
     def __init__(self, services: bool = True, outcomes: tuple[str, ...] = ("success", "preempted")) -> None:
         super().__init__(outcomes=outcomes)

@@ -35,7 +35,7 @@ class Stay(FrameworkState):
 
 
 class Blind(smach.State):
-    """A state of a user who does not know of reasons; ends when told by an event."""
+    """A state of a user who does not know of reasons; ends when an event is set."""
 
     def __init__(self, end: threading.Event, outcome: str = "fail") -> None:
         super().__init__(outcomes=["success", "fail"])
