@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One Ctrl-C in the middle of a simulated pick: when the task said its last word, when the arm stood, who was left."""
+"""One SIGINT during a simulated pick: when the task printed its last line, when the arm was at rest, what was left."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Switching controllers of hardware that takes its time, by the service, in simulated time: start_asap and timeout."""
+"""Switching controllers of hardware with slow mode changes, in simulated time: start_asap and timeout."""
 
 from __future__ import annotations
 

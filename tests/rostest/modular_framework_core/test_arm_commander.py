@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arm commander: every call stands alone, and every failure has a reason."""
+"""The arm commander: every call is independent, and every failure has a reason."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""compute_cartesian_path on the wire: straight, timed, honest about how far it goes and why no further."""
+"""compute_cartesian_path on the wire: straight, timed, with the fraction that was found and why it ends early."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The goal one drags in RViz: this test sends what RViz would send, and sees what RViz would show."""
+"""The interactive goal in RViz: this test sends RViz's feedback, and checks the markers that RViz would show."""
 
 from __future__ import annotations
 

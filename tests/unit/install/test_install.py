@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the set-up script does before it changes anything."""
+"""The checks of the set-up script before it changes anything."""
 from __future__ import annotations
 
 import contextlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two pieces of hardware combined behave as one robot, and each is asked only about what is its own."""
+"""Two pieces of hardware combined behave as one robot, and each gets only the requests for its own joints."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the control loop's node writes after its controllers stopped: cycles until nothing moves, or that is in vain."""
+"""After its controllers stopped, the control loop's node writes commands until all joints are at rest, or too long."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What it takes to bring a group of controllers into force."""
+"""The controllers to load, start and stop for a group of controllers."""
 
 from __future__ import annotations
 

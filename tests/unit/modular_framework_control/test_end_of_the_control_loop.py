@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the control loop's node does last: the robot is brought to rest before anything waits for the network."""
+"""Shutdown of the control loop's node: the robot is brought to rest before anything waits for the network."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The control loop logs without waiting for whoever writes the log."""
+"""The control loop logs without waiting for the handlers that write the log."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a trajectory may ask of joints with limits, and how they come to rest: curves against SciPy and the formulas."""
+"""Limits of trajectories, and stops within them: curves against SciPy and the formulas."""
 
 from __future__ import annotations
 

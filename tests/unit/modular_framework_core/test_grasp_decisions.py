@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the grasp server makes of a command, and when it says that a stage was reached."""
+"""The grasp server's checks of commands, and its decision whether a stage was reached."""
 
 from __future__ import annotations
 

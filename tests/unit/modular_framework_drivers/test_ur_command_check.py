@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What of the commands reaches the arm."""
+"""The check of commands before they are sent to the arm."""
 
 from __future__ import annotations
 

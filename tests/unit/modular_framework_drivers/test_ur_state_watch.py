@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What counts as silence of the arm, and what as one of its states."""
+"""Detection of a silent arm, and of implausible states."""
 
 from __future__ import annotations
 

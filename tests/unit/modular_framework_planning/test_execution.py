@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Execution of motions, as far as it needs no controller."""
+"""Execution of motions, the parts that need no controller."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans are safe, timed within limits and honest about failure; verdicts equal those of an independent checker."""
+"""Plans are safe and timed within limits, and failures have reasons; verdicts equal those of an independent checker."""
 
 from __future__ import annotations
 

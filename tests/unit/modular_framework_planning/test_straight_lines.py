@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Straight lines with six and with seven joints: on the line, without jumps, and honest about where they end."""
+"""Straight lines with six and with seven joints: on the line, without jumps, and with the reason if they end early."""
 
 from __future__ import annotations
 

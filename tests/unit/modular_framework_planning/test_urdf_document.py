@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a robot looks like is kept for the markers, beside what Pinocchio reads."""
+"""The visual geometry of a robot is kept for markers, beside what Pinocchio reads."""
 
 from __future__ import annotations
 

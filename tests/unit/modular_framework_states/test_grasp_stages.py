@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who starts at a stage of a grasp finds the joint positions with which the others arrive there."""
+"""A plan from a stage of a grasp starts at the joint positions at which a plan to that stage ends."""
 
 from __future__ import annotations
 
