@@ -19,7 +19,6 @@ import numpy as np
 import pinocchio as pin
 
 from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry
-from modular_framework_planning.collision_detection.kernels.compiled_collision import Surfaces
 from modular_framework_planning.collision_detection.kernels.compiled_distance import (
     BOX,
     CAPSULE,
@@ -30,7 +29,11 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     SPHERE,
     SURFACE,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_triangles import build_sphere_tree, cut_long_edges
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import (
+    Surfaces,
+    build_sphere_tree,
+    cut_long_edges,
+)
 from modular_framework_planning.geometry.shapes import Mesh, Shape
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.octomap.octree import Octree

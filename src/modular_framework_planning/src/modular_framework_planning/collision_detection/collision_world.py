@@ -21,11 +21,11 @@ from modular_framework_planning.collision_detection.collision_bodies import Plac
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     CELLS,
     UNKNOWN,
-    Surfaces,
     World,
     arguments,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.contacts import LINK, WORLD, Body
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import tree_of

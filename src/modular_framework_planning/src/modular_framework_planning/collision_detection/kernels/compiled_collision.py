@@ -15,25 +15,17 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     SURFACE,
     TOO_CLOSE,
     TOUCHING,
+    Solid,
     solid_distance,
     surface_to_solid,
     surface_to_surface,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_triangles import encloses
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces, encloses
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements
 
 CELLS = 128  # of a table along each joint, over a whole turn
 UNKNOWN, APART, NEAR = range(3)
-
-
-class Surfaces(NamedTuple):
-    """Trees over triangles, see build_sphere_tree; the bodies hold the roots."""
-
-    spheres: Array
-    boxes: Array
-    links: NDArray[np.int32]
-    triangles: Array
 
 
 class World(NamedTuple):
@@ -116,52 +108,37 @@ def relative_pose(one, two, relative):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def solid_of(kinds, sizes, body):  # type: ignore[no-untyped-def]
+    """Returns the closed form of a body, see World."""
+    return Solid(kinds[body], sizes[body, 0], sizes[body, 1], sizes[body, 2])
+
+
+@njit(cache=True, nogil=True)
+def centre_gap(centres, first, second):  # type: ignore[no-untyped-def]
+    """Returns the distance of the centres (b, 3) of two bodies' spheres."""
+    x, y, z = (
+        centres[first, 0] - centres[second, 0],
+        centres[first, 1] - centres[second, 1],
+        centres[first, 2] - centres[second, 2],
+    )
+    return np.sqrt(x * x + y * y + z * z)
+
+
+@njit(cache=True, nogil=True)
 def pair_bound(world, pair, poses, centres, limit, relative):  # type: ignore[no-untyped-def]
     """Returns (status, lower bound of the pair's distance less its margin, at most `limit`)."""
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     margin = world.margins[pair]
-    gap = np.sqrt(
-        (centres[first, 0] - centres[second, 0]) ** 2
-        + (centres[first, 1] - centres[second, 1]) ** 2
-        + (centres[first, 2] - centres[second, 2]) ** 2
-    )
-    if gap - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
+    if centre_gap(centres, first, second) - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
         return CLEAR, limit
     relative_pose(poses[first], poses[second], relative)
-    surface = world.scene if world.is_environment[first] else world.robot
+    surface, root = world.scene if world.is_environment[first] else world.robot, world.roots[first]
     if world.kinds[second] != SURFACE:
-        size = world.sizes[second]
-        status, bound = surface_to_solid(
-            surface.spheres,
-            surface.boxes,
-            surface.links,
-            surface.triangles,
-            world.roots[first],
-            relative,
-            world.kinds[second],
-            size[0],
-            size[1],
-            size[2],
-            margin,
-            limit,
-        )
+        solid = solid_of(world.kinds, world.sizes, second)
+        status, bound = surface_to_solid(surface, root, relative, solid, margin, limit)
     else:
         other = world.scene if world.is_environment[second] else world.robot
-        status, bound = surface_to_surface(
-            surface.spheres,
-            surface.boxes,
-            surface.links,
-            surface.triangles,
-            world.roots[first],
-            other.spheres,
-            other.boxes,
-            other.links,
-            other.triangles,
-            world.roots[second],
-            relative,
-            margin,
-            limit,
-        )
+        status, bound = surface_to_surface(surface, root, other, world.roots[second], relative, margin, limit)
     if status == TOUCHING and not world.exact[pair]:
         status = TOO_CLOSE
     return status, bound
@@ -193,13 +170,13 @@ def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
             )
             local[row] += two[axis, row] * value
     if world.kinds[outer] != SURFACE:
-        size = world.sizes[outer]
-        return solid_distance(world.kinds[outer], size[0], size[1], size[2], local[0], local[1], local[2]) < -ROUNDING
+        solid = solid_of(world.kinds, world.sizes, outer)
+        return solid_distance(solid, local[0], local[1], local[2]) < -ROUNDING
     sphere = world.spheres[outer]
     if (local[0] - sphere[0]) ** 2 + (local[1] - sphere[1]) ** 2 + (local[2] - sphere[2]) ** 2 > sphere[3] * sphere[3]:
         return False
     surface = world.scene if world.is_environment[outer] else world.robot
-    return encloses(surface.spheres, surface.links, surface.triangles, world.roots[outer], local[0], local[1], local[2])
+    return encloses(surface, world.roots[outer], local[0], local[1], local[2])
 
 
 @njit(cache=True, nogil=True)
@@ -208,14 +185,9 @@ def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
     pairs, exact, spheres = world.pairs, world.exact, world.spheres
     for pair in range(len(pairs)):
         first, second = pairs[pair, 0], pairs[pair, 1]
-        x, y, z = (
-            centres[first, 0] - centres[second, 0],
-            centres[first, 1] - centres[second, 1],
-            centres[first, 2] - centres[second, 2],
-        )
         if (
             exact[pair]
-            and np.sqrt(x * x + y * y + z * z) < spheres[first, 3] + spheres[second, 3]
+            and centre_gap(centres, first, second) < spheres[first, 3] + spheres[second, 3]
             and (_contains(world, first, second, poses) or _contains(world, second, first, poses))
         ):
             return pair
@@ -228,60 +200,17 @@ def arguments(world: World) -> tuple[NDArray[Any], ...]:
 
 
 @njit(cache=True, nogil=True)
-def world_of(  # type: ignore[no-untyped-def]
-    parents,
-    placements,
-    axes,
-    prismatic,
-    joints,
-    poses,
-    roots,
-    is_environment,
-    kinds,
-    sizes,
-    spheres,
-    closed,
-    robot_spheres,
-    robot_boxes,
-    robot_links,
-    robot_triangles,
-    scene_spheres,
-    scene_boxes,
-    scene_links,
-    scene_triangles,
-    pairs,
-    margins,
-    exact,
-    tables,
-    table_joints,
-    table_of,
-):
-    """Puts the arrays that `arguments` gives together again."""
-    return World(
-        Tree(parents, placements, axes, prismatic),
-        joints,
-        poses,
-        roots,
-        is_environment,
-        kinds,
-        sizes,
-        spheres,
-        closed,
-        Surfaces(robot_spheres, robot_boxes, robot_links, robot_triangles),
-        Surfaces(scene_spheres, scene_boxes, scene_links, scene_triangles),
-        pairs,
-        margins,
-        exact,
-        tables,
-        table_joints,
-        table_of,
-    )
+def world_of(arrays):  # type: ignore[no-untyped-def]
+    """Puts the arrays that `arguments` gives together again; numba calls no class with more than one starred tuple."""
+    a = arrays
+    tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
+    return World(tree, a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], robot, scene, *a[20:])
 
 
 @njit(cache=True, nogil=True)
 def surrounded_pair_at(positions, *world):  # type: ignore[no-untyped-def]
     """Returns the first pair of which one body lies wholly inside the other at these positions, or -1."""
-    return _surrounded_at(world_of(*world), positions)
+    return _surrounded_at(world_of(world), positions)
 
 
 @njit(cache=True, nogil=True)

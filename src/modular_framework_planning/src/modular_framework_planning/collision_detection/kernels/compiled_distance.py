@@ -2,11 +2,13 @@
 """Bounds the distance between two bodies, compiled: fast where they are far apart, exact to 0.1 mm where they are not.
 
 A body is a tree of spheres over its triangles, or a solid whose distance to a point is known in closed form. Every
-answer is a lower bound of the true distance; an answer of 0 says whether a common point was found or the bodies are
-merely too close to tell.
+answer is a lower bound of the true distance; with an answer of 0 comes whether a common point was found or the bodies
+are too close to decide.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,11 +17,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_triangles i
     halve_longest_edge,
     triangle_distance,
 )
+from modular_framework_planning.geometry.spatial import Array
 
 SURFACE, SPHERE, BOX, CYLINDER, CONE, CAPSULE, PLANE, HALF_SPACE = range(8)  # what a body's closed form is
 CLEAR, TOUCHING, TOO_CLOSE = range(3)
 
-SMALLEST_PIECE = 1.0e-4  # [m]; triangles are cut down to this radius before a pair is called too close to tell
+SMALLEST_PIECE = 1.0e-4  # [m]; triangles are cut down to this radius before a pair is called too close to decide
 ROUNDING = 1.0e-6  # [m]; what the exact checker and floating point may differ by
 HOPELESS_SHARE = 0.3
 ACCEPTED_SHARE = 0.5  # a sphere of at most this share of its distance is not looked into
@@ -28,9 +31,33 @@ MOST_PAIRS = 50_000  # of nodes looked at for one cell of a table
 STACK = 512
 
 
+class Solid(NamedTuple):
+    """A closed form and the three numbers that describe it, see solid_distance."""
+
+    kind: int
+    p0: float
+    p1: float
+    p2: float
+
+
+class Turns(NamedTuple):
+    """Axes that a surface turns about.
+
+    Attributes:
+        origins: a point on each axis, the axis nearest to the surface first; shape (k, 3) [m].
+        axes: unit vectors along them, shape (k, 3).
+        change: by how much it turns about each to either side at most, shape (k,) [rad].
+    """
+
+    origins: Array
+    axes: Array
+    change: Array
+
+
 @njit(cache=True, nogil=True)
-def solid_distance(kind, p0, p1, p2, x, y, z):  # type: ignore[no-untyped-def]
+def solid_distance(solid, x, y, z):  # type: ignore[no-untyped-def]
     """Returns the distance [m] of a point from a solid in the solid's frame, below 0 inside it (never too large)."""
+    kind, p0, p1, p2 = solid
     if kind == BOX:
         dx, dy, dz = abs(x) - p0, abs(y) - p1, abs(z) - p2
         inside = min(max(dx, max(dy, dz)), 0.0)
@@ -50,6 +77,18 @@ def solid_distance(kind, p0, p1, p2, x, y, z):  # type: ignore[no-untyped-def]
         return _cone_distance(p0, p1, np.sqrt(x * x + y * y), z)
     height = p0 * x + p1 * y + p2 * z
     return abs(height) if kind == PLANE else height
+
+
+@njit(cache=True, nogil=True)
+def placed_solid_distance(solid, poses, body, x, y, z):  # type: ignore[no-untyped-def]
+    """Returns what solid_distance does, of a point in the frame in which the solid's body has a pose (b, 3, 4)."""
+    x, y, z = x - poses[body, 0, 3], y - poses[body, 1, 3], z - poses[body, 2, 3]
+    return solid_distance(
+        solid,
+        poses[body, 0, 0] * x + poses[body, 1, 0] * y + poses[body, 2, 0] * z,
+        poses[body, 0, 1] * x + poses[body, 1, 1] * y + poses[body, 2, 1] * z,
+        poses[body, 0, 2] * x + poses[body, 1, 2] * y + poses[body, 2, 2] * z,
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -75,8 +114,9 @@ def _gap(low, high, half):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _span_bound(kind, p0, p1, p2, t):  # type: ignore[no-untyped-def]
+def _span_bound(solid, t):  # type: ignore[no-untyped-def]
     """Lower bound of a triangle's distance from a box or cylinder by the triangle's extent along the axes."""
+    kind, p0, p1, p2 = solid
     gz = _gap(min(t[2], t[5], t[8]), max(t[2], t[5], t[8]), p2 if kind == BOX else p1)
     gx = _gap(min(t[0], t[3], t[6]), max(t[0], t[3], t[6]), p0)
     gy = _gap(min(t[1], t[4], t[7]), max(t[1], t[4], t[7]), p1 if kind == BOX else p0)
@@ -86,7 +126,7 @@ def _span_bound(kind, p0, p1, p2, t):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type: ignore[no-untyped-def]
+def _triangle_to_solid(triangle, pose, solid, margin, limit):  # type: ignore[no-untyped-def]
     """Returns (status, lower bound capped at `limit`) of one triangle against a solid, cutting the triangle up."""
     pieces = np.empty((64, 9))
     for corner in range(3):
@@ -102,7 +142,7 @@ def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type
         depth -= 1
         work += 1
         t = pieces[depth]
-        if kind in (BOX, CYLINDER) and _span_bound(kind, p0, p1, p2, t) - margin >= limit:
+        if solid.kind in (BOX, CYLINDER) and _span_bound(solid, t) - margin >= limit:
             continue
         cx, cy, cz = (t[0] + t[3] + t[6]) / 3.0, (t[1] + t[4] + t[7]) / 3.0, (t[2] + t[5] + t[8]) / 3.0
         radius = 0.0
@@ -111,7 +151,7 @@ def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type
                 radius, (t[3 * corner] - cx) ** 2 + (t[3 * corner + 1] - cy) ** 2 + (t[3 * corner + 2] - cz) ** 2
             )
         radius = np.sqrt(radius)
-        centre = solid_distance(kind, p0, p1, p2, cx, cy, cz) - margin
+        centre = solid_distance(solid, cx, cy, cz) - margin
         if centre - radius >= limit:
             continue
         if centre < -ROUNDING:
@@ -127,8 +167,9 @@ def _triangle_to_solid(triangle, pose, kind, p0, p1, p2, margin, limit):  # type
 
 
 @njit(cache=True, nogil=True)
-def _box_to_solid(box, pose, kind, p0, p1, p2):  # type: ignore[no-untyped-def]
+def _box_to_solid(box, pose, solid):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of a tree's box from a solid, along the faces' normals of the boxes around both."""
+    kind, p0, p1, p2 = solid
     if kind in (PLANE, HALF_SPACE):
         return -np.inf
     hx = p0
@@ -176,39 +217,21 @@ def _box_to_box(box, other, pose):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def surface_to_solid(  # type: ignore[no-untyped-def]
-    spheres,
-    boxes,
-    links,
-    triangles,
-    root,
-    pose,
-    kind,
-    p0,
-    p1,
-    p2,
-    margin,
-    limit,
-):
+def surface_to_solid(surface, root, pose, solid, margin, limit):  # type: ignore[no-untyped-def]
     """Bounds the distance of a surface from a solid.
 
     Args:
-        spheres: of a tree, see build_sphere_tree.
-        boxes: of the tree.
-        links: of the tree.
-        triangles: (m, 9) corners.
+        surface: the trees that hold it.
         root: node to start from.
         pose: (3, 4) of the surface in the solid's frame.
-        kind: of the solid.
-        p0: first number that describes the solid.
-        p1: second number.
-        p2: third number.
+        solid: the closed form.
         margin: what is taken off every distance [m].
         limit: a distance [m] beyond which nothing needs to be known.
 
     Returns:
         (status, lower bound of the distance, at most `limit`).
     """
+    spheres, boxes, links, triangles = surface
     stack = np.empty(STACK, np.int32)
     bounds = np.empty(STACK)
     stack[0], bounds[0] = root, -np.inf
@@ -219,14 +242,14 @@ def surface_to_solid(  # type: ignore[no-untyped-def]
         if bounds[depth] >= limit:
             continue
         if links[node, 0] < 0:
-            status, bound = _triangle_to_solid(triangles[links[node, 1]], pose, kind, p0, p1, p2, margin, limit)
+            status, bound = _triangle_to_solid(triangles[links[node, 1]], pose, solid, margin, limit)
             if status != CLEAR:
                 return status, 0.0
             limit = min(limit, bound)
             continue
         far, near = links[node, 0], links[node, 1]
-        far_gap = _centre_distance(spheres, far, pose, kind, p0, p1, p2) - margin
-        near_gap = _centre_distance(spheres, near, pose, kind, p0, p1, p2) - margin
+        far_gap = _centre_distance(spheres, far, pose, solid) - margin
+        near_gap = _centre_distance(spheres, near, pose, solid) - margin
         if far_gap - spheres[far, 3] < near_gap - spheres[near, 3]:
             far, near, far_gap, near_gap = near, far, near_gap, far_gap
         for child, gap in ((far, far_gap), (near, near_gap)):  # the nearer one comes to lie on top of the stack
@@ -235,20 +258,17 @@ def surface_to_solid(  # type: ignore[no-untyped-def]
                 continue
             if radius <= ACCEPTED_SHARE * gap:
                 limit = gap - radius
-            elif _box_to_solid(boxes[child], pose, kind, p0, p1, p2) - margin < limit:
+            elif _box_to_solid(boxes[child], pose, solid) - margin < limit:
                 stack[depth], bounds[depth] = child, gap - radius
                 depth += 1
     return CLEAR, limit
 
 
 @njit(cache=True, nogil=True)
-def _centre_distance(spheres, node, pose, kind, p0, p1, p2):  # type: ignore[no-untyped-def]
+def _centre_distance(spheres, node, pose, solid):  # type: ignore[no-untyped-def]
     x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
     return solid_distance(
-        kind,
-        p0,
-        p1,
-        p2,
+        solid,
         pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],
         pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3],
         pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3],
@@ -267,21 +287,11 @@ def _sphere_gap(spheres, node, other_spheres, other, pose):  # type: ignore[no-u
 
 @njit(cache=True, nogil=True)
 def surface_to_surface(  # type: ignore[no-untyped-def]
-    spheres,
-    boxes,
-    links,
-    triangles,
-    root,
-    other_spheres,
-    other_boxes,
-    other_links,
-    other_triangles,
-    other_root,
-    pose,
-    margin,
-    limit,
+    surface, root, other_surface, other_root, pose, margin, limit
 ):
     """Bounds the distance of two surfaces; `pose` (3, 4) is the first one's in the frame of the other."""
+    spheres, boxes, links, triangles = surface
+    other_spheres, other_boxes, other_links, other_triangles = other_surface
     stack = np.empty((STACK, 2), np.int32)
     bounds = np.empty(STACK)
     stack[0, 0], stack[0, 1], bounds[0] = root, other_root, -np.inf
@@ -291,11 +301,9 @@ def surface_to_surface(  # type: ignore[no-untyped-def]
         node, other = stack[depth, 0], stack[depth, 1]
         if bounds[depth] >= limit:
             continue
-        leaf, other_leaf = links[node, 0] < 0, other_links[other, 0] < 0
-        if leaf and other_leaf:
-            distance = _triangle_to_triangle(
-                triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]], margin
-            )
+        if links[node, 0] < 0 and other_links[other, 0] < 0:
+            triangle, other_triangle = triangles[links[node, 1]], other_triangles[other_links[other, 1]]
+            distance = _triangle_to_triangle(triangle, pose, other_triangle) - margin
             if distance <= ROUNDING:
                 return (TOUCHING if distance <= 0.0 else TOO_CLOSE), 0.0
             limit = min(limit, distance)
@@ -304,7 +312,7 @@ def surface_to_surface(  # type: ignore[no-untyped-def]
             continue
         if depth > STACK - 3:
             return TOO_CLOSE, 0.0
-        if other_leaf or (not leaf and spheres[node, 3] >= other_spheres[other, 3]):
+        if other_links[other, 0] < 0 or (links[node, 0] >= 0 and spheres[node, 3] >= other_spheres[other, 3]):
             a, b, other_a, other_b = links[node, 0], links[node, 1], other, other
         else:
             a, b, other_a, other_b = node, node, other_links[other, 0], other_links[other, 1]
@@ -326,7 +334,7 @@ def surface_to_surface(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_triangle(triangle, pose, other, margin):  # type: ignore[no-untyped-def]
+def _triangle_to_triangle(triangle, pose, other):  # type: ignore[no-untyped-def]
     corners = np.empty(9)
     for corner in range(3):
         for row in range(3):
@@ -336,44 +344,40 @@ def _triangle_to_triangle(triangle, pose, other, margin):  # type: ignore[no-unt
                 + pose[row, 2] * triangle[3 * corner + 2]
                 + pose[row, 3]
             )
-    return triangle_distance(corners, other) - margin
+    return triangle_distance(corners, other)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _motion_in_turns(spheres, node, pose, origins, axes, change):  # type: ignore[no-untyped-def]
+    """Bounds how far a point of a node's sphere moves [m], ROUNDING included; the others as in surfaces_stay_apart."""
+    x, y, z, radius = spheres[node, 0], spheres[node, 1], spheres[node, 2], spheres[node, 3]
+    px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
+    py = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3]
+    pz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
+    motion = ROUNDING
+    for turn in range(len(change)):
+        wx, wy, wz = px - origins[turn, 0], py - origins[turn, 1], pz - origins[turn, 2]
+        ax, ay, az = axes[turn, 0], axes[turn, 1], axes[turn, 2]
+        reach = np.sqrt((ay * wz - az * wy) ** 2 + (az * wx - ax * wz) ** 2 + (ax * wy - ay * wx) ** 2)
+        motion += change[turn] * (reach + radius + motion)
+    return motion
 
 
 @njit(cache=True, nogil=True)
-def surfaces_stay_apart(  # type: ignore[no-untyped-def]
-    spheres,
-    boxes,
-    links,
-    triangles,
-    root,
-    other_spheres,
-    other_boxes,
-    other_links,
-    other_triangles,
-    other_root,
-    pose,
-    origins,
-    axes,
-    change,
-):
+def surfaces_stay_apart(surface, root, other_surface, other_root, pose, turns):  # type: ignore[no-untyped-def]
     """Whether two surfaces stay apart while the first one turns about some axes; False also where it is too near.
 
     Args:
-        spheres: of the first surface's tree, see build_sphere_tree.
-        boxes: of the first tree.
-        links: of the first tree.
-        triangles: (m, 9) corners of the first surface.
-        root: node of the first tree to start from.
-        other_spheres: of the other surface's tree.
-        other_boxes: of the other tree.
-        other_links: of the other tree.
-        other_triangles: (m, 9) corners of the other surface.
-        other_root: node of the other tree to start from.
+        surface: the trees that hold the first surface.
+        root: node of the first surface to start from.
+        other_surface: the trees that hold the other one.
+        other_root: node of the other surface to start from.
         pose: of the first surface in the frame of the other, in the middle of the turn; shape (3, 4).
-        origins: of the turns in the same frame, the one nearest to the first surface first; shape (k, 3).
-        axes: of the turns, likewise.
-        change: by how much each turns to either side at most [rad], shape (k,).
+        turns: about which axes, in the same frame.
     """
+    spheres, boxes, links, triangles = surface
+    other_spheres, other_boxes, other_links, other_triangles = other_surface
+    origins, axes, change = turns
     stack = np.empty((STACK, 2), np.int32)
     stack[0, 0], stack[0, 1] = root, other_root
     depth, work = 1, 0
@@ -381,37 +385,24 @@ def surfaces_stay_apart(  # type: ignore[no-untyped-def]
         depth -= 1
         work += 1
         node, other = stack[depth, 0], stack[depth, 1]
-        x, y, z, radius = spheres[node, 0], spheres[node, 1], spheres[node, 2], spheres[node, 3]
-        px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
-        py = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3]
-        pz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
-        needed = ROUNDING
-        for turn in range(len(change)):
-            wx, wy, wz = px - origins[turn, 0], py - origins[turn, 1], pz - origins[turn, 2]
-            ax, ay, az = axes[turn, 0], axes[turn, 1], axes[turn, 2]
-            reach = np.sqrt((ay * wz - az * wy) ** 2 + (az * wx - ax * wz) ** 2 + (ax * wy - ay * wx) ** 2)
-            needed += change[turn] * (reach + radius + needed)
+        needed = _motion_in_turns(spheres, node, pose, origins, axes, change)
         gap = _sphere_gap(spheres, node, other_spheres, other, pose)
         if (
-            gap - radius - other_spheres[other, 3] >= needed
+            gap - spheres[node, 3] - other_spheres[other, 3] >= needed
             or _box_to_box(boxes[node], other_boxes[other], pose) >= needed
         ):
             continue
-        leaf, other_leaf = links[node, 0] < 0, other_links[other, 0] < 0
-        if leaf and other_leaf:
-            if (
-                _triangle_to_triangle(triangles[links[node, 1]], pose, other_triangles[other_links[other, 1]], 0.0)
-                < needed
-            ):
+        if links[node, 0] < 0 and other_links[other, 0] < 0:
+            triangle, other_triangle = triangles[links[node, 1]], other_triangles[other_links[other, 1]]
+            if _triangle_to_triangle(triangle, pose, other_triangle) < needed:
                 return False
             continue
         if depth > STACK - 3 or work > MOST_PAIRS:
             return False
-        if other_leaf or (not leaf and radius >= other_spheres[other, 3]):
-            stack[depth, 0], stack[depth, 1] = links[node, 0], other
-            stack[depth + 1, 0], stack[depth + 1, 1] = links[node, 1], other
+        if other_links[other, 0] < 0 or (links[node, 0] >= 0 and spheres[node, 3] >= other_spheres[other, 3]):
+            a, b, other_a, other_b = links[node, 0], links[node, 1], other, other
         else:
-            stack[depth, 0], stack[depth, 1] = node, other_links[other, 0]
-            stack[depth + 1, 0], stack[depth + 1, 1] = node, other_links[other, 1]
+            a, b, other_a, other_b = node, node, other_links[other, 0], other_links[other, 1]
+        stack[depth, 0], stack[depth, 1], stack[depth + 1, 0], stack[depth + 1, 1] = a, other_a, b, other_b
         depth += 2
     return True

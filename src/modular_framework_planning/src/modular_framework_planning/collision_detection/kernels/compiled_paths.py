@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     APART,
     UNKNOWN,
+    centre_gap,
     pair_bound,
     place_bodies,
+    solid_of,
     surrounded_pair,
     world_of,
 )
@@ -29,7 +31,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     SURFACE,
     TOO_CLOSE,
     TOUCHING,
-    solid_distance,
+    placed_solid_distance,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_tables import fill_cells, table_answer
 from modular_framework_planning.geometry.spatial import Array
@@ -301,28 +303,11 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
                             placements,
                             change,
                         )
-            x, y, z = (
-                centres[one, 0] - centres[two, 0],
-                centres[one, 1] - centres[two, 1],
-                centres[one, 2] - centres[two, 2],
-            )
-            if np.sqrt(x * x + y * y + z * z) - spheres[one, 3] - spheres[two, 3] - margins[pair] >= needed:
+            if centre_gap(centres, one, two) - spheres[one, 3] - spheres[two, 3] - margins[pair] >= needed:
                 continue
             if kinds[two] != SURFACE:
-                x, y, z = (
-                    centres[one, 0] - poses[two, 0, 3],
-                    centres[one, 1] - poses[two, 1, 3],
-                    centres[one, 2] - poses[two, 2, 3],
-                )
-                gap = solid_distance(
-                    kinds[two],
-                    sizes[two, 0],
-                    sizes[two, 1],
-                    sizes[two, 2],
-                    poses[two, 0, 0] * x + poses[two, 1, 0] * y + poses[two, 2, 0] * z,
-                    poses[two, 0, 1] * x + poses[two, 1, 1] * y + poses[two, 2, 1] * z,
-                    poses[two, 0, 2] * x + poses[two, 1, 2] * y + poses[two, 2, 2] * z,
-                )
+                x, y, z = centres[one, 0], centres[one, 1], centres[one, 2]
+                gap = placed_solid_distance(solid_of(kinds, sizes, two), poses, two, x, y, z)
                 if gap - spheres[one, 3] - margins[pair] >= needed:
                     continue
             status, bound = pair_bound(world, pair, poses, centres, needed, relative)
@@ -365,7 +350,7 @@ def check_polyline(vertices, step, first, undecided, *world):  # type: ignore[no
         What check_path does, and the numbers of the samples at the vertices, shape (n,).
     """
     samples = sample(vertices, step)
-    status, number = check_path(world_of(*world), samples, first, undecided)
+    status, number = check_path(world_of(world), samples, first, undecided)
     return status, number, samples.numbers
 
 

@@ -13,8 +13,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.kernels.compiled_collision import World, pair_bound, place_bodies
-from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, SURFACE, solid_distance
+from modular_framework_planning.collision_detection.kernels.compiled_collision import (
+    World,
+    pair_bound,
+    place_bodies,
+    solid_of,
+)
+from modular_framework_planning.collision_detection.kernels.compiled_distance import (
+    CLEAR,
+    SURFACE,
+    placed_solid_distance,
+)
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
@@ -61,23 +70,15 @@ def _place(pose, local, out):  # type: ignore[no-untyped-def]
 def _pair_depth(world, cover, placed, poses, middle, first, second, reach):  # type: ignore[no-untyped-def]
     """Depth [m] of the deepest sphere of one body in the other body, `reach` away from it counting as 0."""
     deepest = 0.0
-    pose, size, around = poses[second], world.sizes[second], world.spheres[second, 3]
+    around = world.spheres[second, 3]
+    solid = solid_of(world.kinds, world.sizes, second)
     for i in range(cover.starts[first], cover.starts[first + 1]):
         x, y, z, radius = placed[i, 0], placed[i, 1], placed[i, 2], cover.spheres[i, 3]
         wide = reach + radius + around - deepest
         if (x - middle[0]) ** 2 + (y - middle[1]) ** 2 + (z - middle[2]) ** 2 >= wide * wide:
             continue
         if world.kinds[second] != SURFACE:
-            dx, dy, dz = x - pose[0, 3], y - pose[1, 3], z - pose[2, 3]
-            distance = solid_distance(
-                world.kinds[second],
-                size[0],
-                size[1],
-                size[2],
-                pose[0, 0] * dx + pose[1, 0] * dy + pose[2, 0] * dz,
-                pose[0, 1] * dx + pose[1, 1] * dy + pose[2, 1] * dz,
-                pose[0, 2] * dx + pose[1, 2] * dy + pose[2, 2] * dz,
-            )
+            distance = placed_solid_distance(solid, poses, second, x, y, z)
             deepest = max(deepest, reach + radius - distance)
             continue
         for j in range(cover.starts[second], cover.starts[second + 1]):

@@ -14,7 +14,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     place_bodies,
     relative_pose,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_distance import surfaces_stay_apart
+from modular_framework_planning.collision_detection.kernels.compiled_distance import Turns, surfaces_stay_apart
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
 MOST_CELLS = 12  # looked up for one stretch of a path
@@ -51,22 +51,9 @@ def _fill_cell(world, table, pair, row, column):  # type: ignore[no-untyped-def]
                 axes[turn, line] += base[inner, line] * (
                     placement[inner, 0] * axis[0] + placement[inner, 1] * axis[1] + placement[inner, 2] * axis[2]
                 )
-    surfaces = world.robot
+    change = np.full(turns, 0.5 * width * (1.0 + 1e-9))
     apart = surfaces_stay_apart(
-        surfaces.spheres,
-        surfaces.boxes,
-        surfaces.links,
-        surfaces.triangles,
-        world.roots[first],
-        surfaces.spheres,
-        surfaces.boxes,
-        surfaces.links,
-        surfaces.triangles,
-        world.roots[second],
-        relative,
-        origins,
-        axes,
-        np.full(turns, 0.5 * width * (1.0 + 1e-9)),
+        world.robot, world.roots[first], world.robot, world.roots[second], relative, Turns(origins, axes, change)
     )
     world.tables[table, row, column] = APART if apart else NEAR
 

@@ -3,11 +3,25 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+from modular_framework_planning.geometry.spatial import Array
 
 CENTRING_STEPS = 12
 RAY = (0.4613, 0.5417, 0.7027)  # a direction no mesh is likely to have edges along; of length 1 within 1e-4
+
+
+class Surfaces(NamedTuple):
+    """Trees of spheres and boxes over triangles, see build_sphere_tree; the bodies hold the roots."""
+
+    spheres: Array
+    boxes: Array
+    links: NDArray[np.int32]
+    triangles: Array
 
 
 @njit(cache=True, nogil=True)
@@ -284,8 +298,9 @@ def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def encloses(spheres, links, triangles, root, x, y, z):  # type: ignore[no-untyped-def]
+def encloses(surface, root, x, y, z):  # type: ignore[no-untyped-def]
     """Whether a closed surface contains a point: a ray from the point leaves the surface more often than it enters."""
+    spheres, links, triangles = surface.spheres, surface.links, surface.triangles
     dx, dy, dz = RAY
     stack = np.empty(512, np.int32)
     stack[0] = root
