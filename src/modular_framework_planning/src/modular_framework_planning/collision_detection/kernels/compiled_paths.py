@@ -105,24 +105,13 @@ def _write_reach(vertices, numbers, low, high, first, last, reach):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def _reach_of(  # type: ignore[no-untyped-def]
-    parents,
-    prismatic,
-    axes,
-    joint,
-    until,
-    radius,
-    centre_x,
-    centre_y,
-    centre_z,
-    placements,
-    change,
-):
+def _motion_of(parents, prismatic, axes, placements, change, sphere, joint, until):  # type: ignore[no-untyped-def]
     """Bounds how far a point of a body moves [m], seen from the joint `until`, when every joint changes by `change`.
 
     Going from the body's joint to the base, the distance of the body (a sphere) from each axis can grow by what the
     joints already passed can move it.
     """
+    centre_x, centre_y, centre_z, radius = sphere
     moved = 0.0
     while joint != until:
         if change[joint] > 0.0:
@@ -156,21 +145,19 @@ def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _first_within(travelled, numbers, low, high, at, reference, change, share, row):  # type: ignore[no-untyped-def]
-    """Returns the sample farthest from `at` (low or high, one of which is `at`) within a share of the change.
+def _first_within(travelled, numbers, near, far, reference, change, share, row):  # type: ignore[no-untyped-def]
+    """Returns the sample farthest from `near`, towards `far`, where no joint has gone further than a share of `change`.
 
     Args:
         travelled: how far each joint has gone at the vertices, shape (n, joints).
         numbers: sample at each vertex.
-        low: first of the samples between which to look.
-        high: last of them.
-        at: the one of both that is certified.
-        reference: the travel there.
+        near: the sample that is certified.
+        far: the sample where the search ends.
+        reference: the travel at the certified sample.
         change: how far each joint may have gone where share is 1.
         share: of the change.
         row: working memory.
     """
-    near, far = at, low + high - at
     write_row(travelled, numbers, far, row)
     if _is_within(row, reference, change, share):
         return far
@@ -252,19 +239,8 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         place_bodies(world, placements, poses, centres, looked_at == 0)
         for body in range(bodies):
             if low < high and hangs_on[body] >= 0:
-                motions[body] = _reach_of(
-                    parents,
-                    prismatic,
-                    axes,
-                    hangs_on[body],
-                    -1,
-                    spheres[body, 3],
-                    centres[body, 0],
-                    centres[body, 1],
-                    centres[body, 2],
-                    placements,
-                    change,
-                )
+                sphere = centres[body, 0], centres[body, 1], centres[body, 2], spheres[body, 3]
+                motions[body] = _motion_of(parents, prismatic, axes, placements, change, sphere, hangs_on[body], -1)
         looked_at += 1
         if used + end - begin > len(active):
             larger = np.empty(2 * len(active), active.dtype)
@@ -290,18 +266,9 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
                     needed += motions[one] + motions[two]
                 else:
                     for body in (one, two):
-                        needed += _reach_of(
-                            parents,
-                            prismatic,
-                            axes,
-                            hangs_on[body],
-                            common,
-                            spheres[body, 3],
-                            centres[body, 0],
-                            centres[body, 1],
-                            centres[body, 2],
-                            placements,
-                            change,
+                        sphere = centres[body, 0], centres[body, 1], centres[body, 2], spheres[body, 3]
+                        needed += _motion_of(
+                            parents, prismatic, axes, placements, change, sphere, hangs_on[body], common
                         )
             if centre_gap(centres, one, two) - spheres[one, 3] - spheres[two, 3] - margins[pair] >= needed:
                 continue
@@ -327,8 +294,8 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         if kept == used or low == high:
             continue
         write_row(travelled, numbers, middle, begun)
-        below = _first_within(travelled, numbers, low, middle, middle, begun, change, share, row) - 1
-        above = _first_within(travelled, numbers, middle, high, middle, begun, change, share, row) + 1
+        below = _first_within(travelled, numbers, middle, low, begun, change, share, row) - 1
+        above = _first_within(travelled, numbers, middle, high, begun, change, share, row) + 1
         if tail + 2 > len(ranges):
             longer = np.empty((2 * len(ranges), 4), ranges.dtype)
             longer[:tail] = ranges[:tail]
