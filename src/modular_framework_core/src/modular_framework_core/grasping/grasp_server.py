@@ -137,8 +137,7 @@ def torque_intensities(names: Sequence[str], values: Sequence[float], group: Gro
         {joint: intensity}.
 
     Raises:
-        GraspCommandError: Names and values do not pair, a joint is foreign or repeated, or an intensity is out of
-            range.
+        GraspCommandError: As for a posture; the range of an intensity is [-1, 1].
     """
     if not values:
         return {}
