@@ -20,6 +20,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.ros.robot_hw_node import RobotHwNode
+from modular_framework_ros.action_client import SteadyActionClient
 
 HOUR_S = 3600.0
 
@@ -67,7 +68,7 @@ def clock(ros_session: Any) -> Iterator[SetClock]:
 
 @pytest.fixture
 def arm(clock: SetClock) -> actionlib.SimpleActionClient:
-    client = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    client = SteadyActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 

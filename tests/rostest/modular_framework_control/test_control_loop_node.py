@@ -26,6 +26,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_ros.action_client import SteadyActionClient
+
 MODULE = """
 import rospy
 from std_msgs.msg import String
@@ -146,7 +148,7 @@ def robot(ros_launch: Callable[..., Any], environment: str, diary: Path) -> Any:
 
 
 def follow(name: str, joints: list[str], positions: list[float], duration_s: float) -> actionlib.SimpleActionClient:
-    client = actionlib.SimpleActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
+    client = SteadyActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     point = JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(duration_s))
     client.send_goal(FollowJointTrajectoryGoal(trajectory=JointTrajectory(joint_names=joints, points=[point])))

@@ -33,6 +33,8 @@ from controller_manager_msgs.srv import (
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_ros.action_client import SteadyActionClient
+
 JOINTS = ["shoulder", "elbow"]
 
 
@@ -59,14 +61,14 @@ def robot(ros_session: Any) -> Any:
 
 @pytest.fixture
 def arm(robot: Any) -> actionlib.ActionClient:
-    client = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    client = SteadyActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 
 
 @pytest.fixture
 def gripper(robot: Any) -> actionlib.SimpleActionClient:
-    client = actionlib.SimpleActionClient("gripper/gripper_cmd", GripperCommandAction)
+    client = SteadyActionClient("gripper/gripper_cmd", GripperCommandAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 
@@ -167,7 +169,7 @@ def test_a_malformed_goal_is_rejected_with_code_and_reason(
 
 
 def test_a_new_goal_preempts_the_one_before(arm: actionlib.SimpleActionClient) -> None:
-    other = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    other = SteadyActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert other.wait_for_server(rospy.Duration(30.0))
     here = positions()
     arm.send_goal(goal((30.0, [here["shoulder"] + 5.0, here["elbow"]])))

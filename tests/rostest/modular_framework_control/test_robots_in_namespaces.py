@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import actionlib
 import pytest
 import rosgraph
 import rospy
@@ -17,6 +16,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_ros.action_client import SteadyActionClient
 
 ROBOTS = ["left", "right"]
 
@@ -49,7 +50,7 @@ def test_each_publishes_the_states_of_its_own_joints(robots: Any, robot: str) ->
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_each_moves_its_own_joint_within_its_own_limits(robots: Any, robot: str) -> None:
-    client = actionlib.SimpleActionClient(f"/{robot}/arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    client = SteadyActionClient(f"/{robot}/arm/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(30.0))
 
     def move(position: float) -> int:

@@ -20,6 +20,8 @@ from controller_manager_msgs.srv import LoadController, SwitchController
 from rosgraph_msgs.msg import Clock
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_ros.action_client import SteadyActionClient
+
 LAUNCH = """
 <launch>
   <param name="use_sim_time" value="true"/>
@@ -73,7 +75,7 @@ def clock(ros_launch: Callable[..., Any]) -> Iterator[ClockSource]:
 
 @pytest.fixture
 def arm(clock: ClockSource) -> actionlib.SimpleActionClient:
-    client = actionlib.SimpleActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+    client = SteadyActionClient("arm/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 

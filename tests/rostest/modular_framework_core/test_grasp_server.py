@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal, StandardisedGrasp
+from modular_framework_ros.action_client import SteadyActionClient
 
 ROBOT = """<launch>
   <param name="robot_description" value='&lt;robot name="r"&gt;&lt;link name="palm"/&gt;&lt;link name="finger"/&gt;
@@ -95,7 +96,7 @@ def gripper(ros_launch) -> FakeGripper:
 
 @pytest.fixture(scope="module")
 def client(gripper: FakeGripper) -> actionlib.SimpleActionClient:
-    made = actionlib.SimpleActionClient("moveit_grasp_action_server", GraspAction)
+    made = SteadyActionClient("moveit_grasp_action_server", GraspAction)
     assert made.wait_for_server(rospy.Duration(90)), gripper.session.log()
     return made
 

@@ -15,6 +15,7 @@ from sensor_msgs.msg import JointState
 
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal
+from modular_framework_ros.action_client import SteadyActionClient
 
 JOINT = """&lt;joint name="{name}" type="revolute"&gt;&lt;parent link="palm"/&gt;&lt;child link="{name}_link"/&gt;
 &lt;limit lower="0" upper="1.5" effort="2" velocity="3"/&gt;&lt;/joint&gt;&lt;link name="{name}_link"/&gt;"""
@@ -72,7 +73,7 @@ class FakeHand:
 def hand(ros_launch) -> FakeHand:
     fake = FakeHand()
     ros_launch(LAUNCH)
-    fake.client = actionlib.SimpleActionClient("moveit_grasp_action_server", GraspAction)
+    fake.client = SteadyActionClient("moveit_grasp_action_server", GraspAction)
     assert fake.client.wait_for_server(rospy.Duration(90))
     return fake
 

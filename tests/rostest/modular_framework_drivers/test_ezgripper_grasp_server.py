@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import actionlib
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -19,6 +18,7 @@ from std_srvs.srv import Trigger
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspGoal, StandardisedGrasp
 from modular_framework_drivers.emulators.command_port import send_command
+from modular_framework_ros.action_client import SteadyActionClient
 
 JOINT = "ezgripper_knuckle_palm_L1_1"
 LAUNCH = """<launch>
@@ -50,7 +50,7 @@ class Gripper:
         self.session, self.command_port = session, command_port
         self.joint_state: JointState | None = None
         rospy.Subscriber("joint_states", JointState, self._on_joint_state, queue_size=1)
-        self.client = actionlib.SimpleActionClient("ezgripper_grasp", GraspAction)
+        self.client = SteadyActionClient("ezgripper_grasp", GraspAction)
         assert self.client.wait_for_server(rospy.Duration(60)), session.log()
         until(
             lambda: self.joint_state is not None and self.joint_state.position[0] < 0.03,
@@ -207,7 +207,7 @@ def opening_and_speed(gripper: Gripper) -> tuple[int, int]:
 def test_a_new_goal_takes_over(gripper: Gripper) -> None:
     ended: list[int] = []
     goal = GraspGoal(GraspCommand(grasp_state=1, grasp=grasp(intensity=0.3), max_torque=400.0))
-    other = actionlib.SimpleActionClient("ezgripper_grasp", GraspAction)
+    other = SteadyActionClient("ezgripper_grasp", GraspAction)
     assert other.wait_for_server(rospy.Duration(30))
     other.send_goal(goal, done_cb=lambda state, result: ended.append(state))
     until(lambda: gripper.joint_state.position[0] > 0.6, "closing fingers")

@@ -10,7 +10,6 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-import actionlib
 import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from ros_session import until as wait_until
@@ -21,6 +20,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_drivers.emulators.command_port import send_command
 from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES
+from modular_framework_ros.action_client import SteadyActionClient
 
 START = [3.1375783963, -1.6559683943, 1.3870131566, -1.2662363723, -1.5707963268, 0.0]
 LAUNCH = """<launch>
@@ -60,9 +60,7 @@ class Arm:
         self.ready: bool | None = None
         rospy.Subscriber("joint_states", JointState, self._on_joint_state, queue_size=1)
         rospy.Subscriber("arm_ready", Bool, self._on_ready, queue_size=1)
-        self.client = actionlib.SimpleActionClient(
-            "arm_controller/follow_joint_trajectory", FollowJointTrajectoryAction
-        )
+        self.client = SteadyActionClient("arm_controller/follow_joint_trajectory", FollowJointTrajectoryAction)
         assert self.client.wait_for_server(rospy.Duration(60)), session.log()
         until(lambda: bool(self.positions) and self.ready is True, "a ready arm")
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import actionlib
 import numpy as np
 import pytest
 import rospy
@@ -48,6 +47,8 @@ from planning_wire import (
 from ros_session import until
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
+
+from modular_framework_ros.action_client import SteadyActionClient
 
 UNTURNED = Quaternion(0, 0, 0, 1)
 pytestmark = [pytest.mark.usefixtures("clean_scene")]
@@ -195,7 +196,7 @@ def motion(**options: Any) -> MoveGroupGoal:
 
 
 def result_of(goal: MoveGroupGoal) -> Any:
-    client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
+    client = SteadyActionClient("move_group", MoveGroupAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     client.send_goal(goal)
     assert client.wait_for_result(rospy.Duration(60.0)), "no result"

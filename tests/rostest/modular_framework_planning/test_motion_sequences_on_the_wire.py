@@ -7,7 +7,6 @@ import threading
 import time
 from typing import Any
 
-import actionlib
 import numpy as np
 import pytest
 import rospy
@@ -43,6 +42,8 @@ from planning_wire import (
     vector,
 )
 from sensor_msgs.msg import JointState
+
+from modular_framework_ros.action_client import SteadyActionClient
 
 PILZ = "pilz_industrial_motion_planner"
 CODES = MoveItErrorCodes
@@ -206,7 +207,7 @@ def test_rules_of_a_sequence_are_kept_and_reported(home: Pose) -> None:
 
 @pytest.fixture(scope="module")
 def client(session: Any) -> Any:
-    client = actionlib.SimpleActionClient("sequence_move_group", MoveGroupSequenceAction)
+    client = SteadyActionClient("sequence_move_group", MoveGroupSequenceAction)
     assert client.wait_for_server(rospy.Duration(20.0))
     return client
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import actionlib
 import numpy as np
 import pytest
 import rospy
@@ -23,6 +22,8 @@ from planning_wire import ARM, OK, START, FakeArm, add, box, joint_goal, report_
 from ros_session import until
 from std_msgs.msg import String
 
+from modular_framework_ros.action_client import SteadyActionClient
+
 PAN = "shoulder_pan_joint"
 GOAL_PAN = START[0] - 1.2
 SLOW = {"max_velocity_scaling_factor": 0.1, "max_acceleration_scaling_factor": 0.5}
@@ -31,7 +32,7 @@ pytestmark = pytest.mark.usefixtures("clean_scene")
 
 @pytest.fixture(scope="module")
 def client(arm: FakeArm) -> Any:
-    client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
+    client = SteadyActionClient("move_group", MoveGroupAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 

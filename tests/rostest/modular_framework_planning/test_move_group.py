@@ -6,7 +6,6 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-import actionlib
 import numpy as np
 import pytest
 import rospy
@@ -56,6 +55,8 @@ from planning_wire import (
 from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+
+from modular_framework_ros.action_client import SteadyActionClient
 
 pytestmark = pytest.mark.usefixtures("clean_scene")
 
@@ -263,7 +264,7 @@ def test_malformed_scenes_are_refused_completely_and_leave_the_scene_alone() -> 
 
 
 def execute_client() -> Any:
-    client = actionlib.SimpleActionClient("execute_trajectory", ExecuteTrajectoryAction)
+    client = SteadyActionClient("execute_trajectory", ExecuteTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 
@@ -314,7 +315,7 @@ def test_a_controller_that_is_not_there_is_named() -> None:
 
 
 def test_the_move_group_action_plans_and_moves(arm: FakeArm) -> None:
-    client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
+    client = SteadyActionClient("move_group", MoveGroupAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     goal = MoveGroupGoal(request=request())
     goal.planning_options.plan_only = True

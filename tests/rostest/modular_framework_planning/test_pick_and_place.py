@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import actionlib
 import moveit_commander
 import numpy as np
 import pytest
@@ -43,6 +42,8 @@ from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from modular_framework_ros.action_client import SteadyActionClient
+
 OPEN, CLOSED = 0.0, 1.2
 PALM_TO_BLOCK = 0.155  # from ee_link along its x, which points down in these grasps, to the middle of the block [m]
 BLOCK = (0.1, 0.5, 0.90)
@@ -53,14 +54,14 @@ pytestmark = pytest.mark.move_group(gripper=True)
 
 @pytest.fixture(scope="module")
 def pickup(arm: FakeArm) -> Any:
-    client = actionlib.SimpleActionClient("pickup", PickupAction)
+    client = SteadyActionClient("pickup", PickupAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 
 
 @pytest.fixture(scope="module")
 def place(arm: FakeArm) -> Any:
-    client = actionlib.SimpleActionClient("place", PlaceAction)
+    client = SteadyActionClient("place", PlaceAction)
     assert client.wait_for_server(rospy.Duration(30.0))
     return client
 

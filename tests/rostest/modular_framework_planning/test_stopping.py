@@ -9,12 +9,13 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import actionlib
 import rospy
 from moveit_msgs.msg import MoveGroupAction, MoveGroupGoal
 from moveit_msgs.srv import GetMotionPlan, GetPositionIK, GetPositionIKRequest
 from planning_wire import ARM, LAUNCH, FakeArm, joint_goal, request
 from ros_session import until
+
+from modular_framework_ros.action_client import SteadyActionClient
 
 LOADED_S = 1.5
 
@@ -23,7 +24,7 @@ def test_a_stop_amid_requests_leaves_no_error_in_the_log(ros_session: Any) -> No
     launch = ros_session.launch(LAUNCH)
     ros_session.wait_for_service("plan_kinematic_path", 120.0)
     arm, ended = FakeArm(), threading.Event()
-    client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
+    client = SteadyActionClient("move_group", MoveGroupAction)
     assert client.wait_for_server(rospy.Duration(20.0))
     message = request(joint_goal(ARM[0], 1.0))
     goal = MoveGroupGoal(request=message)

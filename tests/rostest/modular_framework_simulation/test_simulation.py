@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import actionlib
 import pytest
 import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
@@ -40,6 +39,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectoryPoint
+
+from modular_framework_ros.action_client import SteadyActionClient
 
 LAUNCH = """<launch>
   <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>
@@ -152,7 +153,7 @@ def test_the_world_holds_the_models_of_the_file_and_the_robot(simulation: Any) -
 
 def test_the_robot_starts_at_its_pose_and_follows_a_trajectory(simulation: Any) -> None:
     action = "/arm_trajectory_controller/follow_joint_trajectory"
-    client = actionlib.SimpleActionClient(action, FollowJointTrajectoryAction)
+    client = SteadyActionClient(action, FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(20))
     state = rospy.wait_for_message("/joint_states", JointState, 20.0)
     positions = dict(zip(state.name, state.position, strict=True))

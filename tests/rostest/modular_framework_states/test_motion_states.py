@@ -25,6 +25,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 import smach
 from modular_framework_core import srv
 from modular_framework_core.msg import GraspAction, GraspResult
+from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_states.states.cartesian_move import CartesianMove, moved
 from modular_framework_states.states.execute_trajectory import ExecuteTrajectory
 from modular_framework_states.states.gripper import Gripper
@@ -188,7 +189,7 @@ def test_fingers_go_to_a_posture_of_the_group_and_the_server_has_the_last_word()
 
     server = actionlib.SimpleActionServer("hand", GraspAction, execute, auto_start=False)
     server.start()
-    keys = {"manipulator_controller_client": actionlib.SimpleActionClient("hand", GraspAction), "max_torque": 0.5}
+    keys = {"manipulator_controller_client": SteadyActionClient("hand", GraspAction), "max_torque": 0.5}
     assert run(Gripper("open"), **keys) == "success"
     assert (goals[0].grasp_state, list(goals[0].grasp.pregrasp.posture.position)) == (0, [0.0])
     assert run(Gripper(positions={"f": 0.7}, grip=True, torque=0.3), **keys) == "success"

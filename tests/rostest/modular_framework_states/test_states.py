@@ -22,6 +22,7 @@ import smach
 from modular_framework_core import srv
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import GraspAction, GraspResult, StandardisedGrasp
+from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_states.states import wait_for_signal
 from modular_framework_states.states.allow_manipulator_collisions import AllowManipulatorCollisions
 from modular_framework_states.states.grasp import Grasp
@@ -364,7 +365,7 @@ def hand():
 
     server = actionlib.SimpleActionServer("hand", GraspAction, on_goal, False)
     server.start()
-    fake.client = actionlib.SimpleActionClient("hand", GraspAction)
+    fake.client = SteadyActionClient("hand", GraspAction)
     return fake
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import threading
 import time
 
-import actionlib
 import pytest
 import rospy
 from actionlib.msg import TestAction, TestGoal, TestRequestAction, TestRequestGoal
@@ -329,7 +328,7 @@ def test_transitions_send_the_mapped_feedback_and_slots_are_expanded_and_packed(
         pack_result_slots=True,
     )
     wrapper.run_server()
-    client = actionlib.SimpleActionClient("staged", TestAction)
+    client = SteadyActionClient("staged", TestAction)
     assert client.wait_for_server(rospy.Duration(60.0))
     client.send_goal(TestGoal(5), feedback_cb=lambda message: feedback.append(message.feedback) or heard.set())
     sent.set()
