@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Loads a MoveIt config package into parameters: the public interface of MoveIt 2's package, in ROS 1's layout."""
+
+from moveit_configs_utils.moveit_configs import MoveItConfigs
+from moveit_configs_utils.moveit_configs_builder import MoveItConfigsBuilder
+
+__all__ = ["MoveItConfigs", "MoveItConfigsBuilder"]

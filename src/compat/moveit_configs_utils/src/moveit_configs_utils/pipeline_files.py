@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds the planning pipelines of a config package, and the packaged ones, and loads their parameters."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from launch_param_builder import ParameterFileError, load_yaml
+
+from moveit_configs_utils.ros1_pipelines import COMPLETED, completed, ros1_pipeline
+from moveit_configs_utils.ros_launch_files import launch_file_parameters
+
+LOGGER = logging.getLogger(__name__)
+SUFFIX = "_planning.yaml"
+OMPL = "ompl"
+
+
+@dataclass(frozen=True, slots=True)
+class PipelineFiles:
+    """Where the parameters of pipelines stand.
+
+    Attributes:
+        package: folder of the config package: `config/<name>_planning.yaml`, and in packages of MoveIt 1 also
+            `launch/<name>_planning_pipeline.launch.xml`.
+        defaults: folder with what serves packages that have neither.
+    """
+
+    package: Path
+    defaults: Path
+
+    def names(self, with_defaults: bool) -> list[str]:
+        """Returns the pipelines with a YAML file in the package, then those with a packaged one."""
+        folders = [self.package / "config", *([self.defaults] if with_defaults else [])]
+        files = [path for folder in folders for path in sorted(folder.glob(f"*{SUFFIX}"))]
+        return list(dict.fromkeys(path.name.removesuffix(SUFFIX) for path in files))
+
+    def load(self, names: Sequence[str], leave_out: bool) -> dict[str, dict[str, Any]]:
+        """Returns the parameters of pipelines, by name.
+
+        Args:
+            names: of the pipelines.
+            leave_out: a pipeline without a planner is left out with a warning, instead of being an error.
+
+        Raises:
+            ParameterFileError: there is no file of a pipeline, or it names no planner.
+        """
+        pipelines = {name: self._load(name) for name in names}
+        for name in [name for name, item in pipelines.items() if not item.get("planning_plugin")]:
+            reason = (
+                f"pipeline '{name}': no planning_plugin; looked in {', '.join(str(path) for path in self._files(name))}"
+            )
+            if not leave_out:
+                raise ParameterFileError(reason)
+            LOGGER.warning("%s; it is left out", reason)
+            del pipelines[name]
+        return pipelines
+
+    def _files(self, name: str) -> tuple[Path, Path, Path]:
+        return (
+            self.package / "config" / f"{name}{SUFFIX}",
+            self.package / "launch" / f"{name}_planning_pipeline.launch.xml",
+            self.defaults / f"{name}{SUFFIX}",
+        )
+
+    def _load(self, name: str) -> dict[str, Any]:
+        own, launch_file, default = self._files(name)
+        found: dict[str, Any] = {}
+        if own.is_file():
+            found = ros1_pipeline(load_yaml(own), own)
+        if "planning_plugin" not in found and launch_file.is_file():
+            found = completed(found, ros1_pipeline(launch_file_parameters(launch_file), launch_file), ())
+        if default.is_file():
+            found = completed(found, ros1_pipeline(load_yaml(default), default), COMPLETED if found else ())
+        if name == OMPL and "planner_configs" not in found:
+            found = completed(found, load_yaml(self.defaults / "ompl_defaults.yaml"), ())
+        return found

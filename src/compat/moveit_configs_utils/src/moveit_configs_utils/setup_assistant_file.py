@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads `.setup_assistant`: which URDF and SRDF a config package was made from."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from launch_param_builder import ParameterFileError, load_yaml
+
+FILE_NAME = ".setup_assistant"
+
+
+@dataclass(frozen=True, slots=True)
+class SetupAssistantFile:
+    """What the file says; all of it may be absent.
+
+    Attributes:
+        urdf_package: ROS package that holds the URDF.
+        urdf_path: of the URDF in that package.
+        xacro_arguments: arguments the URDF's xacro file is expanded with.
+        srdf_path: of the SRDF in the config package.
+    """
+
+    urdf_package: str = ""
+    urdf_path: str = ""
+    xacro_arguments: Mapping[str, str] = field(default_factory=dict)
+    srdf_path: str = ""
+
+
+def read_setup_assistant_file(package_path: Path) -> SetupAssistantFile:
+    """Reads the file of a config package; an empty result where there is none.
+
+    Raises:
+        ParameterFileError: it is not as the Setup Assistant writes it.
+    """
+    path = package_path / FILE_NAME
+    if not path.exists():
+        return SetupAssistantFile()
+    config = _section(load_yaml(path), "moveit_setup_assistant_config", path)
+    urdf, srdf = (_section(config, key if key in config else key.upper(), path) for key in ("urdf", "srdf"))
+    if urdf and not (urdf.get("package") and urdf.get("relative_path")):
+        raise ParameterFileError(f"{path}: section urdf has {', '.join(urdf)}; needed are package and relative_path")
+    return SetupAssistantFile(
+        str(urdf.get("package", "")),
+        _relative(urdf),
+        _arguments(str(urdf.get("xacro_args", "")), path),
+        _relative(srdf),
+    )
+
+
+def _section(content: Mapping[str, Any], key: str, path: Path) -> Mapping[str, Any]:
+    section = content.get(key, {})
+    if not isinstance(section, Mapping):
+        raise ParameterFileError(f"{path}: {key} is {section!r}; a mapping is needed")
+    return section
+
+
+def _relative(section: Mapping[str, Any]) -> str:
+    return str(section.get("relative_path", "")).lstrip("/")
+
+
+def _arguments(text: str, path: Path) -> dict[str, str]:
+    """Reads `name:=value name:=value`; options of the xacro command such as --inorder have no effect."""
+    words = [word for word in shlex.split(text) if not word.startswith("-")]
+    wrong = [word for word in words if ":=" not in word]
+    if wrong:
+        raise ParameterFileError(
+            f"{path}: xacro_args has '{' '.join(wrong)}'; every argument is needed as name:=value, separated by spaces"
+        )
+    return dict(word.split(":=", 1) for word in words)
