@@ -169,14 +169,15 @@ leave_out_packages_of_underlay() {
 }
 
 # Everything whose change asks for a new build: definitions, build files, and which executables and launch files there are.
+# The '/' behind the folders of src follows one that is a link, such as a container's to the packages of its workspace.
 build_fingerprint() {
   {
-    find "$ROOT/src" "$ROOT/.catkin_tools/profiles/default/config.yaml" -type f \( -name CMakeLists.txt -o -name package.xml -o -name setup.py -o -name '*.msg' \
+    find "$ROOT"/src/*/ "$ROOT/.catkin_tools/profiles/default/config.yaml" -type f \( -name CMakeLists.txt -o -name package.xml -o -name setup.py -o -name '*.msg' \
       -o -name '*.srv' -o -name '*.action' -o -name '*.in' -o -name CATKIN_IGNORE -o -name config.yaml \) -print0 |
       sort -z | xargs -0 sha256sum
-    find "$ROOT/src" -type f -perm -u+x | sort
+    find "$ROOT"/src/*/ -type f -perm -u+x | sort
     if [ "${INSTALL_SPACE:-0}" = 1 ]; then
-      find "$ROOT/src" -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum
+      find "$ROOT"/src/*/ -type f ! -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum
     fi
     printf '%s %s\n' "${UNDERLAY:-none}" "${INSTALL_SPACE:-0}"
   } | sha256sum | cut -d' ' -f1

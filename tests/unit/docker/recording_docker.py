@@ -1,0 +1,79 @@
+#!/usr/bin/python3 -SE
+# SPDX-License-Identifier: BSD-3-Clause
+"""A docker command for tests: records each call and remembers which image and container there are.
+
+The folder $STAND_IN holds calls.jsonl (one call a line), copied (what was copied into the container), image.json,
+container.json, off (as long as the engine does not answer) and exit_code (of the container).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(os.environ["STAND_IN"])
+IMAGE, CONTAINER = FOLDER / "image.json", FOLDER / "container.json"
+
+
+def values(arguments: list[str], option: str) -> dict[str, str]:
+    """Returns the NAME=VALUE pairs that follow an option of a command line."""
+    pairs = zip(arguments, arguments[1:], strict=False)
+    return dict(value.split("=", 1) for name, value in pairs if name == option)
+
+
+def inspect(path: Path, arguments: list[str]) -> int:
+    if not path.exists():
+        return 1
+    found: dict[str, Any] = json.loads(path.read_text())
+    if arguments[0] == "--format":
+        wanted = arguments[1].strip("{}")
+        known = {".Id": found.get("id"), ".State.Running": str(found.get("running", False)).lower()}
+        print(known.get(wanted) or found["labels"].get(wanted.split('"')[1] if '"' in wanted else wanted, ""))
+    return 0
+
+
+def make_image(user_id: str) -> None:
+    number = json.loads(IMAGE.read_text())["number"] + 1 if IMAGE.exists() else 1
+    labels = {"modular_framework.user_id": user_id}
+    IMAGE.write_text(json.dumps({"number": number, "id": f"sha256:{number}", "labels": labels}))
+
+
+def answer(arguments: list[str]) -> int:
+    match arguments:
+        case ["info"]:
+            return int((FOLDER / "off").exists())
+        case ["image", "inspect", *rest]:
+            return inspect(IMAGE, rest)
+        case ["container", "inspect", *rest]:
+            return inspect(CONTAINER, rest)
+        case ["build", *rest]:
+            make_image(values(rest, "--build-arg")["USER_ID"])
+        case ["pull", name]:
+            if "missing" in name:
+                return 1
+            make_image(os.environ.get("USER_OF_PULLED_IMAGE", "1000"))
+        case ["image", "ls", *_]:
+            number = json.loads(IMAGE.read_text())["number"]
+            print("\n".join(f"sha256:{old}" for old in range(1, number)))
+        case ["create", *rest]:
+            CONTAINER.write_text(json.dumps({"labels": values(rest, "--label")}))
+        case ["rm", _]:
+            CONTAINER.unlink()
+        case ["cp", source, _]:
+            (FOLDER / "copied").write_bytes(Path(source).read_bytes())
+        case ["start", "--attach", _]:
+            return int((FOLDER / "exit_code").read_text()) if (FOLDER / "exit_code").exists() else 0
+        case ["image", "rm", _]:
+            pass
+        case _:
+            raise SystemExit(f"docker has no such call: {arguments}")
+    return 0
+
+
+if __name__ == "__main__":
+    with (FOLDER / "calls.jsonl").open("a") as record:
+        record.write(json.dumps(sys.argv[1:]) + "\n")
+    sys.exit(answer(sys.argv[1:]))
