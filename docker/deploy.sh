@@ -231,6 +231,15 @@ check_user_of_image() {
 
 container_exists() { docker container inspect "$container_name" >/dev/null 2>&1; }
 
+option_of_container() {  # option
+  docker container inspect --format "{{index .Config.Labels \"modular_framework.$1\"}}" "$container_name" 2>/dev/null || true
+}
+
+check_made_here() {
+  [ -n "$(option_of_container image)" ] ||
+    fail "there is a container '$container_name' that this script did not make" "choose another container_name"
+}
+
 check_not_running() {  # what is asked for
   [ "$(docker container inspect --format '{{.State.Running}}' "$container_name")" != true ] ||
     fail "container '$container_name' is running: $1" "stop it first: docker stop $container_name"
@@ -291,7 +300,10 @@ make_container() {
 replace_container() {
   local old
   old=$(image_id)
-  if container_exists; then check_not_running "it cannot be made anew"; fi
+  if container_exists; then
+    check_made_here
+    check_not_running "it cannot be made anew"
+  fi
   prepare_image
   [ -z "$workspace" ] || check_user_of_image
   if container_exists; then docker rm "$container_name" >/dev/null; fi
@@ -302,11 +314,12 @@ replace_container() {
 # Devices, folders and the like cannot be changed in a container: whoever asks for other ones must be told.
 check_same_options() {
   local name made
+  check_made_here
   for name in $KEPT_OPTIONS; do
     is_given "$name" || continue
-    made=$(docker container inspect --format "{{index .Config.Labels \"modular_framework.$name\"}}" "$container_name")
+    made=$(option_of_container "$name")
     [ "$made" = "${!name}" ] || fail "container '$container_name' exists already, with $name='$made'" \
-      "leave $name=${!name} out, choose another container_name, or make it anew with reinstall=true"
+      "start it with what it has, choose another container_name, or make it anew with reinstall=true"
   done
 }
 

@@ -1,22 +1,115 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The window that launch files start for use_gui:=true publishes joint states."""
+"""The window that launch files start for use_gui:=true publishes joint states; sources and followers are in them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import pytest
 import rospy
+from ros_session import RosSession, executable, until
 from sensor_msgs.msg import JointState
 
-ROD = """<robot name='rod'><link name='a'/><link name='b'/><joint name='turn' type='revolute'><parent link='a'/>
-<child link='b'/><axis xyz='0 0 1'/><limit lower='-0.3' upper='1.7' effort='1' velocity='1'/></joint></robot>"""
+LIMIT = "<limit lower='-0.3' upper='1.7' effort='1' velocity='1'/>"
+MIMIC = "<mimic joint='turn' multiplier='-1'/>"
+LINKS = "<link name='a'/><link name='b'/><link name='c'/><link name='d'/>"
+URDF = f"""<robot name='rods'>{LINKS}
+<joint name='turn' type='revolute'><parent link='a'/><child link='b'/>{LIMIT}</joint>
+<joint name='mirror' type='revolute'><parent link='a'/><child link='c'/>{LIMIT}{MIMIC}</joint>
+<joint name='wheel' type='continuous'><parent link='a'/><child link='d'/></joint></robot>"""
+LAUNCH = """<launch><param name="robot_description" value="{text}"/>
+  <node pkg="joint_state_publisher_gui" type="joint_state_publisher_gui" name="window" output="screen"
+        launch-prefix="xvfb-run -a">
+    <rosparam>{{rate: 5, source_list: [/hand/joint_states], zeros: {{turn: 0.123456}}}}</rosparam>
+    <rosparam param="dependent_joints">{{wheel: {{parent: turn, factor: 2.0, offset: 0.5}}}}</rosparam>
+  </node></launch>"""
 
 
-def test_the_window_publishes_the_joints(ros_launch: Callable[..., Any]) -> None:
-    text = ROD.replace("<", "&lt;").replace("\n", " ")
-    ros_launch(f"""<launch><param name="robot_description" value="{text}"/>
-      <node pkg="joint_state_publisher_gui" type="joint_state_publisher_gui" name="window" output="screen"
-            launch-prefix="xvfb-run -a"/></launch>""")
-    state = rospy.wait_for_message("joint_states", JointState, 60.0)
-    assert list(state.name) == ["turn"] and abs(state.position[0]) < 0.01
+@pytest.fixture(scope="module")
+def window(ros_launch: Callable[..., RosSession]) -> RosSession:
+    session = ros_launch(LAUNCH.format(text=URDF.replace("<", "&lt;").replace("\n", " ")))
+    rospy.wait_for_message("joint_states", JointState, 60.0)
+    return session
+
+
+def wait_for(expected: list[float]) -> Any:
+    """Returns the first joint state with these positions."""
+    end = rospy.get_time() + 20.0
+    while rospy.get_time() < end:
+        state = rospy.wait_for_message("joint_states", JointState, 20.0)
+        if list(state.position) == pytest.approx(expected, abs=1e-9):
+            return state
+    raise AssertionError(f"the last positions are {state.position}, expected {expected}")
+
+
+def test_the_zeros_and_what_follows_them_are_published(window: RosSession) -> None:
+    state = wait_for([0.123456, -0.123456, 2 * 0.123456 + 0.5])
+    assert list(state.name) == ["turn", "mirror", "wheel"]
+
+
+def test_a_source_is_published_with_what_follows_it(window: RosSession) -> None:
+    publisher = rospy.Publisher("/hand/joint_states", JointState, queue_size=1, latch=True)
+    publisher.publish(JointState(name=["turn"], position=[0.7654321]))
+    wait_for([0.7654321, -0.7654321, 2 * 0.7654321 + 0.5])
+
+
+def test_joint_states_come_at_the_rate(window: RosSession) -> None:
+    stamps: list[float] = []
+    subscriber = rospy.Subscriber("joint_states", JointState, lambda state: stamps.append(state.header.stamp.to_sec()))
+    until(lambda: len(stamps) > 10, "ten joint states")
+    subscriber.unregister()
+    assert stamps[10] - stamps[0] > 1.5, "ten periods of 1/5 s; of the default rate, 1 s"
+
+
+def test_wrong_parameters_end_the_node_with_what_is_allowed(window: RosSession) -> None:
+    command = ["rosrun", "joint_state_publisher_gui", "joint_state_publisher_gui", "__name:=wrong", "_rate:=-1",
+               "_source_list:=[joint_states]"]  # fmt: skip
+    answer = subprocess.run(command, env=window.env, capture_output=True, text=True, timeout=60, check=False)
+    assert answer.returncode == 1 and "parameter rate is -1; allowed: a number above 0" in answer.stdout + answer.stderr
+    command.remove("_rate:=-1")
+    answer = subprocess.run(
+        [*command, "_rate:=1"], env=window.env, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert answer.returncode == 1 and "'joint_states', which this node publishes" in answer.stdout + answer.stderr
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    """A screen of its own."""
+    reading, writing = os.pipe()
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-nolisten", "tcp"], pass_fds=[writing])
+    os.close(writing)
+    with os.fdopen(reading) as answer:
+        yield f":{answer.readline().strip()}"
+    server.terminate()
+    server.wait(20.0)
+
+
+def test_the_publisher_without_a_window_opens_one_for_use_gui(window: RosSession, display: str) -> None:
+    def titles() -> str:
+        command = ["xwininfo", "-root", "-tree", "-display", display]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    states: list[JointState] = []
+    subscriber = rospy.Subscriber("old/joint_states", JointState, states.append)
+    env = {**window.env, "DISPLAY": display}
+    for use_gui in ("false", "true"):
+        states.clear()
+        command = [executable("joint_state_publisher", "joint_state_publisher"), "__ns:=old", f"_use_gui:={use_gui}",
+                   "robot_description:=/robot_description", f"__name:=publisher_{use_gui}"]  # fmt: skip
+        node = subprocess.Popen(command, env=env)
+        try:
+            until(lambda: bool(states), "joint states", 60.0)
+            assert [round(value, 6) for value in states[0].position] == [0.0, 0.0, 0.0]
+            if use_gui == "true":
+                until(lambda: '"Node: /old/publisher_true"' in titles(), "the window")
+            else:
+                assert "Node:" not in titles()
+        finally:
+            node.send_signal(signal.SIGINT)
+            assert node.wait(20.0) == 0
+    subscriber.unregister()

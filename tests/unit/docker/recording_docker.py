@@ -11,11 +11,19 @@ from __future__ import annotations
 import json
 import os
 import sys
-from pathlib import Path
-from typing import Any
 
-FOLDER = Path(os.environ["STAND_IN"])
-IMAGE, CONTAINER = FOLDER / "image.json", FOLDER / "container.json"
+FOLDER = os.environ["STAND_IN"]
+IMAGE, CONTAINER = f"{FOLDER}/image.json", f"{FOLDER}/container.json"
+
+
+def read(path: str) -> str:
+    with open(path) as file:
+        return file.read()
+
+
+def write(path: str, text: str) -> None:
+    with open(path, "w") as file:
+        file.write(text)
 
 
 def values(arguments: list[str], option: str) -> dict[str, str]:
@@ -24,10 +32,10 @@ def values(arguments: list[str], option: str) -> dict[str, str]:
     return dict(value.split("=", 1) for name, value in pairs if name == option)
 
 
-def inspect(path: Path, arguments: list[str]) -> int:
-    if not path.exists():
+def inspect(path: str, arguments: list[str]) -> int:
+    if not os.path.exists(path):
         return 1
-    found: dict[str, Any] = json.loads(path.read_text())
+    found = json.loads(read(path))
     if arguments[0] == "--format":
         wanted = arguments[1].strip("{}")
         known = {".Id": found.get("id"), ".State.Running": str(found.get("running", False)).lower()}
@@ -36,15 +44,15 @@ def inspect(path: Path, arguments: list[str]) -> int:
 
 
 def make_image(user_id: str) -> None:
-    number = json.loads(IMAGE.read_text())["number"] + 1 if IMAGE.exists() else 1
+    number = json.loads(read(IMAGE))["number"] + 1 if os.path.exists(IMAGE) else 1
     labels = {"modular_framework.user_id": user_id}
-    IMAGE.write_text(json.dumps({"number": number, "id": f"sha256:{number}", "labels": labels}))
+    write(IMAGE, json.dumps({"number": number, "id": f"sha256:{number}", "labels": labels}))
 
 
 def answer(arguments: list[str]) -> int:
     match arguments:
         case ["info"]:
-            return int((FOLDER / "off").exists())
+            return int(os.path.exists(f"{FOLDER}/off"))
         case ["image", "inspect", *rest]:
             return inspect(IMAGE, rest)
         case ["container", "inspect", *rest]:
@@ -56,16 +64,16 @@ def answer(arguments: list[str]) -> int:
                 return 1
             make_image(os.environ.get("USER_OF_PULLED_IMAGE", "1000"))
         case ["image", "ls", *_]:
-            number = json.loads(IMAGE.read_text())["number"]
+            number = json.loads(read(IMAGE))["number"]
             print("\n".join(f"sha256:{old}" for old in range(1, number)))
         case ["create", *rest]:
-            CONTAINER.write_text(json.dumps({"labels": values(rest, "--label")}))
+            write(CONTAINER, json.dumps({"labels": values(rest, "--label")}))
         case ["rm", _]:
-            CONTAINER.unlink()
+            os.remove(CONTAINER)
         case ["cp", source, _]:
-            (FOLDER / "copied").write_bytes(Path(source).read_bytes())
+            write(f"{FOLDER}/copied", read(source))
         case ["start", "--attach", _]:
-            return int((FOLDER / "exit_code").read_text()) if (FOLDER / "exit_code").exists() else 0
+            return int(read(f"{FOLDER}/exit_code")) if os.path.exists(f"{FOLDER}/exit_code") else 0
         case ["image", "rm", _]:
             pass
         case _:
@@ -74,6 +82,6 @@ def answer(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    with (FOLDER / "calls.jsonl").open("a") as record:
+    with open(f"{FOLDER}/calls.jsonl", "a") as record:
         record.write(json.dumps(sys.argv[1:]) + "\n")
     sys.exit(answer(sys.argv[1:]))

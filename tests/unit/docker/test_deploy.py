@@ -106,6 +106,13 @@ def test_reinstall_leaves_a_running_container_alone(docker: Deployer) -> None:
     assert not docker.calls("build") and not docker.calls("rm")
 
 
+@pytest.mark.parametrize("option", ["reinstall=true", "reinstall=false"])
+def test_leaves_a_container_alone_that_it_did_not_make(docker: Deployer, option: str) -> None:
+    (docker.folder / "container.json").write_text('{"labels": {"some.other": "tool"}}')
+    assert "a container 'mbf' that this script did not make" in docker.refusal(option)
+    assert not docker.calls("rm") and not docker.calls("start") and not docker.calls("build")
+
+
 def test_hands_launch_arguments_on_and_replaces_those_of_an_existing_container(docker: Deployer) -> None:
     docker.deploy("rviz:=false", "simulation_starting_pose:=-J a 1 -J b 2")
     assert docker.calls("cp")[0].endswith(" mbf:/home/user/.launch_arguments")

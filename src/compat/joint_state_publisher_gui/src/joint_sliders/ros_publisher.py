@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Publishes the joint states of a robot: parameters and topics, without a window."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from sensor_msgs.msg import JointState
+
+from joint_sliders.joint_values import JointValues
+from joint_sliders.node_parameters import NodeParameters, ParameterFaults, read_parameters
+from joint_sliders.slider_joints import SliderJoints, slider_joints
+from modular_framework_ros.publishing import publish
+from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.xml_text import XmlError
+
+OUTPUT = "joint_states"
+
+
+class JointStatePublisher:
+    """Publishes joint states at a rate, and takes over those of other topics.
+
+    Parameters (private, or in the node's namespace): robot_description, rate (10 /s), source_list, zeros,
+    dependent_joints, use_mimic_tags, use_smallest_joint_limits, publish_default_positions, publish_default_velocities,
+    publish_default_efforts, delta, num_rows.
+    Subscribers: the topics of source_list (sensor_msgs/JointState).
+    Publishers: joint_states (sensor_msgs/JointState).
+
+    Args:
+        joints: The robot's joints.
+        parameters: The node's parameters.
+
+    Attributes:
+        joints: As given.
+        parameters: As given.
+        values: What is published.
+    """
+
+    def __init__(self, joints: SliderJoints, parameters: NodeParameters) -> None:
+        self.joints, self.parameters = joints, parameters
+        defaults = (parameters.default_positions, parameters.default_velocities, parameters.default_efforts)
+        self.values = JointValues(joints, *defaults)
+
+    def start(self, on_change: Callable[[], None]) -> None:
+        """Begins to publish and to receive, in threads.
+
+        Args:
+            on_change: Called, from any thread, when the values have changed.
+        """
+        self._publisher = rospy.Publisher(OUTPUT, JointState, queue_size=5)
+        self._on_change = on_change
+        for topic in self.parameters.source_list:
+            rospy.Subscriber(topic, JointState, self._receive)
+        threading.Thread(target=self._publish_all, daemon=True).start()
+
+    def _receive(self, message: JointState) -> None:
+        self.values.receive(message.name, message.position, message.velocity, message.effort)
+        self._on_change()
+
+    def _publish_all(self) -> None:
+        rate = rospy.Rate(self.parameters.rate, reset=True)
+        while not rospy.is_shutdown():
+            if self.parameters.delta > 0:
+                self.values.sweep(self.parameters.delta)
+                self._on_change()
+            self._publish()
+            try:
+                rate.sleep()
+            except rospy.ROSInterruptException:
+                return
+
+    def _publish(self) -> None:
+        arrays = self.values.arrays()
+        message = JointState(
+            name=list(arrays.names),
+            position=list(arrays.positions),
+            velocity=list(arrays.velocities),
+            effort=list(arrays.efforts),
+        )
+        message.header.stamp = rospy.Time.now()
+        if arrays.names:
+            publish(self._publisher, message)
+
+
+def joint_state_publisher() -> JointStatePublisher | None:
+    """Returns the publisher that the parameters ask for; logs what is wrong with them and returns None if it is."""
+    try:
+        parameters = read_parameters(parameter)
+        _check_sources(parameters)
+        joints = slider_joints(read_urdf(_description()), parameters.settings)
+    except (ParameterFaults, XmlError, ValueError) as error:
+        for line in str(error).splitlines():
+            rospy.logfatal("%s", line)
+        return None
+    for warning in joints.warnings:
+        rospy.logwarn("%s", warning)
+    return JointStatePublisher(joints, parameters)
+
+
+def parameter(name: str, default: Any) -> Any:
+    """Returns a parameter of the node: private, or in its namespace, or the default."""
+    return rospy.get_param(f"~{name}", rospy.get_param(name, default))
+
+
+def _description() -> str:
+    description = parameter("robot_description", None)
+    if description is None:
+        raise ValueError(
+            f"parameter {rospy.resolve_name('robot_description')} is not set; allowed: a URDF; load it before this node"
+        )
+    return str(description)
+
+
+def _check_sources(parameters: NodeParameters) -> None:
+    own = rospy.resolve_name(OUTPUT)
+    for topic in parameters.source_list:
+        if rospy.resolve_name(topic) == own:
+            raise ValueError(
+                f"parameter source_list has '{topic}', which this node publishes; allowed: other topics; "
+                f"remap {OUTPUT} or take the topic out"
+            )

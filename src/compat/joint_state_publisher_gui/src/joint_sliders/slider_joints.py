@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which joints of a robot are moved by hand, within which limits, and which ones follow them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from modular_framework_urdf.mimics import Mimic, resolved
+from modular_framework_urdf.robot import Joint, Robot
+
+
+@dataclass(frozen=True, slots=True)
+class SliderSettings:
+    """Parameters of the public joint_state_publisher that say how a description is read.
+
+    Attributes:
+        use_mimic_tags: Whether <mimic> joints follow; if not, they are moved by hand.
+        use_smallest_joint_limits: Whether soft limits of a <safety_controller> narrow the range.
+        zeros: Positions at the start and after centring, by joint [rad or m].
+        dependent_joints: More joints that follow another one, by joint.
+    """
+
+    use_mimic_tags: bool = True
+    use_smallest_joint_limits: bool = True
+    zeros: Mapping[str, float] = field(default_factory=dict)
+    dependent_joints: Mapping[str, Mimic] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SliderJoint:
+    """A joint that is moved by hand.
+
+    Attributes:
+        name: Of the joint.
+        lower: Least position [rad or m].
+        upper: Largest position [rad or m].
+        zero: Position at the start and after centring [rad or m].
+        unit: "rad" or "m".
+        continuous: Whether positions a whole turn apart are the same.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    zero: float
+    unit: str
+    continuous: bool
+
+    @property
+    def has_range(self) -> bool:
+        """Whether there is anything to choose."""
+        return self.upper > self.lower
+
+    def shown(self, position: float) -> float:
+        """Returns the position within the limits that is nearest; of a continuous joint, the same one within a turn."""
+        if self.continuous and not self.lower <= position <= self.upper:
+            position = math.remainder(position, math.tau)
+        return min(max(position, self.lower), self.upper)
+
+
+@dataclass(frozen=True, slots=True)
+class SliderJoints:
+    """The joints of a robot as the window needs them.
+
+    Attributes:
+        names: All joints that move, in the order of the description.
+        free: Those that are moved by hand, by name.
+        following: What each of the others follows.
+        warnings: What of the settings or the description is not used, and why.
+    """
+
+    names: tuple[str, ...]
+    free: Mapping[str, SliderJoint]
+    following: Mapping[str, Mimic]
+    warnings: tuple[str, ...]
+
+
+def slider_joints(robot: Robot, settings: SliderSettings) -> SliderJoints:
+    """Returns the joints of a robot.
+
+    Args:
+        robot: The description.
+        settings: How it is read.
+
+    Raises:
+        ValueError: A range is empty, or a joint follows itself or one that does not move.
+    """
+    movable = {joint.name: joint for joint in robot.movable_joints()}
+    warnings = [
+        f"parameter {parameter}: there is no movable joint '{name}'; allowed: {', '.join(movable) or 'none'}"
+        for parameter, names in (("zeros", settings.zeros), ("dependent_joints", settings.dependent_joints))
+        for name in names
+        if name not in movable
+    ]
+    mimics = {name: mimic for name, mimic in settings.dependent_joints.items() if name in movable}
+    if settings.use_mimic_tags:
+        mimics |= {name: joint.mimic for name, joint in movable.items() if joint.mimic is not None}
+    following = resolved(mimics, movable)
+    free = {name: _free_joint(joint, settings, warnings) for name, joint in movable.items() if name not in following}
+    return SliderJoints(tuple(movable), free, following, tuple(warnings))
+
+
+def _free_joint(joint: Joint, settings: SliderSettings, warnings: list[str]) -> SliderJoint:
+    lower, upper = _limits(joint, settings.use_smallest_joint_limits, warnings)
+    middle = (lower + upper) / 2
+    zero = settings.zeros.get(joint.name, 0.0 if lower <= 0.0 <= upper else middle)
+    if not lower <= zero <= upper:
+        nearest = min(max(zero, lower), upper)
+        warnings.append(f"parameter zeros/{joint.name}: {zero} is outside [{lower}, {upper}]; {nearest} is used")
+        zero = nearest
+    unit = "m" if joint.kind == "prismatic" else "rad"
+    return SliderJoint(joint.name, lower, upper, zero, unit, joint.kind == "continuous")
+
+
+def _limits(joint: Joint, smallest: bool, warnings: list[str]) -> tuple[float, float]:
+    if joint.kind == "continuous":
+        lower, upper = -math.pi, math.pi
+    elif joint.limit is None:
+        warnings.append(f"robot_description:{joint.line}: joint '{joint.name}' has no <limit>: it stays at 0")
+        return 0.0, 0.0
+    else:
+        lower, upper = joint.limit.lower, joint.limit.upper
+    if smallest and joint.safety is not None:
+        lower = max(lower, -math.inf if joint.safety.soft_lower_limit is None else joint.safety.soft_lower_limit)
+        upper = min(upper, math.inf if joint.safety.soft_upper_limit is None else joint.safety.soft_upper_limit)
+    if not (lower <= upper and math.isfinite(lower) and math.isfinite(upper)):
+        raise ValueError(
+            f"robot_description:{joint.line}: joint '{joint.name}' has the range [{lower}, {upper}]; allowed: a finite "
+            "lower limit that is not above the upper one; correct <limit> or <safety_controller>"
+        )
+    return lower, upper
