@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Public name of the base of actions."""
+
+from __future__ import annotations
+
+from launch.core.action import Action
+
+__all__ = [
+    "Action",
+]

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Actions: what a launch description does, in order."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from launch.actions.configurations import (
+    DeclareLaunchArgument,
+    PopLaunchConfigurations,
+    PushLaunchConfigurations,
+    ResetLaunchConfigurations,
+    SetLaunchConfiguration,
+    UnsetLaunchConfiguration,
+)
+from launch.actions.environment import (
+    AppendEnvironmentVariable,
+    PopEnvironment,
+    PushEnvironment,
+    ResetEnvironment,
+    SetEnvironmentVariable,
+    UnsetEnvironmentVariable,
+)
+from launch.actions.events import EmitEvent, RegisterEventHandler, Shutdown, TimerAction, UnregisterEventHandler
+from launch.actions.execute_process import ExecuteLocal, ExecuteProcess
+from launch.actions.functions import LogInfo, OpaqueFunction
+from launch.actions.grouping import GroupAction, IncludeLaunchDescription
+from launch.core.errors import LaunchError, line_of_launch_file
+
+__all__ = [
+    "AppendEnvironmentVariable",
+    "DeclareLaunchArgument",
+    "EmitEvent",
+    "ExecuteLocal",
+    "ExecuteProcess",
+    "GroupAction",
+    "IncludeLaunchDescription",
+    "LogInfo",
+    "OpaqueFunction",
+    "PopEnvironment",
+    "PopLaunchConfigurations",
+    "PushEnvironment",
+    "PushLaunchConfigurations",
+    "RegisterEventHandler",
+    "ResetEnvironment",
+    "ResetLaunchConfigurations",
+    "SetEnvironmentVariable",
+    "SetLaunchConfiguration",
+    "Shutdown",
+    "TimerAction",
+    "UnregisterEventHandler",
+    "UnsetEnvironmentVariable",
+    "UnsetLaunchConfiguration",
+]
+
+NOT_OFFERED = {"OpaqueCoroutine": "the launch has no asyncio loop; use OpaqueFunction, or a process of its own"}
+"""Actions of ROS 2 that are refused, with what to do."""
+
+
+def __getattr__(name: str) -> NoReturn:
+    if name in NOT_OFFERED:
+        raise LaunchError(f"{line_of_launch_file()}: launch.actions.{name} is not offered: {NOT_OFFERED[name]}")
+    raise AttributeError(f"module 'launch.actions' has no attribute '{name}'")

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Launch files: Python with `generate_launch_description()`, and roslaunch's XML."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from launch.actions.launch_description import LaunchDescription
+from launch.actions.launch_description_source import LaunchDescriptionSource
+from launch.core.errors import InvalidLaunchFileError, LaunchError, hint
+
+__all__ = [
+    "AnyLaunchDescriptionSource",
+    "FrontendLaunchDescriptionSource",
+    "InvalidLaunchFileError",
+    "LaunchDescriptionSource",
+    "PythonLaunchDescriptionSource",
+    "XMLLaunchDescriptionSource",
+    "get_launch_description_from_any_launch_file",
+    "get_launch_description_from_python_launch_file",
+    "load_python_launch_file_as_module",
+]
+
+PYTHON_ENDINGS = (".py",)
+XML_ENDINGS = (".launch", ".xml", ".test")
+FUNCTION = "generate_launch_description"
+
+
+def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleType:
+    """Returns a Python launch file as a module.
+
+    Raises:
+        InvalidLaunchFileError: The file is not there, or raised something; names the file and line.
+    """
+    path = _existing(python_launch_file_path)
+    name = f"python_launch_file_{re.sub(r'[^0-9A-Za-z_]', '_', path.name)}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InvalidLaunchFileError(f"{path}: is no Python file; allowed: a name that ends in .py")
+    module = importlib.util.module_from_spec(spec)
+    write_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    try:
+        spec.loader.exec_module(module)
+    except LaunchError:
+        raise
+    except Exception as error:  # a launch file is a program, which may raise anything
+        raise _failed(path, error) from error
+    finally:
+        sys.dont_write_bytecode = write_bytecode
+    return module
+
+
+def get_launch_description_from_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
+    """Returns the description of a Python launch file.
+
+    Raises:
+        InvalidLaunchFileError: The file has no function that returns one.
+    """
+    path = Path(python_launch_file_path)
+    module = load_python_launch_file_as_module(python_launch_file_path)
+    function = getattr(module, FUNCTION, None)
+    if not callable(function):
+        functions = [name for name, value in vars(module).items() if callable(value)]
+        raise InvalidLaunchFileError(
+            f"{path}: has no function {FUNCTION}(){hint(FUNCTION, functions)}; a launch file defines one that returns "
+            "a LaunchDescription"
+        )
+    try:
+        description: Any = function()
+    except LaunchError:
+        raise
+    except Exception as error:  # as above
+        raise _failed(path, error) from error
+    if not isinstance(description, LaunchDescription):
+        raise InvalidLaunchFileError(
+            f"{path}: {FUNCTION}() returned {description!r}; allowed: a LaunchDescription; return one"
+        )
+    return description
+
+
+def _existing(path_text: str) -> Path:
+    path = Path(path_text)
+    if path.is_file():
+        return path
+    beside = sorted(each.name for each in path.parent.iterdir()) if path.parent.is_dir() else []
+    there = f"in {path.parent} are: {', '.join(beside)}" if beside else f"there is no folder {path.parent}"
+    raise InvalidLaunchFileError(f"{path}: there is no such file{hint(path.name, beside)}; {there}; correct the path")
+
+
+def _failed(path: Path, error: Exception) -> InvalidLaunchFileError:
+    """Returns the error of a file that raised something, with the line of that file where it came from."""
+    where, traceback = str(path), error.__traceback__
+    if isinstance(error, SyntaxError) and error.lineno is not None:
+        where = f"{error.filename}:{error.lineno}"
+    while traceback is not None:
+        if Path(traceback.tb_frame.f_code.co_filename) == path:
+            where = f"{path}:{traceback.tb_lineno}"
+        traceback = traceback.tb_next
+    failed = InvalidLaunchFileError(f"{type(error).__name__}: {error}")
+    failed.where = where
+    return failed
+
+
+class PythonLaunchDescriptionSource(LaunchDescriptionSource):
+    """A Python launch file.
+
+    Args:
+        launch_file_path: Its path.
+    """
+
+    def __init__(self, launch_file_path: Any) -> None:
+        super().__init__(None, _as_text(launch_file_path))
+
+    def load(self, path: str) -> LaunchDescription:
+        return get_launch_description_from_python_launch_file(path)
+
+
+class XMLLaunchDescriptionSource(LaunchDescriptionSource):
+    """An XML launch file of roslaunch.
+
+    Args:
+        launch_file_path: Its path.
+    """
+
+    def __init__(self, launch_file_path: Any) -> None:
+        super().__init__(None, _as_text(launch_file_path))
+
+    def load(self, path: str) -> LaunchDescription:
+        from launch.actions.ros_xml_files import describe_xml_file
+
+        return describe_xml_file(str(_existing(path)))
+
+
+class AnyLaunchDescriptionSource(LaunchDescriptionSource):
+    """A launch file; the end of its name says of which kind.
+
+    Args:
+        launch_file_path: Its path.
+    """
+
+    def __init__(self, launch_file_path: Any) -> None:
+        super().__init__(None, _as_text(launch_file_path))
+
+    def load(self, path: str) -> LaunchDescription:
+        return get_launch_description_from_any_launch_file(path)
+
+
+FrontendLaunchDescriptionSource = XMLLaunchDescriptionSource
+
+
+def get_launch_description_from_any_launch_file(launch_file_path: str) -> LaunchDescription:
+    """Returns the description of a launch file.
+
+    Raises:
+        InvalidLaunchFileError: The file is of no known kind.
+    """
+    if launch_file_path.endswith(PYTHON_ENDINGS):
+        return get_launch_description_from_python_launch_file(launch_file_path)
+    if launch_file_path.endswith(XML_ENDINGS):
+        return XMLLaunchDescriptionSource(launch_file_path).load(launch_file_path)
+    _existing(launch_file_path)
+    allowed = ", ".join((*PYTHON_ENDINGS, *XML_ENDINGS))
+    raise InvalidLaunchFileError(f"{launch_file_path}: is of no known kind; allowed: names that end in {allowed}")
+
+
+def _as_text(path: Any) -> Any:
+    return str(path) if isinstance(path, Path) else path

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command `launch_py`: runs a launch file of a package, or shows its arguments."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from launch.actions.grouping import IncludeLaunchDescription
+from launch.actions.launch_description import LaunchDescription
+from launch.actions.launch_file_sources import (
+    AnyLaunchDescriptionSource,
+    get_launch_description_from_any_launch_file,
+)
+from launch.core.errors import LaunchError, hint, listed
+from launch.core.launch_context import LaunchContext
+from launch.core.screen_log import get_logger
+from launch.launch_service import EXIT_BAD_LAUNCH, LaunchService
+from launch.ros_packages import package_share_directory
+from launch.substitutions.text import described
+
+ENDINGS = (".launch.py", ".launch", ".launch.xml")
+USAGE = (
+    "launch_py [--show-args] PACKAGE FILE [argument:=value ...]  |  launch_py [--show-args] PATH [argument:=value ...]"
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a launch file to its end; returns the exit code, see LaunchService.run."""
+    parser = argparse.ArgumentParser(prog="launch_py", usage=USAGE, description=main.__doc__)
+    parser.add_argument("--show-args", "-s", action="store_true", help="list the arguments of the file, start nothing")
+    parser.add_argument("words", nargs="+", help="package and file, or the path of a file; then argument:=value")
+    parsed = parser.parse_args(arguments)
+    try:
+        path, given = _file_and_arguments(parsed.words)
+        if parsed.show_args:
+            print(argument_listing(get_launch_description_from_any_launch_file(str(path))))
+            return 0
+    except LaunchError as error:
+        get_logger().error("%s", error)
+        return EXIT_BAD_LAUNCH
+    return run_launch_file(path, given)
+
+
+def run_launch_file(path: Path, given: dict[str, str]) -> int:
+    """Runs a launch file to its end.
+
+    Args:
+        path: The file.
+        given: Values of its arguments.
+
+    Returns:
+        The exit code, see LaunchService.run.
+    """
+    include = IncludeLaunchDescription(AnyLaunchDescriptionSource(str(path)), launch_arguments=given)
+    include.where = "launch_py"
+
+    def check(context: LaunchContext) -> None:
+        known = LaunchDescription([include]).get_launch_arguments()
+        declared = context.declared_arguments | {argument.name for argument in known}
+        unknown = [name for name in given if name not in declared | context.read_configurations]
+        if unknown:
+            raise LaunchError(
+                f"{path} has no argument '{unknown[0]}'{hint(unknown[0], declared)}; allowed: {listed(declared)}; "
+                "correct the name, or leave it out"
+            )
+
+    service = LaunchService(argv=[f"{name}:={value}" for name, value in given.items()], check=check)
+    service.include_launch_description(LaunchDescription([include]))
+    return service.run()
+
+
+def _file_and_arguments(words: Sequence[str]) -> tuple[Path, dict[str, str]]:
+    """Splits the words of the command line into the file and its arguments."""
+    first = next((index for index, word in enumerate(words) if ":=" in word), len(words))
+    names, assignments = words[:first], words[first:]
+    given: dict[str, str] = {}
+    for assignment in assignments:
+        name, separator, value = assignment.partition(":=")
+        if not separator or not name:
+            raise LaunchError(f"argument '{assignment}' is not of the form name:=value")
+        given[name] = value
+    match names:
+        case [path] if Path(path).is_file():
+            return Path(path).resolve(), given
+        case [package, file]:
+            return file_of_package(package, file), given
+        case [path] if "/" in path or path.endswith((".py", ".launch", ".xml")):
+            raise LaunchError(f"there is no file {Path(path).resolve()}; allowed: {USAGE}")
+    raise LaunchError(f"got '{' '.join(names)}'; allowed: {USAGE}")
+
+
+def file_of_package(package: str, file: str) -> Path:
+    """Returns the path of a launch file in a package: in its folder `launch`, or anywhere else in it.
+
+    Raises:
+        LaunchError: There is no such package or file, or there are several files.
+    """
+    folder = Path(package_share_directory(package))
+    if (folder / "launch" / file).is_file():
+        return folder / "launch" / file
+    found = sorted(path for path in folder.rglob(Path(file).name) if path.is_file() and str(path).endswith(f"/{file}"))
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise LaunchError(f"package '{package}' has several files {file}: {listed(map(str, found))}; give a path")
+    there = sorted({path.name for path in folder.rglob("*") if path.name.endswith(ENDINGS)})
+    raise LaunchError(
+        f"package '{package}' ({folder}) has no launch file '{file}'{hint(file, there)}; there are: {listed(there)}"
+    )
+
+
+def argument_listing(description: LaunchDescription) -> str:
+    """Returns the arguments of a description, with descriptions and defaults."""
+    lines = ["Arguments (pass arguments as '<name>:=<value>'):"]
+    arguments = description.get_launch_arguments()
+    for argument in arguments:
+        lines += ["", f"    '{argument.name}':{'*' if argument.conditionally_included else ''}"]
+        lines += [f"        {argument.description}"]
+        if argument.default_value is not None:
+            lines += [f"        (default: {described(argument.default_value)})"]
+    if not arguments:
+        lines += ["", "  No arguments."]
+    if any(argument.conditionally_included for argument in arguments):
+        lines += ["", "* argument(s) which are only used if specific conditions occur"]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Public name of the base of conditions."""
+
+from __future__ import annotations
+
+from launch.core.condition import Condition
+
+__all__ = [
+    "Condition",
+]

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Action: something to do when a description is launched, perhaps on a condition."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from launch.core.condition import Condition
+from launch.core.errors import LaunchError, line_of_launch_file
+from launch.core.launch_context import LaunchContext
+from launch.core.launch_description_entity import LaunchDescriptionEntity
+
+
+class Action(LaunchDescriptionEntity):
+    """Base of actions.
+
+    Args:
+        condition: Decides whether the action is carried out; None for always.
+
+    Attributes:
+        where: File and line that made it.
+    """
+
+    def __init__(self, *, condition: Condition | None = None) -> None:
+        if condition is not None and not isinstance(condition, Condition):
+            raise TypeError(
+                f"{line_of_launch_file()}: {type(self).__name__}: condition is {condition!r}; allowed: a condition of "
+                "launch.conditions; write IfCondition(...) around it"
+            )
+        self._condition = condition
+        self.where = line_of_launch_file()
+
+    @property
+    def condition(self) -> Condition | None:
+        """What decides whether the action is carried out."""
+        return self._condition
+
+    def visit(self, context: LaunchContext) -> Iterable[LaunchDescriptionEntity] | None:
+        """Carries the action out unless its condition says no; an error gets the line of the launch file."""
+        try:
+            if self._condition is not None and not self._condition.evaluate(context):
+                return None
+            return self.execute(context)
+        except LaunchError as error:
+            error.where = error.where or self.where
+            raise
+        except TypeError as error:
+            raise _located(LaunchError(f"{self.describe()}: {error}"), self.where) from error
+
+    def execute(self, context: LaunchContext) -> Iterable[LaunchDescriptionEntity] | None:
+        """Does it; returns entities to visit next."""
+        del context
+        return None
+
+    def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        """Returns the entities inside, as far as they are known before the launch."""
+        return []
+
+    def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        return self.get_sub_entities() if self._condition is None else []
+
+    def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
+        if self._condition is None:
+            return []
+        return [(self._condition.describe(), self.get_sub_entities())]
+
+
+def _located(error: LaunchError, where: str) -> LaunchError:
+    error.where = where
+    return error

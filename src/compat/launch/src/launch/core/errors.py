@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Errors of launch descriptions: each says where, what was found, what was allowed and what is probably meant."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Iterable
+
+PACKAGES_OF_LAUNCH = ("launch", "launch_ros", "importlib")
+"""Frames of these are skipped when the line of a launch file is looked for."""
+
+
+class LaunchError(RuntimeError):
+    """A launch description that cannot be carried out.
+
+    Args:
+        message: What was found, what was allowed and what to do.
+
+    Attributes:
+        where: File and line of the action concerned; empty as long as nobody knows it.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.where = ""
+
+    def __str__(self) -> str:
+        message = Exception.__str__(self)  # that of KeyError puts quotes around it
+        return f"{self.where}: {message}" if self.where else message
+
+
+class SubstitutionFailure(LaunchError):
+    """A substitution has no value."""
+
+
+class InvalidConditionExpressionError(LaunchError):
+    """The text of a condition is neither true nor false."""
+
+
+class InvalidLaunchFileError(LaunchError):
+    """A file holds no launch description."""
+
+
+class PackageNotFoundError(LaunchError, KeyError):
+    """No ROS package has this name. It is a KeyError too, as in `ament_index_python`."""
+
+    __str__ = LaunchError.__str__
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """Returns, after a semicolon, a question with the known name that is most like `name`; empty when none is."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean '{near[0]}'" if near else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Returns names in order, for a message; `none` when there are none."""
+    return ", ".join(sorted(names)) or "none"
+
+
+def line_of_launch_file() -> str:
+    """Returns file and line of the innermost caller outside of this package: the launch file."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] not in PACKAGES_OF_LAUNCH:
+            break
+        frame = frame.f_back
+    return f"{frame.f_code.co_filename}:{frame.f_lineno}"

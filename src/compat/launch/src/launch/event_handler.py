@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Public name of event handlers."""
+
+from __future__ import annotations
+
+from launch.core.event_handler import BaseEventHandler, EventHandler
+
+__all__ = [
+    "BaseEventHandler",
+    "EventHandler",
+]

@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Public name of the base of entities."""
+
+from __future__ import annotations
+
+from launch.core.launch_description_entity import LaunchDescriptionEntity
+
+__all__ = [
+    "LaunchDescriptionEntity",
+]

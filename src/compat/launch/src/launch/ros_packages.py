@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where ROS packages and their programs are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import roslib.packages
+import rospkg
+
+from launch.core.errors import LaunchError, PackageNotFoundError, hint, listed
+
+
+def package_share_directory(package: str) -> str:
+    """Returns the folder of a package's files.
+
+    Raises:
+        PackageNotFoundError: There is no such package.
+    """
+    finder = rospkg.RosPack()
+    try:
+        return str(finder.get_path(package))
+    except rospkg.ResourceNotFound:
+        raise PackageNotFoundError(
+            f"there is no package '{package}'{hint(package, finder.list())}; ROS_PACKAGE_PATH has "
+            f"{len(finder.list())} packages; install it, or build and source the workspace that has it"
+        ) from None
+
+
+def program_of_package(package: str, program: str) -> str:
+    """Returns the path of a package's program, as rosrun would run it.
+
+    Raises:
+        PackageNotFoundError: There is no such package.
+        LaunchError: It has no such program.
+    """
+    package_share_directory(package)
+    found = roslib.packages.find_node(package, program)
+    if found:
+        return str(found[0])
+    there = programs_of_package(package)
+    raise LaunchError(
+        f"package '{package}' has no executable '{program}'{hint(program, there)}; there are: {listed(there)}; correct "
+        "the name, or build the workspace and make the file executable (chmod +x)"
+    )
+
+
+def programs_of_package(package: str) -> set[str]:
+    """Returns the names of the executable files of a package."""
+    folders = [Path(package_share_directory(package))]
+    folders += [Path(each) / "lib" / package for each in os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if each]
+    found = set()
+    for folder in folders:
+        files = folder.rglob("*") if folder.is_dir() else ()
+        found |= {path.name for path in files if path.is_file() and os.access(path, os.X_OK)}
+    return found

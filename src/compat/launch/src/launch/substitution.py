@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Public name of the base of substitutions."""
+
+from __future__ import annotations
+
+from launch.core.substitution import Substitution
+
+__all__ = [
+    "Substitution",
+]

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Substitutions that look at files or run programs."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from launch.core.errors import SubstitutionFailure, hint
+from launch.core.launch_context import LaunchContext
+from launch.core.screen_log import get_logger
+from launch.core.some_substitutions_type import SomeSubstitutionsType
+from launch.core.substitution import Substitution
+from launch.core.utilities import normalize_to_list_of_substitutions, perform_substitutions, perform_text
+from launch.substitutions.text import described
+
+ON_STDERR = ("fail", "ignore", "warn", "capture")
+
+
+class PathJoinSubstitution(Substitution):
+    """Parts of a path, joined with slashes.
+
+    Args:
+        substitutions: The parts; a part may be several, which are joined without a slash.
+    """
+
+    def __init__(self, substitutions: Any) -> None:
+        parts = [substitutions] if isinstance(substitutions, str | Substitution) else list(substitutions)
+        self._parts = [normalize_to_list_of_substitutions(part) for part in parts]
+
+    @property
+    def substitutions(self) -> list[Substitution]:
+        """The parts."""
+        return [each for part in self._parts for each in part]
+
+    def describe(self) -> str:
+        return f"PathJoin({', '.join(described(part) for part in self._parts)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        return os.path.join(*(perform_substitutions(context, part) for part in self._parts))
+
+    def __truediv__(self, part: SomeSubstitutionsType) -> PathJoinSubstitution:
+        """Returns the path with a further part, as `path / "config"`."""
+        return PathJoinSubstitution([*self._parts, normalize_to_list_of_substitutions(part)])
+
+
+class FileContent(Substitution):
+    """What a text file holds.
+
+    Args:
+        path: Its path.
+    """
+
+    def __init__(self, path: SomeSubstitutionsType) -> None:
+        self._path = normalize_to_list_of_substitutions(path)
+
+    def describe(self) -> str:
+        return f"FileContent({described(self._path)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        path = Path(perform_substitutions(context, self._path))
+        try:
+            return path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            beside = [str(each) for each in path.parent.iterdir()] if path.parent.is_dir() else []
+            raise SubstitutionFailure(f"FileContent: {path} cannot be read: {error}{hint(str(path), beside)}") from None
+
+
+class FindExecutable(Substitution):
+    """Path of a program.
+
+    Args:
+        name: Its name, looked for in PATH.
+    """
+
+    def __init__(self, name: SomeSubstitutionsType) -> None:
+        self._name = normalize_to_list_of_substitutions(name)
+
+    def describe(self) -> str:
+        return f"FindExec({described(self._name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self._name)
+        path = context.environment.get("PATH", os.defpath)
+        found = shutil.which(name, path=path)
+        if found is None:
+            raise SubstitutionFailure(
+                f"program '{name}' was not found; looked in the folders of PATH: {path}; install it, or source the "
+                "workspace that has it"
+            )
+        return found
+
+
+class Command(Substitution):
+    """What a program prints.
+
+    Args:
+        command: Program and arguments, split as a shell does.
+        on_stderr: What to do when it prints errors: fail, ignore, warn, or capture (take them too).
+    """
+
+    def __init__(self, command: SomeSubstitutionsType, *, on_stderr: SomeSubstitutionsType = "fail") -> None:
+        self._command = normalize_to_list_of_substitutions(command)
+        self._on_stderr = normalize_to_list_of_substitutions(on_stderr)
+
+    @property
+    def command(self) -> list[Substitution]:
+        """Program and arguments."""
+        return self._command
+
+    def describe(self) -> str:
+        return f"Command({described(self._command)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        command = perform_substitutions(context, self._command)
+        on_stderr = perform_substitutions(context, self._on_stderr)
+        if on_stderr not in ON_STDERR:
+            raise SubstitutionFailure(
+                f"Command: on_stderr is '{on_stderr}'; allowed: {', '.join(ON_STDERR)}{hint(on_stderr, ON_STDERR)}"
+            )
+        try:
+            result = subprocess.run(
+                shlex.split(command),
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT if on_stderr == "capture" else subprocess.PIPE,
+                text=True,
+                check=False,
+            )
+        except (OSError, ValueError) as error:
+            raise SubstitutionFailure(f"Command: '{command}' cannot be run: {error}") from None
+        if result.returncode != 0:
+            raise SubstitutionFailure(
+                f"Command: '{command}' ended with exit code {result.returncode}: "
+                f"{(result.stderr or result.stdout).strip()}"
+            )
+        if result.stderr and on_stderr == "fail":
+            raise SubstitutionFailure(
+                f"Command: '{command}' printed errors: {result.stderr.strip()}; mend them, or give Command "
+                "on_stderr='warn'"
+            )
+        if result.stderr and on_stderr == "warn":
+            get_logger().warning("Command: '%s' printed errors: %s", command, result.stderr.strip())
+        return result.stdout
+
+
+class PythonExpression(Substitution):
+    """The value of a Python expression, as a text.
+
+    Args:
+        expression: The expression; texts that come from substitutions need quotes around them.
+        python_modules: Modules that it may use; the names of `math` need no prefix.
+    """
+
+    def __init__(self, expression: SomeSubstitutionsType, python_modules: SomeSubstitutionsType = ("math",)) -> None:
+        self._expression = normalize_to_list_of_substitutions(expression)
+        self._modules = normalize_to_list_of_substitutions(python_modules)
+
+    @property
+    def expression(self) -> list[Substitution]:
+        """The expression."""
+        return self._expression
+
+    def describe(self) -> str:
+        return f"PythonExpr({described(self._expression)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        expression = perform_text(context, self._expression)
+        names: dict[str, Any] = {}
+        try:
+            for substitution in self._modules:
+                module = importlib.import_module(perform_text(context, substitution))
+                names |= vars(module) if module.__name__ == "math" else {}
+                names[module.__name__] = module
+            return str(eval(expression, {}, names))  # noqa: S307  # the launch file is a program of the user's
+        except Exception as error:  # an expression may raise anything
+            raise SubstitutionFailure(
+                f"PythonExpression: {expression!r}: {type(error).__name__}: {error}; write quotes around texts"
+            ) from error

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A text as it is, values of the context, and names that are different each time."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterable
+
+from launch.core.errors import SubstitutionFailure, hint, listed
+from launch.core.launch_context import LaunchContext
+from launch.core.some_substitutions_type import SomeSubstitutionsType
+from launch.core.substitution import Substitution, TextSubstitution
+from launch.core.utilities import normalize_to_list_of_substitutions, perform_substitutions, perform_text
+
+__all__ = [
+    "AnonName",
+    "EnvironmentVariable",
+    "LaunchConfiguration",
+    "LocalSubstitution",
+    "TextSubstitution",
+    "ThisLaunchFile",
+    "ThisLaunchFileDir",
+    "described",
+]
+
+
+def described(subs: Iterable[Substitution]) -> str:
+    """Returns how substitutions are written."""
+    return " + ".join(each.describe() for each in subs)
+
+
+class LaunchConfiguration(Substitution):
+    """The value of a launch configuration, which a launch argument is too.
+
+    Args:
+        variable_name: Its name.
+        default: Value when it is not set.
+    """
+
+    def __init__(self, variable_name: SomeSubstitutionsType, *, default: object = None) -> None:
+        self._name = normalize_to_list_of_substitutions(variable_name)
+        self._default: list[Substitution] | None = None
+        if default is not None:
+            several = isinstance(default, Iterable) and not isinstance(default, str)
+            parts = list(default) if several else [default]  # type: ignore[call-overload]
+            self._default = normalize_to_list_of_substitutions(
+                [each if isinstance(each, Substitution) else str(each) for each in parts]
+            )
+
+    @property
+    def variable_name(self) -> list[Substitution]:
+        """Its name."""
+        return self._name
+
+    def describe(self) -> str:
+        return f"LaunchConfig({described(self._name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self._name)
+        value = context.read_configuration(name)
+        if value is not None:
+            return str(value)
+        if self._default is not None:
+            return perform_substitutions(context, self._default)
+        known = context.launch_configurations
+        raise SubstitutionFailure(
+            f"launch configuration '{name}' is not set{hint(name, known)}; set here: {listed(known)}; declare it "
+            f"before with DeclareLaunchArgument('{name}', default_value=...), or give LaunchConfiguration a default"
+        )
+
+
+class EnvironmentVariable(Substitution):
+    """The value of an environment variable.
+
+    Args:
+        name: Its name.
+        default_value: Value when it is not set.
+    """
+
+    def __init__(self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None) -> None:
+        self._name = normalize_to_list_of_substitutions(name)
+        self._default = default_value
+
+    def describe(self) -> str:
+        return f"EnvVar({described(self._name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self._name)
+        if name in context.environment:
+            return context.environment[name]
+        if self._default is not None:
+            return perform_text(context, self._default)
+        raise SubstitutionFailure(
+            f"environment variable '{name}' is not set{hint(name, context.environment)}; set it, or give "
+            "EnvironmentVariable a default_value"
+        )
+
+
+class LocalSubstitution(Substitution):
+    """A value of the context's `locals`, such as `event.returncode` in an event handler.
+
+    Args:
+        expression: Attributes, joined by dots.
+        description: How it is shown.
+    """
+
+    def __init__(self, expression: str, description: str | None = None) -> None:
+        self._expression = expression
+        self._description = description or expression
+
+    def describe(self) -> str:
+        return f"Local('{self._description}')"
+
+    def perform(self, context: LaunchContext) -> str:
+        value = context.locals
+        try:
+            for attribute in self._expression.split("."):
+                value = getattr(value, attribute)
+        except AttributeError as error:
+            raise SubstitutionFailure(f"LocalSubstitution('{self._expression}'): {error}") from None
+        return str(value)
+
+
+class ThisLaunchFile(Substitution):
+    """Path of the launch file that is being visited."""
+
+    def perform(self, context: LaunchContext) -> str:
+        path = context.get_locals_as_dict().get("current_launch_file_path")
+        if path is None:
+            raise SubstitutionFailure("ThisLaunchFile: this description comes from no file; use a path instead")
+        return str(path)
+
+
+class ThisLaunchFileDir(ThisLaunchFile):
+    """Folder of the launch file that is being visited."""
+
+    def perform(self, context: LaunchContext) -> str:
+        return os.path.dirname(super().perform(context))
+
+
+class AnonName(Substitution):
+    """A name that no other process has; the same for the same base name within a launch.
+
+    Args:
+        name: Base name.
+    """
+
+    def __init__(self, name: SomeSubstitutionsType) -> None:
+        self._name = normalize_to_list_of_substitutions(name)
+
+    def describe(self) -> str:
+        return f"AnonName({described(self._name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        key = f"anon{perform_substitutions(context, self._name)}"
+        if key not in context.launch_configurations:
+            host = "".join(each if each.isalnum() else "_" for each in socket.gethostname())
+            name = f"{key.removeprefix('anon')}_{host}_{os.getpid()}_{os.urandom(4).hex()}"
+            context.launch_configurations[key] = name
+        return str(context.launch_configurations[key])

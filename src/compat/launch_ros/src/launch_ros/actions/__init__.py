@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Actions about ROS nodes."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from launch.actions import TimerAction as RosTimer
+from launch.core.errors import LaunchError, line_of_launch_file
+
+from launch_ros.actions.node import Node
+from launch_ros.actions.scopes import (
+    PushROSNamespace,
+    PushRosNamespace,
+    SetParameter,
+    SetParametersFromFile,
+    SetRemap,
+    SetUseSimTime,
+)
+
+__all__ = [
+    "Node",
+    "PushROSNamespace",
+    "PushRosNamespace",
+    "RosTimer",
+    "SetParameter",
+    "SetParametersFromFile",
+    "SetRemap",
+    "SetUseSimTime",
+]
+
+NOT_OFFERED = {
+    "ComposableNodeContainer": "ROS 1 has no components; start a Node for each",
+    "LoadComposableNodes": "ROS 1 has no components; start a Node for each",
+    "LifecycleNode": "nodes of ROS 1 have no life cycle; use Node",
+    "LifecycleTransition": "nodes of ROS 1 have no life cycle; use Node",
+    "SetROSLogDir": "set the environment variable ROS_LOG_DIR with SetEnvironmentVariable",
+}
+"""Actions of ROS 2 that are refused, with what to do."""
+
+
+def __getattr__(name: str) -> NoReturn:
+    if name in NOT_OFFERED:
+        raise LaunchError(f"{line_of_launch_file()}: launch_ros.actions.{name} is not offered: {NOT_OFFERED[name]}")
+    raise AttributeError(f"module 'launch_ros.actions' has no attribute '{name}'")

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Actions that concern all nodes after them in the same scope: namespace, parameters, remappings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from launch.core.action import Action
+from launch.core.launch_context import LaunchContext
+from launch.core.some_substitutions_type import SomeSubstitutionsType
+from launch.core.utilities import (
+    normalize_to_list_of_substitutions,
+    perform_boolean,
+    perform_substitutions,
+    perform_text,
+)
+
+from launch_ros.actions.node import NAMESPACE, PARAMETERS, REMAPPINGS
+from launch_ros.namespaces import join
+from launch_ros.node_parameters import CLOCK, evaluate_sources
+from launch_ros.parameter_descriptions import evaluate_value
+
+
+class PushROSNamespace(Action):
+    """Puts the nodes after it into a namespace, until the end of the group around it.
+
+    Args:
+        namespace: The namespace, absolute, or below the one that was pushed before.
+    """
+
+    def __init__(self, namespace: SomeSubstitutionsType, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._namespace = normalize_to_list_of_substitutions(namespace)
+
+    def execute(self, context: LaunchContext) -> None:
+        configurations = context.launch_configurations
+        configurations[NAMESPACE] = join(configurations.get(NAMESPACE), perform_substitutions(context, self._namespace))
+
+
+PushRosNamespace = PushROSNamespace
+
+
+class SetParameter(Action):
+    """Gives a parameter to the nodes after it, until the end of the group around it.
+
+    Args:
+        name: Its name.
+        value: Its value; the node's own parameters win.
+    """
+
+    def __init__(self, name: SomeSubstitutionsType, value: Any, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._name = normalize_to_list_of_substitutions(name)
+        self._value = value
+
+    def execute(self, context: LaunchContext) -> None:
+        name = perform_substitutions(context, self._name)
+        value = evaluate_value(context, self._value, None, f"parameter {name}")
+        configurations = context.launch_configurations
+        configurations[PARAMETERS] = [*configurations.get(PARAMETERS, ()), {name: value}]
+
+
+class SetParametersFromFile(Action):
+    """Gives the parameters of a YAML file to the nodes after it, until the end of the group around it.
+
+    Args:
+        filename: Path of the file.
+    """
+
+    def __init__(self, filename: Any, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._filename = filename
+
+    def execute(self, context: LaunchContext) -> None:
+        configurations = context.launch_configurations
+        sources = evaluate_sources(context, [self._filename])
+        configurations[PARAMETERS] = [*configurations.get(PARAMETERS, ()), *sources]
+
+
+class SetRemap(Action):
+    """Remaps a name for the nodes after it, until the end of the group around it.
+
+    Args:
+        src: The name.
+        dst: What stands for it.
+    """
+
+    def __init__(self, src: SomeSubstitutionsType, dst: SomeSubstitutionsType, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._src, self._dst = src, dst
+
+    def execute(self, context: LaunchContext) -> None:
+        pair = (perform_text(context, self._src), perform_text(context, self._dst))
+        configurations = context.launch_configurations
+        configurations[REMAPPINGS] = [*configurations.get(REMAPPINGS, ()), pair]
+
+
+class SetUseSimTime(Action):
+    """Says whether nodes take the time from `/clock`: on ROS 1 all of a master do, or none.
+
+    Args:
+        value: Whether they do.
+    """
+
+    def __init__(self, value: bool | SomeSubstitutionsType, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._value = value
+
+    def execute(self, context: LaunchContext) -> None:
+        value = perform_boolean(context, self._value, "SetUseSimTime")
+        context.parameters.set(f"/{CLOCK}", value, self.where, shared=True)

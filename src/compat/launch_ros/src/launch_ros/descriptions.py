@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Descriptions of parameters under their other public name."""
+
+from __future__ import annotations
+
+from launch_ros.parameter_descriptions import Parameter, ParameterFile, ParameterValue
+
+__all__ = ["Parameter", "ParameterFile", "ParameterValue"]

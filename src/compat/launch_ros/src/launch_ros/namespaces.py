@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Names of nodes and namespaces."""
+
+from __future__ import annotations
+
+import re
+
+from launch.core.errors import LaunchError
+
+_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+
+
+def join(base: str | None, name: str | None) -> str:
+    """Returns the absolute namespace of a name that is relative to a base, or absolute itself.
+
+    Args:
+        base: The namespace around it; None for the root.
+        name: The namespace; None for the base itself.
+
+    Raises:
+        LaunchError: A part is no ROS name.
+    """
+    joined = name if name and name.startswith("/") else f"{base or ''}/{name or ''}"
+    parts = [part for part in joined.split("/") if part]
+    for part in parts:
+        _check(part, "namespace", joined)
+    return "/" + "/".join(parts)
+
+
+def check_node_name(name: str) -> str:
+    """Returns the name of a node.
+
+    Raises:
+        LaunchError: It is no ROS name, or has a namespace in it.
+    """
+    _check(name, "node name", name)
+    return name
+
+
+def full_name(namespace: str, name: str) -> str:
+    """Returns the full name of something in an absolute namespace."""
+    return f"{namespace.rstrip('/')}/{name}"
+
+
+def name_from(executable: str) -> str:
+    """Returns a node name made of a program's name."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", executable.removesuffix(".py"))
+    return name if _WORD.match(name) else f"node_{name}"
+
+
+def _check(part: str, what: str, whole: str) -> None:
+    if not _WORD.match(part):
+        raise LaunchError(
+            f"{what} '{whole}' is not allowed; allowed: letters, digits and underscores, a letter first"
+            f"{'; give the namespace as namespace=...' if what == 'node name' and '/' in whole else ''}"
+        )

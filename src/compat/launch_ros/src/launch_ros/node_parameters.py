@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the parameters of a node go on ROS 1: to the node, and what nodes share also to its namespace."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from launch.core.errors import LaunchError
+from launch.core.launch_context import LaunchContext
+from launch.core.parameter_plan import ParameterPlan
+from launch.core.utilities import perform_text
+
+from launch_ros.namespaces import full_name
+from launch_ros.parameter_descriptions import Parameter, ParameterFile, evaluate_value, read_yaml_mapping
+
+SECTION = "ros__parameters"
+"""Key of ROS 2's parameter files below which the parameters of a node are."""
+DESCRIPTION = "robot_description"
+DESCRIPTION_PARTS = ("", "_semantic", "_kinematics", "_planning")
+"""Endings of the names that RViz, robot_state_publisher and MoveIt's clients look for in their namespace."""
+CLOCK = "use_sim_time"
+"""All nodes of a ROS 1 master have one clock; this parameter is in the root namespace."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSource:
+    """An entry of a node's `parameters`.
+
+    Attributes:
+        content: What it holds.
+        path: The file it came from; None for a dict.
+    """
+
+    content: Mapping[str, Any]
+    path: Path | None = None
+
+    @property
+    def has_sections(self) -> bool:
+        """Whether it is written for ROS 2, with a section for each node."""
+        return self.path is not None and any(True for _ in sections(self.content))
+
+
+def evaluate_sources(context: LaunchContext, parameters: Any) -> list[ParameterSource]:
+    """Returns what the entries of `parameters` hold, in order.
+
+    Args:
+        context: Launch context.
+        parameters: Dicts, paths of YAML files, ParameterFile, Parameter.
+
+    Raises:
+        LaunchError: An entry is none of these, or a file cannot be read.
+    """
+    if isinstance(parameters, str | Mapping):
+        raise LaunchError(f"parameters is {type(parameters).__name__}; allowed: a list of dicts and files; write [...]")
+    return [_evaluated(context, entry) for entry in parameters]
+
+
+def _evaluated(context: LaunchContext, entry: Any) -> ParameterSource:
+    if isinstance(entry, Mapping):
+        values = {
+            perform_text(context, key): evaluate_value(context, value, None, f"parameter {perform_text(context, key)}")
+            for key, value in entry.items()
+        }
+        return ParameterSource(values)
+    if isinstance(entry, Parameter):
+        name, value = entry.evaluate(context)
+        return ParameterSource({name: value})
+    path = (entry if isinstance(entry, ParameterFile) else ParameterFile(entry)).path(context)
+    return ParameterSource(read_yaml_mapping(path), path)
+
+
+def sections(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Returns the sections of a parameter file of ROS 2: pattern of the node's full name, and its parameters."""
+    for key, value in content.items():
+        if not isinstance(value, Mapping):
+            continue
+        pattern = f"{prefix}/{str(key).strip('/')}"
+        if isinstance(value.get(SECTION), Mapping):
+            yield pattern, value[SECTION]
+        yield from sections({name: inner for name, inner in value.items() if name != SECTION}, pattern)
+
+
+def parameters_of_node(sources: Iterable[ParameterSource], node: str) -> dict[str, Any]:
+    """Returns the parameters that entries give to a node; later entries win, of a file its exact section.
+
+    Args:
+        sources: The entries.
+        node: Full name of the node.
+    """
+    merged: dict[str, Any] = {}
+    for source in sources:
+        if not source.has_sections:
+            merge(merged, nest_dots(source.content))
+            continue
+        found = [(pattern, values) for pattern, values in sections(source.content) if _matches(pattern, node)]
+        for _, values in sorted(found, key=lambda each: "*" not in each[0]):
+            merge(merged, nest_dots(values))
+    return merged
+
+
+def _matches(pattern: str, node: str) -> bool:
+    return fnmatch.fnmatchcase(node, pattern.replace("/**", "/*")) or pattern in ("/**", node)
+
+
+def nest_dots(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a mapping in which names with dots, ROS 2's separator, are mappings in each other."""
+    nested: dict[str, Any] = {}
+    for name, value in content.items():
+        parts = str(name).replace("/", ".").strip(".").split(".")
+        inner = nest_dots(value) if isinstance(value, Mapping) else value
+        for part in reversed(parts[1:]):
+            inner = {part: inner}
+        merge(nested, {parts[0]: inner})
+    return nested
+
+
+def merge(target: dict[str, Any], values: Mapping[str, Any]) -> None:
+    """Puts values into a mapping; mappings in it are merged, other values are replaced."""
+    for name, value in values.items():
+        if isinstance(value, Mapping) and isinstance(target.get(name), dict):
+            merge(target[name], value)
+        else:
+            target[name] = dict(value) if isinstance(value, Mapping) else value
+
+
+def description_names(parameters: Mapping[str, Any]) -> set[str]:
+    """Returns the names among a node's parameters that other nodes look for in its namespace.
+
+    They are `robot_description`, `robot_description_semantic`, `..._kinematics` and `..._planning`; a robot description
+    under another name, which its text shows, has the same endings.
+    """
+    bases = {DESCRIPTION}
+    for name, value in parameters.items():
+        if isinstance(value, str) and "<robot" in value[:4000] and value.lstrip().startswith("<"):
+            bases.add(name.removesuffix("_semantic"))
+    return {base + part for base in bases for part in DESCRIPTION_PARTS} & set(parameters)
+
+
+def plan_parameters(plan: ParameterPlan, namespace: str, name: str, parameters: Mapping[str, Any]) -> None:
+    """Plans the parameters of a node.
+
+    Args:
+        plan: Where they are planned.
+        namespace: Absolute namespace of the node.
+        name: Its name in it.
+        parameters: Its parameters.
+
+    Raises:
+        LaunchError: Another node of the namespace gives another description of the robot, or another clock.
+    """
+    node = full_name(namespace, name)
+    owner = f"node {node}"
+    for key, value in parameters.items():
+        if key == CLOCK:
+            plan.set(f"/{CLOCK}", value, owner, shared=True)
+        else:
+            plan.set(full_name(node, key), value, owner)
+    for key in sorted(description_names(parameters)):
+        plan.set(full_name(namespace, key), parameters[key], owner, shared=True)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Programs of ROS 2 that have another name or other arguments on ROS 1: one table, and the functions it names."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NoReturn
+
+from launch.core.errors import LaunchError
+from launch.core.parameter_plan import Lookup
+
+from launch_ros import ros2_control
+from launch_ros.node_parameters import ParameterSource
+
+
+@dataclass(frozen=True)
+class NodePlan:
+    """A node as it is to be started.
+
+    Attributes:
+        package: Package of its program.
+        executable: Its program.
+        namespace: Its namespace, from `/`.
+        name: Its name; empty when the program names itself.
+        arguments: Arguments of the program.
+        sources: Entries of its `parameters`.
+        namespace_parameters: Parameters for its namespace, besides what it is given.
+        late_parameters: Called before the parameters are set, with a look-up of parameters; returns more of them, for
+            the node itself and for its namespace.
+        companions: Nodes to start besides it.
+    """
+
+    package: str
+    executable: str
+    namespace: str
+    name: str
+    arguments: tuple[str, ...] = ()
+    sources: tuple[ParameterSource, ...] = ()
+    namespace_parameters: Mapping[str, Any] = field(default_factory=dict)
+    late_parameters: Callable[[Lookup], tuple[Mapping[str, Any], Mapping[str, Any]]] | None = None
+    companions: tuple[NodePlan, ...] = ()
+
+
+def ros1_plan(plan: NodePlan) -> NodePlan:
+    """Returns the node of ROS 1 that stands for one of ROS 2; others as they are.
+
+    Raises:
+        LaunchError: It has arguments that ROS 1's node has not.
+    """
+    translate = ROS1_PROGRAMS.get((plan.package, plan.executable))
+    return plan if translate is None else translate(plan)
+
+
+def _rviz(plan: NodePlan) -> NodePlan:
+    """RViz; with MoveIt's parameters also the marker that drags the goal, which is in RViz's window in ROS 2."""
+    given = {name for source in plan.sources for name in source.content}
+    marker = NodePlan("modular_framework_planning", "interactive_goal", plan.namespace, "interactive_goal")
+    companions = (marker,) if "robot_description_semantic" in given else ()
+    return replace(plan, package="rviz", executable="rviz", companions=companions)
+
+
+_TRANSFORM_DEFAULTS = {"--x": "0", "--y": "0", "--z": "0", "--yaw": "0", "--pitch": "0", "--roll": "0"}
+_QUATERNION = ("--qx", "--qy", "--qz", "--qw")
+
+
+def _static_transform(plan: NodePlan) -> NodePlan:
+    """The transform as position, angles or quaternion, parent and child frame, without names."""
+    if not any(argument.startswith("--") for argument in plan.arguments):
+        return plan
+    names = [*_TRANSFORM_DEFAULTS, *_QUATERNION, "--frame-id", "--child-frame-id"]
+    parser = _Parser("static_transform_publisher")
+    for name in names:
+        parser.add_argument(name, required=name.endswith("frame-id"))
+    given = vars(parser.parse_args(_joined_negative_numbers(plan.arguments)))
+    values = {name: given[name.strip("-").replace("-", "_")] for name in names}
+    position = [values[name] or "0" for name in ("--x", "--y", "--z")]
+    angles = [values[name] for name in ("--yaw", "--pitch", "--roll")]
+    quaternion = [values[name] for name in _QUATERNION]
+    if any(quaternion) and any(angles):
+        raise LaunchError("static_transform_publisher: got angles and a quaternion; allowed: one of them")
+    rotation = [value or default for value, default in zip(quaternion, "0001", strict=True)]
+    rotation = rotation if any(quaternion) else [value or "0" for value in angles]
+    return replace(plan, arguments=(*position, *rotation, values["--frame-id"], values["--child-frame-id"]))
+
+
+def _control_node(plan: NodePlan) -> NodePlan:
+    """The node with hardware and controller manager: controllers from its files, hardware from the description."""
+    name = plan.name or "controller_manager"
+    private = ros2_control.manager_parameters(plan.sources, plan.namespace, name)
+    controllers = ros2_control.controller_parameters(plan.sources)
+
+    def late_parameters(lookup: Lookup) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+        return ros2_control.hardware_parameters(lookup, plan.namespace, private, controllers)
+
+    return replace(
+        plan,
+        package="modular_framework_control",
+        executable="robot_hw",
+        name=name,
+        sources=(ParameterSource(private),),
+        namespace_parameters=controllers,
+        late_parameters=late_parameters,
+    )
+
+
+def _spawner(plan: NodePlan) -> NodePlan:
+    """Loads and starts controllers, then ends; with --unload-on-kill it stays, and unloads them at its end."""
+    parser = _Parser("spawner")
+    parser.add_argument("controller_names", nargs="+")
+    parser.add_argument("-c", "--controller-manager", default="controller_manager")
+    parser.add_argument("-p", "--param-file", action="append", default=[])
+    parser.add_argument("-t", "--controller-type")
+    parser.add_argument("-n", "--namespace")
+    for flag in ("--load-only", "--stopped", "--inactive", "--unload-on-kill", "-u", "--activate-as-group"):
+        parser.add_argument(flag, action="store_true")
+    for number in ("--controller-manager-timeout", "--switch-timeout", "--service-call-timeout"):
+        parser.add_argument(number, type=float, default=0.0)
+    given = parser.parse_args(list(plan.arguments))
+    namespace = ros2_control.namespace_of_manager(given.controller_manager, given.namespace or plan.namespace)
+    waiting = given.controller_manager_timeout
+    options = ["--namespace", namespace, *(["--timeout", f"{waiting:g}"] if waiting > 0.0 else ["--no-timeout"])]
+    files = tuple(ros2_control.source_of(path) for path in given.param_file)
+    parameters = ros2_control.controller_parameters(files)
+    if given.controller_type:
+        for name in given.controller_names:
+            parameters.setdefault(name, {})["type"] = ros2_control.ros1_type(given.controller_type, {})
+    inactive = given.load_only or given.stopped or given.inactive
+    if given.unload_on_kill or given.u:
+        executable, command = "spawner", [*options, *(["--stopped"] if inactive else [])]
+    else:
+        executable, command = "controller_manager", ["load" if inactive else "spawn", *options]
+    return replace(
+        plan,
+        package="controller_manager",
+        executable=executable,
+        namespace=namespace,
+        arguments=(*command, *given.controller_names),
+        namespace_parameters=parameters,
+    )
+
+
+def _unspawner(plan: NodePlan) -> NodePlan:
+    """Stops and unloads controllers, then ends."""
+    parser = _Parser("unspawner")
+    parser.add_argument("controller_names", nargs="+")
+    parser.add_argument("-c", "--controller-manager", default="controller_manager")
+    given = parser.parse_args(list(plan.arguments))
+    namespace = ros2_control.namespace_of_manager(given.controller_manager, plan.namespace)
+    arguments = ("kill", "--namespace", namespace, *given.controller_names)
+    return replace(plan, executable="controller_manager", arguments=arguments)
+
+
+ROS1_PROGRAMS: Mapping[tuple[str, str], Callable[[NodePlan], NodePlan]] = {
+    ("rviz2", "rviz2"): _rviz,
+    ("tf2_ros", "static_transform_publisher"): _static_transform,
+    ("controller_manager", "ros2_control_node"): _control_node,
+    ("controller_manager", "spawner"): _spawner,
+    ("controller_manager", "spawner.py"): _spawner,
+    ("controller_manager", "unspawner"): _unspawner,
+}
+"""Package and program of ROS 2, and what makes the node of ROS 1 of it."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser of a node's arguments that raises."""
+
+    def __init__(self, program: str) -> None:
+        super().__init__(prog=program, add_help=False, allow_abbrev=False)
+
+    def error(self, message: str) -> NoReturn:
+        raise LaunchError(f"{self.prog}: {message}; allowed: {' '.join(self.format_usage().split()[2:])}")
+
+
+def _joined_negative_numbers(arguments: Sequence[str]) -> list[str]:
+    """Writes `--x -1e-3` as `--x=-1e-3`, which argparse takes for an option otherwise."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1].startswith("--") and "=" not in joined[-1] and not argument.startswith("--"):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Substitutions about ROS packages and parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from launch.core.errors import SubstitutionFailure, hint, listed
+from launch.core.launch_context import LaunchContext
+from launch.core.some_substitutions_type import SomeSubstitutionsType
+from launch.core.substitution import Substitution
+from launch.core.utilities import normalize_to_list_of_substitutions, perform_substitutions, perform_text
+from launch.ros_packages import package_share_directory, program_of_package
+from launch.substitutions import PathJoinSubstitution
+from launch.substitutions.text import described
+
+__all__ = ["ExecutableInPackage", "FindPackage", "FindPackagePrefix", "FindPackageShare", "Parameter"]
+
+
+class FindPackage(Substitution):
+    """Base: a folder of a ROS package.
+
+    Args:
+        package: Its name.
+    """
+
+    def __init__(self, package: SomeSubstitutionsType) -> None:
+        self._package = normalize_to_list_of_substitutions(package)
+
+    @property
+    def package(self) -> list[Substitution]:
+        """Its name."""
+        return self._package
+
+    def describe(self) -> str:
+        return f"{type(self).__name__}({described(self._package)})"
+
+    def find(self, package_name: str) -> str:
+        """Returns the folder.
+
+        Raises:
+            PackageNotFoundError: There is no such package.
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not say which folder: define find(package_name)")
+
+    def perform(self, context: LaunchContext) -> str:
+        return self.find(perform_substitutions(context, self._package))
+
+    def __truediv__(self, part: SomeSubstitutionsType) -> PathJoinSubstitution:
+        """Returns a path in the folder, as `FindPackageShare("robot") / "config"`."""
+        return PathJoinSubstitution([self, normalize_to_list_of_substitutions(part)])
+
+
+class FindPackageShare(FindPackage):
+    """The folder with a package's files."""
+
+    def find(self, package_name: str) -> str:
+        return package_share_directory(package_name)
+
+
+class FindPackagePrefix(FindPackage):
+    """The folder that a package is installed in; in a workspace that is not installed, that of its files."""
+
+    def find(self, package_name: str) -> str:
+        share = Path(package_share_directory(package_name))
+        return str(share.parent.parent if share.parent.name == "share" else share)
+
+
+class ExecutableInPackage(FindPackage):
+    """The path of a package's program.
+
+    Args:
+        executable: Its name.
+        package: Name of the package.
+    """
+
+    def __init__(self, executable: SomeSubstitutionsType, package: SomeSubstitutionsType) -> None:
+        super().__init__(package)
+        self._executable = normalize_to_list_of_substitutions(executable)
+
+    def describe(self) -> str:
+        return f"ExecInPkg({described(self._package)}, {described(self._executable)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        return program_of_package(
+            perform_substitutions(context, self._package), perform_substitutions(context, self._executable)
+        )
+
+
+class Parameter(Substitution):
+    """The value of a parameter that SetParameter set.
+
+    Args:
+        name: Its name.
+        default: Value when it was not set.
+    """
+
+    def __init__(self, name: SomeSubstitutionsType, *, default: Any = None) -> None:
+        self._name = normalize_to_list_of_substitutions(name)
+        self._default = default
+
+    def describe(self) -> str:
+        return f"Parameter({described(self._name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self._name)
+        known: dict[str, Any] = {}
+        for entry in context.launch_configurations.get("global_params", ()):
+            known |= entry if isinstance(entry, dict) else {}
+        if name in known:
+            return str(known[name])
+        if self._default is None:
+            raise SubstitutionFailure(
+                f"no SetParameter has set '{name}' here{hint(name, known)}; set here: {listed(known)}; set it before, "
+                "or give Parameter a default"
+            )
+        is_text = isinstance(self._default, str | Substitution | list | tuple)
+        return perform_text(context, self._default if is_text else str(self._default))
