@@ -17,6 +17,7 @@ from moveit_msgs.msg import (
 )
 from moveit_msgs.srv import GetPositionFK, GetPositionFKRequest, QueryPlannerInterfaces, QueryPlannerInterfacesRequest
 
+from modular_framework_ros.parameter_search import nearest_parameter
 from moveit_commander import conversions
 from moveit_commander.exception import MoveItCommanderException, ServerError
 from moveit_commander.robot_state import CurrentState, current_state
@@ -183,7 +184,7 @@ class GroupConnection:
         return [joint.name for joint in self._group.variables]
 
     def _parameter(self, name: str, default: float) -> float:
-        value: Any = rospy.get_param(f"{self._robot_description}{name}", default)
+        value: Any = rospy.get_param(nearest_parameter(f"{self._robot_description}{name}"), default)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise MoveItCommanderException(
                 f"parameter {rospy.resolve_name(self._robot_description)}{name}: got {value!r}, a number is needed"

@@ -12,6 +12,7 @@ from moveit_msgs.msg import RobotState
 from rosgraph.names import ns_join
 from sensor_msgs.msg import JointState
 
+from modular_framework_ros.parameter_search import nearest_parameter
 from moveit_commander.exception import RobotModelError, ServerError
 from moveit_commander.robot_model import RobotModel
 from moveit_commander.roscpp_initializer import ensure_node, on_shutdown
@@ -29,7 +30,7 @@ def load_model(robot_description: str) -> RobotModel:
     """
     texts = []
     for parameter in (robot_description, f"{robot_description}_semantic"):
-        text = rospy.get_param(parameter, None)
+        text = rospy.get_param(nearest_parameter(parameter), None)
         if not isinstance(text, str):
             raise RobotModelError(
                 f"parameter {rospy.resolve_name(parameter)}: got {type(text).__name__}, the text of "
@@ -37,7 +38,7 @@ def load_model(robot_description: str) -> RobotModel:
                 "another one by the argument robot_description"
             )
         texts.append(text)
-    limits = rospy.get_param(f"{robot_description}_planning/joint_limits", {})
+    limits = rospy.get_param(f"{nearest_parameter(f'{robot_description}_planning')}/joint_limits", {})
     return RobotModel(texts[0], texts[1], limits if isinstance(limits, dict) else {})
 
 

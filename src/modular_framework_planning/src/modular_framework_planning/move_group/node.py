@@ -30,6 +30,7 @@ from modular_framework_planning.move_group.capabilities.tf_publisher import TfPu
 from modular_framework_planning.move_group.capability_selection import Capability, chosen_capabilities
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.move_group.controllers.execution import load_execution
+from modular_framework_planning.move_group.description_topics import publish_descriptions
 from modular_framework_planning.move_group.markers.scene_markers import MarkerPublisher
 from modular_framework_planning.move_group.monitors.octomap_monitor import OctomapMonitor
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
@@ -106,6 +107,7 @@ def advertise(context: MoveGroupContext) -> None:
     context.monitor.connect()
     OctomapMonitor(context.monitor).connect()
     context.markers.show_scene(context.monitor.snapshot())
+    publish_descriptions()
     context.execution.connect()
     for adjustable in reconfigurations(context):
         adjustable.connect()

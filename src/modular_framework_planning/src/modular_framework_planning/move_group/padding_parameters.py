@@ -3,11 +3,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import rospy
-
 from modular_framework_planning.errors import ModelError
+from modular_framework_planning.move_group.robot_parameters import load_planning_limits
 from modular_framework_planning.planning_scene.padding import Padding, uniform_padding
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -19,7 +16,7 @@ def load_padding(model: RobotModel) -> Padding:
         ModelError: a link is unknown, or a value is no number.
         GeometryError: a length below 0 or a scale of 0 or less.
     """
-    given: dict[str, Any] = rospy.get_param("robot_description_planning", {}) or {}
+    given = load_planning_limits()
     try:
         padding, scale, objects, attached = (
             float(given.get(f"default_{key}", default))

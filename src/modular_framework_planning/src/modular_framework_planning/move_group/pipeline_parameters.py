@@ -12,6 +12,7 @@ import rospy
 
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.move_group.robot_parameters import load_planning_limits
 from modular_framework_planning.planning_interface.planning_request import (
     PipelineSettings,
     PlanningAnswer,
@@ -24,7 +25,6 @@ from modular_framework_planning.planning_pipeline.plugins import DEFAULT_ADAPTER
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-ROBOT_PLANNING = "robot_description_planning"
 PARENT = "~planning_pipelines"
 
 
@@ -108,7 +108,7 @@ def pipeline_parameters() -> tuple[dict[str, dict[str, Any]], str]:
 
 def pipeline_settings(parameters: Mapping[str, Any]) -> PipelineSettings:
     """Reads the settings of one pipeline; its own value comes before the node's, and that before the robot's."""
-    planning = rospy.get_param(ROBOT_PLANNING, {}) or {}
+    planning = load_planning_limits()
     known = {item.name for item in fields(PipelineSettings)}
     values: dict[str, Any] = {}
     for source in (planning, rospy.get_param("~", {}) or {}, parameters):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import rospy
 
@@ -15,39 +16,43 @@ from modular_framework_planning.planning_interface.collision_detectors import (
     is_known,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_ros.parameter_search import nearest_parameter
 
 DESCRIPTION = "robot_description"
 COLLISION_DETECTOR = "collision_detector"
 
 
 def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
-    """Builds the robot model from the parameter server.
+    """Builds the robot model from the parameter server: the node's own description, or else one above it.
 
     Raises:
         ModelError: a description is missing after the timeout, or not usable.
     """
     deadline = time.monotonic() + timeout_s
     names = (DESCRIPTION, f"{DESCRIPTION}_semantic")
-    while not all(rospy.has_param(name) for name in names):
+    while missing := [name for name in map(nearest_parameter, names) if not rospy.has_param(name)]:
         if time.monotonic() > deadline or rospy.is_shutdown():
-            missing = [rospy.resolve_name(name) for name in names if not rospy.has_param(name)]
             raise ModelError(
                 f"parameter {' and '.join(missing)} not set after {timeout_s:.0f} s; load the robot's "
                 "description (planning_context.launch) before move_group"
             )
         rospy.rostime.wallsleep(0.1)
-    planning = rospy.get_param(f"{DESCRIPTION}_planning", {})
-    model = RobotModel(
-        str(rospy.get_param(names[0])), str(rospy.get_param(names[1])), planning.get("joint_limits") or {}
-    )
+    urdf, srdf = (str(rospy.get_param(nearest_parameter(name))) for name in names)
+    model = RobotModel(urdf, srdf, load_planning_limits().get("joint_limits") or {})
     for note in model.document.notes:
         rospy.logwarn(note)
     return model
 
 
+def load_planning_limits() -> dict[str, Any]:
+    """Returns robot_description_planning: joint_limits, cartesian_limits, paddings and default scaling factors."""
+    limits: dict[str, Any] = rospy.get_param(nearest_parameter(f"{DESCRIPTION}_planning"), {}) or {}
+    return limits
+
+
 def load_kinematics_settings() -> dict[str, KinematicsSettings]:
     """Returns the settings of groups in robot_description_kinematics (kinematics.yaml); raises PlanningError."""
-    return settings_from(rospy.get_param(f"{DESCRIPTION}_kinematics", {}) or {})
+    return settings_from(rospy.get_param(nearest_parameter(f"{DESCRIPTION}_kinematics"), {}) or {})
 
 
 def collision_detector_name() -> str:
