@@ -83,6 +83,15 @@ class FaultList:
         free = [name for name in names if name not in given]
         self.add(location, f"{what} '{found}' is unknown; {listing(names)}{nearest(found, free)}")
 
+    def extend(self, other: FaultList) -> None:
+        """Adds the faults of another list."""
+        for fault in other._faults:
+            self.add(fault.location, fault.message)
+
+    def sorted(self) -> tuple[Fault, ...]:
+        """Returns the faults by location, each once."""
+        return tuple(sorted(set(self._faults)))
+
     def __len__(self) -> int:
         return len(self._faults)
 

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks controllers against the robot, against the groups, and those of MoveIt against those of the hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from modular_framework_core.files.faults import FaultList, closest, listing, nearest
+from modular_framework_core.files.located_yaml import Mapping
+from modular_framework_core.files.located_yaml import Sequence as YamlSequence
+from modular_framework_planning.trajectory_execution.controllers import ACTION_KINDS, FAKE_KINDS, GRIPPER, TRAJECTORY
+from modular_framework_setup.checks.controller_records import (
+    HardwareController,
+    Located,
+    MoveItController,
+    hardware_controllers,
+    moveit_controllers,
+    names_moveit_controllers,
+)
+from modular_framework_setup.robot_tree import RobotTree, Semantics
+from modular_framework_setup.yaml_files import is_open, plain_text
+
+KINDS = (*ACTION_KINDS, "ParallelGripperCommand")
+ACTIONS = ("follow_joint_trajectory", "gripper_cmd", "gripper_action", "joint_trajectory_action")
+# end of a hardware controller's type: types and action of the MoveIt side
+OFFERS = {
+    "JointTrajectoryController": ((TRAJECTORY,), "follow_joint_trajectory"),
+    "GripperActionController": ((GRIPPER, "ParallelGripperCommand"), "gripper_cmd"),
+}
+
+
+class ControllerChecker:
+    """Checks the controllers of all files together.
+
+    Args:
+        tree: of the robot.
+        semantics: of the SRDF; None where it cannot be read.
+        faults: where faults are noted.
+    """
+
+    def __init__(self, tree: RobotTree, semantics: Semantics | None, faults: FaultList) -> None:
+        self._tree, self._semantics, self._faults = tree, semantics, faults
+        self._listed: list[list[MoveItController]] = []
+        self._hardware: list[HardwareController] = []
+
+    def add_file(self, file_name: str, top: Mapping) -> None:
+        """Checks what one file says by itself."""
+        is_fake = file_name.startswith("fake")
+        if names_moveit_controllers(top):
+            found = moveit_controllers(top, self._faults)
+            self._check_listed(found, FAKE_KINDS if is_fake else KINDS, is_fake)
+            if is_fake:
+                self._check_initial(top)
+            else:
+                self._listed.append(found)
+        else:
+            hardware = hardware_controllers(top)
+            for item in hardware:
+                self._check_joints(f"controller '{item.name}'", item.joints)
+            self._hardware += hardware
+
+    def check_together(self) -> None:
+        """Checks what the files say together."""
+        moving = [item for item in self._hardware if item.moves]
+        for controllers in self._listed:
+            for controller in controllers:
+                if moving and not is_open(controller.name):
+                    self._check_hardware(controller, moving)
+        self._check_groups()
+
+    def _check_joints(self, owner: str, joints: Sequence[Located]) -> None:
+        seen = set()
+        for name, where in joints:
+            if is_open(name):
+                continue
+            if name not in self._tree.joints:
+                movable = [joint.name for joint in self._tree.robot.movable_joints()]
+                self._faults.add_unknown(where, f"{owner}: joint", name, movable)
+            elif self._tree.joints[name].kind == "fixed":
+                self._faults.add(where, f"{owner}: joint '{name}' is a fixed one, which nothing moves; remove it")
+            if name in seen:
+                self._faults.add(where, f"{owner}: joint '{name}' is listed twice; remove it once")
+            seen.add(name)
+
+    def _check_listed(self, controllers: Sequence[MoveItController], kinds: Sequence[str], is_fake: bool) -> None:
+        claims: dict[str, MoveItController] = {}
+        for item in controllers:
+            owner = f"controller '{item.name}'"
+            self._check_joints(owner, item.joints)
+            kind, where = item.kind
+            if not is_open(kind) and kind not in kinds and not (is_fake and not kind):
+                self._faults.add_unknown(where, f"{owner}: type", kind, kinds)
+            self._check_action(item)
+            for joint, at in item.joints if item.is_default else ():
+                other = claims.setdefault(joint, item)
+                if other is not item and not is_open(joint):
+                    self._faults.add(
+                        at,
+                        f"{owner}: joint '{joint}' belongs to default controller '{other.name}' "
+                        f"(line {other.location.line}) too; one default controller may move a joint; write "
+                        "default: false for one of them",
+                    )
+
+    def _check_action(self, item: MoveItController) -> None:
+        """Any name may be right; one that is nearly a usual one is not."""
+        if item.action_ns is None:
+            return
+        action, where = item.action_ns
+        if action not in ACTIONS and not is_open(action) and closest(action, ACTIONS):
+            self._faults.add_unknown(where, f"controller '{item.name}': action_ns", action, ACTIONS)
+
+    def _check_initial(self, top: Mapping) -> None:
+        """Checks the states that fake controllers begin in."""
+        initial = top.entries.get("initial")
+        if self._semantics is None or not isinstance(initial, YamlSequence):
+            return
+        for entry in initial.items:
+            if not isinstance(entry, Mapping):
+                continue
+            group, pose = plain_text(entry.entries.get("group")), plain_text(entry.entries.get("pose"))
+            if is_open(group) or is_open(pose):
+                continue
+            if group not in self._semantics.groups:
+                self._faults.add_unknown(entry.location, "initial: group", group, self._semantics.groups)
+            elif pose not in (states := self._semantics.states.get(group, frozenset())):
+                self._faults.add_unknown(entry.location, f"initial: state of group '{group}'", pose, sorted(states))
+
+    def _check_hardware(self, controller: MoveItController, moving: Sequence[HardwareController]) -> None:
+        names = [item.name for item in moving]
+        found = next((item for item in moving if item.name == controller.name.rsplit("/", 1)[-1]), None)
+        if found is None:
+            files = ", ".join(dict.fromkeys(item.location.file for item in moving))
+            self._faults.add(
+                controller.location,
+                f"controller '{controller.name}' is none of the hardware's ({files}); {listing(names)}"
+                f"{nearest(controller.name, names)}; name the same controllers on both sides",
+            )
+            return
+        where = f"{found.location.file}:{found.location.line}"
+        kinds, action = next(offer for ending, offer in OFFERS.items() if found.kind.endswith(ending))
+        if controller.kind[0] in KINDS and controller.kind[0] not in kinds:
+            self._faults.add(
+                controller.kind[1],
+                f"controller '{controller.name}' has type {controller.kind[0]}, and the hardware's ({where}) is a "
+                f"{found.kind}; allowed for it: {' or '.join(kinds)}; correct one of them",
+            )
+        elif controller.action_ns and controller.action_ns[0] in ACTIONS and controller.action_ns[0] != action:
+            self._faults.add(
+                controller.action_ns[1],
+                f"controller '{controller.name}' has action_ns {controller.action_ns[0]}, and the hardware's "
+                f"({where}), a {found.kind}, offers {action}; correct it",
+            )
+        if found.joints and {name for name, _ in controller.joints} != {name for name, _ in found.joints}:
+            self._check_same_joints(controller, found)
+
+    def _check_same_joints(self, controller: MoveItController, found: HardwareController) -> None:
+        ours, theirs = ({name for name, _ in item.joints} for item in (controller, found))
+        if any(map(is_open, ours)) or (controller.kind[0] != TRAJECTORY and theirs <= ours):
+            return  # a gripper is commanded by one of its joints
+        only = [f"only here: {', '.join(sorted(ours - theirs))}"] if ours - theirs else []
+        only += [f"only there: {', '.join(sorted(theirs - ours))}"] if theirs - ours else []
+        self._faults.add(
+            controller.location,
+            f"controller '{controller.name}' moves other joints than the hardware's of this name "
+            f"({found.location.file}:{found.location.line}); {'; '.join(only)}; list the same joints",
+        )
+
+    def _check_groups(self) -> None:
+        """Notes groups whose joints are moved in part; one that no controller moves may be meant so."""
+        if self._semantics is None:
+            return
+        for group in self._semantics.groups.values():
+            moved = [self._moved(controllers) & set(group.active) for controllers in self._listed]
+            best = max(moved, key=len, default=set())
+            if not best or len(best) == len(group.active):
+                continue
+            missing = [joint for joint in group.active if joint not in best]
+            first = self._listed[moved.index(best)][0].location
+            self._faults.add(
+                first,
+                f"no controller in this file moves {', '.join(missing)} of group '{group.name}', while others of its "
+                f"joints are moved; add {'it' if len(missing) == 1 else 'them'} to a controller",
+            )
+
+    @staticmethod
+    def _moved(controllers: Sequence[MoveItController]) -> set[str]:
+        return {joint for item in controllers for joint, _ in item.joints}

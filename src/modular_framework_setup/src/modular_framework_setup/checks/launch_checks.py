@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks that the files which the launch files of a config package name are there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from modular_framework_core.files.faults import FaultList, SourceLocation, nearest
+from modular_framework_setup.config_package import ConfigPackage
+from modular_framework_setup.description_files import add_xml_error
+from modular_framework_urdf import xml_text
+from modular_framework_urdf.xml_text import XmlError
+
+INPUTS = (".yaml", ".yml", ".rviz", ".launch", ".xml", ".srdf", ".urdf", ".xacro")
+_OWN_FILE = re.compile(r"^\$\((?P<base>find [\w-]+|dirname)\)(?P<path>/[^$\s]+)$")
+
+
+def check_launch_files(package: ConfigPackage, faults: FaultList) -> None:
+    """Notes launch files that are not XML, and files of this package that they name and that are not there.
+
+    Paths with an argument in them, and other packages' files, are left to roslaunch.
+    """
+    for path in package.launch_files():
+        try:
+            root = xml_text.read(path)
+        except XmlError as error:
+            add_xml_error(error, faults)
+            continue
+        for element in root.iter():
+            for key, value in element.attrib.items():
+                named = _named_file(value, path, package) if _names_input(key, value) else None
+                if named is not None and not named.exists():
+                    there = sorted(item.name for item in named.parent.glob("*")) if named.parent.is_dir() else []
+                    faults.add(
+                        SourceLocation(str(path), element.sourceline, 1),
+                        f"<{element.tag}> names {value}, and there is no such file{nearest(named.name, there)}; "
+                        "correct the name, or add the file",
+                    )
+
+
+def _names_input(key: str, value: str) -> bool:
+    """Whether an attribute names a file to read; an argument may name one that is written, or a folder."""
+    return key in ("file", "textfile") or (key in ("default", "value") and value.endswith(INPUTS))
+
+
+def _named_file(value: str, launch_file: Path, package: ConfigPackage) -> Path | None:
+    match = _OWN_FILE.match(value)
+    if match is None:
+        return None
+    if match["base"] == "dirname":
+        return launch_file.parent / match["path"].lstrip("/")
+    return package.folder / match["path"].lstrip("/") if match["base"] == f"find {package.name}" else None

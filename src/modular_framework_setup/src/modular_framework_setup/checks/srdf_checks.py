@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks an SRDF against the robot: states, end effectors, virtual and passive joints, and the collision matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from modular_framework_core.files.faults import FaultList, SourceLocation
+from modular_framework_setup.checks.group_checks import GroupChecker
+from modular_framework_setup.robot_tree import END_M, PlanningGroup, RobotTree, Semantics
+from modular_framework_urdf.xml_text import Element
+
+VIRTUAL_KINDS = ("fixed", "planar", "floating")
+ELEMENTS = (
+    "group", "group_state", "end_effector", "virtual_joint", "passive_joint", "disable_collisions",
+    "enable_collisions", "disable_default_collisions", "link_sphere_approximation", "joint_property",
+)  # fmt: skip
+
+
+def check_srdf(root: Element, where: str, tree: RobotTree, faults: FaultList) -> Semantics:
+    """Checks an SRDF.
+
+    Args:
+        root: of the document.
+        where: its file, for messages.
+        tree: of the robot.
+        faults: where faults are noted.
+
+    Returns:
+        What the checks of other files need of it.
+    """
+    return _SrdfChecker(root, where, tree, faults).check()
+
+
+class _SrdfChecker:
+    """Checks one document."""
+
+    def __init__(self, root: Element, where: str, tree: RobotTree, faults: FaultList) -> None:
+        self._root, self._where, self._tree, self._faults = root, where, tree, faults
+
+    def check(self) -> Semantics:
+        self._check_top()
+        groups = GroupChecker(self._root, self._where, self._tree, self._faults).check()
+        states: dict[str, set[str]] = {}
+        for element in self._root.findall("group_state"):
+            self._check_state(element, groups, states)
+        for element in self._root.findall("end_effector"):
+            self._check_end_effector(element, groups)
+        virtual = {item.get("name", "") for item in self._root.findall("virtual_joint")}
+        for element in self._root.findall("virtual_joint"):
+            self._check_virtual_joint(element)
+        for tag in ("passive_joint", "joint_property"):
+            key = "name" if tag == "passive_joint" else "joint_name"
+            for element in self._root.findall(tag):
+                self._check_name(element, key, "joint", {**self._tree.joints, **dict.fromkeys(virtual)})
+        self._check_pairs()
+        return Semantics(groups, {name: frozenset(items) for name, items in states.items()}, frozenset(virtual))
+
+    def _at(self, element: Element) -> SourceLocation:
+        return SourceLocation(self._where, element.sourceline, 1)
+
+    def _check_top(self) -> None:
+        name, robot = self._root.get("name", ""), self._tree.robot.name
+        if name != robot:
+            self._faults.add(
+                self._at(self._root),
+                f"the SRDF is for robot '{name}', and the URDF ({self._tree.file}) describes '{robot}'; both names "
+                "must be the same; correct one of them",
+            )
+        for element in self._root:
+            if isinstance(element.tag, str) and element.tag not in ELEMENTS:
+                self._faults.add_unknown(self._at(element), "element", element.tag, ELEMENTS)
+
+    def _check_name(self, element: Element, key: str, what: str, allowed: Iterable[str]) -> bool:
+        name = (element.get(key) or "").strip()
+        if not name:
+            self._faults.add(self._at(element), f"<{element.tag}> has no attribute '{key}'; add it")
+            return False
+        if name not in allowed:
+            self._faults.add_unknown(self._at(element), f"<{element.tag}>: {what}", name, allowed)
+            return False
+        return True
+
+    def _check_state(self, element: Element, groups: Mapping[str, PlanningGroup], states: dict[str, set[str]]) -> None:
+        name, group_name = element.get("name", ""), element.get("group", "")
+        if not name:
+            self._faults.add(self._at(element), "a <group_state> has no name; give it one")
+        if not self._check_name(element, "group", "group", groups):
+            return
+        if name in states.setdefault(group_name, set()):
+            self._faults.add(self._at(element), f"group '{group_name}' has two states '{name}'; rename one of them")
+        states[group_name].add(name)
+        group, given = groups[group_name], set()
+        for item in element.findall("joint"):
+            given.add(item.get("name", ""))
+            self._check_state_joint(item, f"state '{name}' of group '{group_name}'", group)
+        missing = [joint for joint in group.active if joint not in given]
+        if missing and group.is_whole:
+            self._faults.add(
+                self._at(element),
+                f"state '{name}' of group '{group_name}' has no value for {', '.join(missing)}; a value for each joint "
+                "of the group that moves is needed; add it",
+            )
+
+    def _check_state_joint(self, item: Element, owner: str, group: PlanningGroup) -> None:
+        name = item.get("name", "")
+        if name not in group.joints:
+            what = f"{owner}: joint '{name}'"
+            if name in self._tree.joints and not group.is_whole:
+                return
+            if name in self._tree.joints:
+                allowed = ", ".join(group.active)
+                self._faults.add(self._at(item), f"{what} is not in the group; allowed: {allowed}; remove it")
+            else:
+                self._faults.add_unknown(self._at(item), f"{owner}: joint", name, group.active)
+            return
+        try:
+            values = [float(word) for word in item.get("value", "").split()]
+        except ValueError:
+            values = []
+        if not values:
+            found = item.get("value", "")
+            self._faults.add(self._at(item), f"{owner}: '{name}' is '{found}'; expected a position in rad or m")
+            return
+        joint = self._tree.joints.get(name)
+        if joint is None or joint.limit is None or joint.kind not in ("revolute", "prismatic"):
+            return
+        lower, upper = joint.limit.lower, joint.limit.upper
+        if not lower - END_M <= values[0] <= upper + END_M:
+            self._faults.add(
+                self._at(item),
+                f"{owner}: '{name}' is at {values[0]:g}; allowed by the URDF: {lower:g} to {upper:g}; correct it",
+            )
+
+    def _check_end_effector(self, element: Element, groups: Mapping[str, PlanningGroup]) -> None:
+        name = element.get("name", "")
+        if not name:
+            self._faults.add(self._at(element), "an <end_effector> has no name; give it one")
+        has_group = self._check_name(element, "group", "group", groups)
+        has_link = self._check_name(element, "parent_link", "parent_link", self._tree.links)
+        parent, link = element.get("parent_group", ""), (element.get("parent_link") or "").strip()
+        if parent and parent not in groups:
+            self._faults.add_unknown(self._at(element), f"end effector '{name}': parent_group", parent, groups)
+        elif has_link and parent and link not in groups[parent].links:
+            allowed = ", ".join(item for item in self._tree.links if item in groups[parent].links)
+            self._faults.add(
+                self._at(element),
+                f"end effector '{name}': parent_link '{link}' is not in its parent_group '{parent}'; allowed: {allowed}"
+                "; correct the link or the group",
+            )
+        elif has_link and not parent and not self._holders(link, element.get("group", ""), groups):
+            self._faults.add(
+                self._at(element),
+                f"end effector '{name}': no other group contains its parent_link '{link}', so nothing moves it; name a "
+                "link of a group, or add parent_group",
+            )
+        if has_group and parent and parent == element.get("group"):
+            self._faults.add(self._at(element), f"end effector '{name}': group and parent_group are both '{parent}'")
+
+    @staticmethod
+    def _holders(link: str, own: str, groups: Mapping[str, PlanningGroup]) -> list[str]:
+        return [name for name, group in groups.items() if name != own and link in group.links]
+
+    def _check_virtual_joint(self, element: Element) -> None:
+        name, kind = element.get("name", ""), element.get("type", "")
+        if not name or not element.get("parent_frame"):
+            missing = "name" if not name else "parent_frame"
+            self._faults.add(self._at(element), f"<virtual_joint> '{name}' has no attribute '{missing}'; add it")
+        if kind not in VIRTUAL_KINDS:
+            self._faults.add_unknown(self._at(element), f"virtual joint '{name}': type", kind, VIRTUAL_KINDS)
+        roots = self._tree.roots
+        if self._check_name(element, "child_link", "child_link", self._tree.links) and roots:
+            child = (element.get("child_link") or "").strip()
+            if child not in roots:
+                self._faults.add(
+                    self._at(element),
+                    f"virtual joint '{name}': child_link '{child}' is not the root of the robot; allowed: "
+                    f"{', '.join(roots)}; a virtual joint places the whole robot, so name its root",
+                )
+
+    def _check_pairs(self) -> None:
+        links = self._tree.links
+        for tag in ("disable_collisions", "enable_collisions"):
+            for element in self._root.findall(tag):
+                for key in ("link1", "link2"):
+                    self._check_name(element, key, key, links)
+        for tag in ("disable_default_collisions", "link_sphere_approximation"):
+            for element in self._root.findall(tag):
+                self._check_name(element, "link", "link", links)

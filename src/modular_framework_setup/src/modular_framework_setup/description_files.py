@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the URDF and the SRDF of a config package, expanding xacro; what fails is noted with file and line."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from xacro_rospkg import PackageNotFoundError, expand
+
+from modular_framework_core.files.faults import FaultList, SourceLocation
+from modular_framework_urdf import xml_text
+from modular_framework_urdf.xml_text import XmlError
+
+_XACRO_NAMESPACE = "www.ros.org/wiki/xacro"
+_AT_LINE = re.compile(r"^(?P<file>.*):(?P<line>\d+)$")
+_NAMES = re.compile(r"'([^']+)'|\(find (\w+)\)|\"([^\"]+)\"|: (\S+)$")
+
+
+@dataclass(frozen=True, slots=True)
+class XmlDocument:
+    """The text of a description.
+
+    Attributes:
+        text: with xacro expanded.
+        where: what to call it in messages, before the line.
+    """
+
+    text: str
+    where: str
+
+
+def read_document(path: Path, arguments: Mapping[str, str], faults: FaultList) -> XmlDocument | None:
+    """Reads a description.
+
+    Args:
+        path: XML, or xacro.
+        arguments: of the xacro file.
+        faults: where it is noted that it cannot be read or expanded.
+
+    Returns:
+        The text; None when there is none. Lines of an expanded file are those of the expanded text.
+    """
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        faults.add(SourceLocation(str(path), 1, 1), f"cannot be read ({error}); a readable file is needed")
+        return None
+    if ".xacro" not in path.suffixes and _XACRO_NAMESPACE not in text:
+        return XmlDocument(text, str(path))
+    words = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(words):
+            return XmlDocument(expand(path, arguments), f"{path} (expanded)")
+    except Exception as error:  # noqa: BLE001 - xacro evaluates Python expressions, which raise what they like
+        line = getattr(getattr(error, "exc", error), "lineno", None) or _line_of(text, str(error), error)
+        reason = " ".join(str(error).split()) or type(error).__name__
+        faults.add(SourceLocation(str(path), line, 1), f"xacro fails: {reason}; mend the file, or give the argument")
+        return None
+
+
+def _line_of(text: str, reason: str, error: Exception) -> int:
+    """Returns the first line of a file that has a name out of the reason of a failure, 1 when none has."""
+    names = [error.package] if isinstance(error, PackageNotFoundError) else []
+    names += [name for match in _NAMES.findall(reason) for name in match if name]
+    for name in names:
+        for number, line in enumerate(text.splitlines(), start=1):
+            if re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line):
+                return number
+    return 1
+
+
+def add_xml_error(error: XmlError, faults: FaultList) -> None:
+    """Notes what a reader of XML found."""
+    match = _AT_LINE.match(error.where)
+    location = SourceLocation(match["file"], int(match["line"]), 1) if match else SourceLocation(error.where, 1, 1)
+    faults.add(location, f"{error.found}; {error.allowed}")
+
+
+def parse_document(document: XmlDocument, faults: FaultList) -> xml_text.Element | None:
+    """Returns the root element of a description; None, and a note, when it is not well-formed."""
+    try:
+        return xml_text.parse(document.text, document.where)
+    except XmlError as error:
+        add_xml_error(error, faults)
+        return None

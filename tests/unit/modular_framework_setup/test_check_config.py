@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Each inconsistency of a config package is named with its file and line, and all of them at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import rospkg
+from small_package import SmallPackage
+
+from modular_framework_setup.check_command import main
+
+SHIPPED = [name for name in rospkg.RosPack().list() if name.endswith("_moveit_config")]
+SRDF, LIMITS, IK = "config/crane.srdf", "config/joint_limits.yaml", "config/kinematics.yaml"
+MOVEIT, HARDWARE = "config/simple_moveit_controllers.yaml", "config/ros_controllers.yaml"
+OMPL, LAUNCH = "config/ompl_planning.yaml", "launch/move_group.launch"
+
+
+@dataclass(frozen=True)
+class Edit:
+    """An edit that breaks the package: what becomes what in a file, and what the complaint says.
+
+    `lower` is how many lines below the begin of the edit the complaint is; `file` has it where it is another file.
+    """
+
+    name: str
+    old: str
+    new: str
+    says: tuple[str, ...]
+    lower: int = 0
+    file: str = ""
+
+
+EDITS = {
+    "joint of a group": Edit(SRDF, '<joint name="grip_1"/>', '<joint name="gripp_1"/>', ("'gripp_1'", "mean 'grip_1'")),
+    "link of a chain": Edit(SRDF, 'tip_link="palm"', 'tip_link="plam"', ("tip_link", "'plam'", "did you mean 'palm'")),
+    "tip above base": Edit(
+        SRDF,
+        'base_link="base" tip_link="palm"',
+        'base_link="palm" tip_link="base"',
+        ("'base' does not hang below", "finger_1"),
+    ),
+    "unknown group of a state": Edit(SRDF, 'name="home" group="arm"', 'name="home" group="arms"', ("'arms'", "'arm'")),
+    "state out of its group": Edit(
+        SRDF,
+        '<joint name="elbow" value="1"/>',
+        '<joint name="elbow" value="1"/><joint name="grip_1" value="0"/>',
+        ("state 'home'", "'grip_1' is not in the group", "allowed: pan, lift, elbow"),
+    ),  # fmt: skip
+    "state beyond limits": Edit(SRDF, 'value="0.5"', 'value="1.5"', ("'lift' is at 1.5", "-1 to 1")),
+    "state without a joint": Edit(SRDF, '    <joint name="pan" value="0"/>\n', "", ("no value for pan",), lower=-1),
+    "end effector's link": Edit(SRDF, 'parent_link="palm" ', "", ("no attribute 'parent_link'",)),
+    "end effector's group": Edit(SRDF, 'parent_group="arm"', 'parent_group="am"', ("parent_group 'am'", "'arm'")),
+    "pair of unknown links": Edit(SRDF, 'link2="turret"', 'link2="turet"', ("link2 'turet'", "did you mean 'turret'")),
+    "virtual joint": Edit(SRDF, 'child_link="base"', 'child_link="boom"', ("'boom' is not the root", "allowed: base")),
+    "passive joint": Edit(SRDF, 'passive_joint name="grip_2"', 'passive_joint name="grp_2"', ("'grp_2'", "'grip_2'")),
+    "misspelt element": Edit(SRDF, "<passive_joint", "<pasive_joint", ("element 'pasive_joint'", "'passive_joint'")),
+    "broken SRDF": Edit(SRDF, "</robot>", "</robt>", ("not an XML document",)),
+    "kinematics of no group": Edit(IK, "arm:", "arn:", ("group 'arn'", "did you mean 'arm'")),
+    "solver": Edit(IK, "KDLKinematicsPlugin", "KDLKinematicPlugin", ("kinematics_solver", "KDLKinematicsPlugin'?")),
+    "limits of no joint": Edit(LIMITS, "pan:", "pn:", ("joint 'pn'", "did you mean 'pan'")),
+    "no velocity": Edit(LIMITS, "true\n    max_velocity: 1.5", "true", ("is true and there is no max_velocity",)),
+    "wider than the URDF": Edit(
+        LIMITS,
+        "pan:\n    has_velocity_limits: true\n    max_velocity: 1.5",
+        "pan:\n    has_velocity_limits: true\n    max_velocity: 2.5",
+        ("max_velocity 2.5", "at most 2"),
+        lower=2,
+    ),  # fmt: skip
+    "key given twice": Edit(LIMITS, "  lift:", "  pan:", ("the key 'pan' is given twice; first in line 3",)),
+    "broken YAML": Edit(LIMITS, "  lift:", "\tlift:", ("not valid YAML", "indent with spaces")),
+    "joint of a controller": Edit(MOVEIT, "- grip_1", "- gripp_1", ("joint 'gripp_1'", "did you mean 'grip_1'")),
+    "joint claimed twice": Edit(
+        MOVEIT, "      - grip_1", "      - grip_1\n      - pan", ("'arm_controller'",), lower=1
+    ),
+    "joint not moved": Edit(
+        MOVEIT, "[pan, lift, elbow]", "[pan, lift]", ("no controller in this file moves elbow", "'arm'"), lower=-4
+    ),
+    "type": Edit(MOVEIT, "type: GripperCommand", "type: GriperCommand", ("type 'GriperCommand'", "'GripperCommand'")),
+    "action": Edit(MOVEIT, "follow_joint_trajectory", "follow_joint_trajectoy", ("action_ns", "'follow_joint_traj")),
+    "name of the hardware's": Edit(
+        HARDWARE,
+        "arm_controller:",
+        "arms_controller:",
+        ("'arm_controller' is none", "'arms_controller'"),
+        file=MOVEIT,
+        lower=-1,
+    ),  # fmt: skip
+    "joints of the hardware's": Edit(
+        HARDWARE, "    - elbow\n", "", ("other joints", "only here: elbow"), file=MOVEIT, lower=-6
+    ),
+    "action of the hardware's": Edit(MOVEIT, "gripper_cmd", "gripper_action", ("offers gripper_cmd",)),
+    "planner": Edit(OMPL, "    - RRTConnect", "    - RRTConect", ("planner configuration 'RRTConect'", "'RRTConnect'")),
+    "planner's type": Edit(OMPL, "geometric::RRTConnect", "geometric::RTConnect", ("'geometric::RRTConnect'",)),
+    "planners of no group": Edit(OMPL, "arm:", "arn:", ("group 'arn'", "did you mean 'arm'")),
+    "projection": Edit(OMPL, "(pan,lift)", "(pan,lft)", ("projection_evaluator", "'lft'", "did you mean 'lift'")),
+    "sensor": Edit("config/sensors_3d.yaml", "PointCloudO", "PointO", ("sensor_plugin is", "PointCloudOctomapUpdater")),
+    "launch file": Edit(
+        "launch/move_group.launch", "kinematics.yaml", "kinematic.yaml", ("did you mean 'kinematics.",)
+    ),
+    "mesh": Edit("urdf", "boom.stl", "bom.stl", ("bom.stl", "does not exist")),
+    "package of a mesh": Edit("urdf", "crane_robot/meshes", "crane_rbot/meshes", ("'crane_rbot' is not found",)),
+    "package of the URDF": Edit(".setup_assistant", "crane_robot", "crane_rbot", ("'crane_rbot'", "crane_robot?")),
+    "limits of the URDF": Edit("urdf", 'lower="-3" upper="3"', 'lower="3" upper="-3"', ("3 is above",), lower=-1),
+    "mimic joint": Edit("urdf", 'mimic joint="grip_1"', 'mimic joint="grip_3"', ("mimics", "'grip_3'"), lower=-1),
+    "number of the URDF": Edit("urdf", 'lower="-3"', 'lower="low"', ("lower is 'low'", "expected a number")),
+    "robot's name": Edit(SRDF, 'robot name="crane"', 'robot name="crain"', ("'crain'", "'crane'")),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS.values(), ids=EDITS)
+def test_a_broken_package_gets_the_right_complaint_at_the_right_line(small: SmallPackage, edit: Edit) -> None:
+    line = small.edit(edit.name, edit.old, edit.new) + edit.lower
+    faults = small.faults()
+    here = [
+        fault
+        for fault in faults
+        if Path(fault.location.file).resolve() == small.path(edit.file or edit.name).resolve()
+        and all(words in fault.message for words in edit.says)
+    ]
+    assert [fault.location.line for fault in here] == [line], "\n".join(map(str, faults))
+
+
+def test_a_package_without_a_fault_gets_no_complaint(small: SmallPackage) -> None:
+    assert small.faults() == ()
+
+
+def test_all_faults_are_told_at_once(small: SmallPackage) -> None:
+    names = ("pair of unknown links", "solver", "limits of no joint", "type", "projection", "mesh")
+    chosen = [EDITS[name] for name in names]
+    for edit in chosen:
+        small.edit(edit.name, edit.old, edit.new)
+    text = "\n".join(map(str, small.faults()))
+    assert all(words in text for edit in chosen for words in edit.says)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_shipped_packages_have_no_fault(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([name]) == 0, capsys.readouterr().out
+
+
+def test_the_exit_code_is_1_for_faults_and_for_a_package_that_is_not_there(
+    small: SmallPackage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(small.folder)]) == 0
+    line = small.edit(IK, "arm:", "arn:")
+    assert main([str(small.folder)]) == 1
+    assert capsys.readouterr().out.startswith(f"{small.folder}/{IK}:{line}:1: group 'arn' is unknown")
+    assert main(["ur5_ezgriper_moveit_config"]) == 1
+    assert "did you mean 'ur5_ezgripper_moveit_config'" in capsys.readouterr().err
+
+
+def test_files_of_moveit_2_are_understood(small: SmallPackage) -> None:
+    for name in (MOVEIT, HARDWARE):
+        small.path(name).unlink()
+    (small.folder / "config/moveit_controllers.yaml").write_text(
+        "moveit_controller_manager: moveit_simple_controller_manager/MoveItSimpleControllerManager\n"
+        "moveit_simple_controller_manager:\n"
+        "  controller_names: [arm_controller]\n"
+        "  arm_controller:\n"
+        "    type: FollowJointTrajectory\n"
+        "    joints: [pan, lift, elbow]\n"
+    )
+    hardware = small.folder / "config/ros2_controllers.yaml"
+    hardware.write_text(
+        "controller_manager:\n"
+        "  ros__parameters:\n"
+        "    arm_controller:\n"
+        "      type: joint_trajectory_controller/JointTrajectoryController\n"
+        "arm_controller:\n"
+        "  ros__parameters:\n"
+        "    joints: [pan, lift, elbow]\n"
+    )
+    (small.folder / "config/initial_positions.yaml").write_text("initial_positions:\n  pan: 0\n")
+    limits = small.path(LIMITS)
+    limits.write_text(limits.read_text().replace("max_velocity: 1.5", "max_velocity: !degrees 80.0"))
+    assert small.faults() == ()
+    hardware.write_text(hardware.read_text().replace("lift, elbow", "lift"))
+    assert [(Path(fault.location.file).name, fault.location.line) for fault in small.faults()] == [
+        ("moveit_controllers.yaml", 4)
+    ]
+
+
+def test_a_xacro_file_that_fails_is_named_with_its_line(small: SmallPackage) -> None:
+    folder = small.path("urdf").parent
+    text = small.path("urdf").read_text().replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    broken = text.replace('velocity="0.2"/></joint>', 'velocity="${speed}"/></joint>')
+    (folder / "crane.urdf.xacro").write_text(broken)
+    small.edit(".setup_assistant", "crane.urdf", "crane.urdf.xacro")
+    (fault,) = small.faults()
+    line = broken[: broken.index("${speed}")].count("\n") + 1
+    assert (Path(fault.location.file).name, fault.location.line) == ("crane.urdf.xacro", line)
+    assert "xacro fails" in fault.message and "speed" in fault.message
+
+
+def test_values_that_launch_files_fill_in_are_understood(small: SmallPackage) -> None:
+    small.edit(IK, "arm:", "$(arg group):")
+    small.edit(OMPL, "arm:", "$(arg unknown):")
+    small.edit(LAUNCH, "<launch>", '<launch><arg name="group" default="arm"/>')
+    assert small.faults() == ()
+    small.edit(LAUNCH, 'default="arm"', 'default="am"')
+    assert ["group 'am' is unknown" in fault.message for fault in small.faults()] == [True]
