@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from modular_framework_core.files.faults import Fault
-from modular_framework_setup.package_check import check_package
+from modular_framework_setup.checks.package_check import check_package
 
 JOINTS = ("pan", "lift", "elbow")
 URDF = """<?xml version="1.0"?>

@@ -10,7 +10,7 @@ import pytest
 import rospkg
 from small_package import SmallPackage
 
-from modular_framework_setup.check_command import main
+from modular_framework_setup.commands.check_command import main
 
 SHIPPED = [name for name in rospkg.RosPack().list() if name.endswith("_moveit_config")]
 SRDF, LIMITS, IK = "config/crane.srdf", "config/joint_limits.yaml", "config/kinematics.yaml"

@@ -17,8 +17,8 @@ from modular_framework_setup.checks.controller_records import (
     moveit_controllers,
     names_moveit_controllers,
 )
-from modular_framework_setup.robot_tree import RobotTree, Semantics
-from modular_framework_setup.yaml_files import is_open, plain_text
+from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
+from modular_framework_setup.config_files.yaml_files import is_open, plain_text
 
 KINDS = (*ACTION_KINDS, "ParallelGripperCommand")
 ACTIONS = ("follow_joint_trajectory", "gripper_cmd", "gripper_action", "joint_trajectory_action")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Sequence, kind_of
-from modular_framework_setup.yaml_files import is_open, mappings, plain_text, read_truth, texts
+from modular_framework_setup.config_files.yaml_files import is_open, mappings, plain_text, read_truth, texts
 
 Located = tuple[str, SourceLocation]
 SIMPLE = "moveit_simple_controller_manager"

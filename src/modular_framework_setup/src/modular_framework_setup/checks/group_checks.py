@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
-from modular_framework_setup.robot_tree import PlanningGroup, RobotTree
+from modular_framework_setup.config_files.robot_tree import PlanningGroup, RobotTree
 from modular_framework_urdf.xml_text import Element
 
 MEMBERS = ("joint", "link", "chain", "group")

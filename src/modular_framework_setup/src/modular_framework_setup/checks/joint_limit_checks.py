@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, kind_of
-from modular_framework_setup.robot_tree import END_M, RobotTree
-from modular_framework_setup.yaml_files import is_open, read_number, read_truth
+from modular_framework_setup.config_files.robot_tree import END_M, RobotTree
+from modular_framework_setup.config_files.yaml_files import is_open, read_number, read_truth
 from modular_framework_urdf.robot import Joint
 
 # flag: what it needs

@@ -8,8 +8,8 @@ import re
 from modular_framework_core.files.faults import FaultList, closest
 from modular_framework_core.files.located_yaml import Mapping, kind_of
 from modular_framework_planning.kinematics.kinematics_settings import NUMERIC
-from modular_framework_setup.robot_tree import Semantics
-from modular_framework_setup.yaml_files import is_open, parameters_of, plain_text, read_number, read_truth
+from modular_framework_setup.config_files.robot_tree import Semantics
+from modular_framework_setup.config_files.yaml_files import is_open, parameters_of, plain_text, read_number, read_truth
 
 SOLVERS = (
     "kdl_kinematics_plugin/KDLKinematicsPlugin",

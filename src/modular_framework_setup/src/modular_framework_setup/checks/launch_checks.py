@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 
 from modular_framework_core.files.faults import FaultList, SourceLocation, nearest
-from modular_framework_setup.config_package import ConfigPackage
-from modular_framework_setup.description_files import add_xml_error
+from modular_framework_setup.config_files.config_package import ConfigPackage
+from modular_framework_setup.config_files.description_files import add_xml_error
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.xml_text import XmlError
 

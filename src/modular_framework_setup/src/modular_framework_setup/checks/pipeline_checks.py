@@ -7,8 +7,8 @@ import re
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node
-from modular_framework_setup.robot_tree import RobotTree, Semantics
-from modular_framework_setup.yaml_files import is_open, mappings, parameters_of, plain_text, texts
+from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
+from modular_framework_setup.config_files.yaml_files import is_open, mappings, parameters_of, plain_text, texts
 
 GROUP_KEYS = ("default_planner_config", "planner_configs", "projection_evaluator", "longest_valid_segment_fraction")
 PLANNER_TYPES = tuple(

@@ -8,7 +8,7 @@ import re
 from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, Scalar, Sequence, kind_of
 from modular_framework_planning.perception.sensor_settings import read_sensors
-from modular_framework_setup.yaml_files import is_open, parameters_of
+from modular_framework_setup.config_files.yaml_files import is_open, parameters_of
 
 _NUMBER = re.compile(r"sensors\[\d+\]: ")
 

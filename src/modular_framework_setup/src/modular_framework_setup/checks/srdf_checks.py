@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_setup.checks.group_checks import GroupChecker
-from modular_framework_setup.robot_tree import END_M, PlanningGroup, RobotTree, Semantics
+from modular_framework_setup.config_files.robot_tree import END_M, PlanningGroup, RobotTree, Semantics
 from modular_framework_urdf.xml_text import Element
 
 VIRTUAL_KINDS = ("fixed", "planar", "floating")

@@ -7,9 +7,9 @@ import re
 from collections import Counter
 
 from modular_framework_core.files.faults import FaultList
-from modular_framework_setup.config_package import find_package
-from modular_framework_setup.description_files import XmlDocument, add_xml_error
-from modular_framework_setup.robot_tree import RobotTree
+from modular_framework_setup.config_files.config_package import find_package
+from modular_framework_setup.config_files.description_files import XmlDocument, add_xml_error
+from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.robot import MOVABLE_KINDS, Joint, MeshFile, Robot

@@ -7,8 +7,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from modular_framework_setup.config_package import NoConfigPackageError, folder_of
-from modular_framework_setup.package_check import check_package
+from modular_framework_setup.checks.package_check import check_package
+from modular_framework_setup.config_files.config_package import NoConfigPackageError, folder_of
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

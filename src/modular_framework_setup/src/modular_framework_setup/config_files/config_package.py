@@ -16,7 +16,7 @@ from lxml import etree
 from modular_framework_core.files.faults import FaultList, SourceLocation, closest, nearest
 from modular_framework_core.files.located_yaml import Mapping as YamlMapping
 from modular_framework_core.files.located_yaml import Scalar
-from modular_framework_setup.yaml_files import load_yaml
+from modular_framework_setup.config_files.yaml_files import load_yaml
 
 SETTINGS = ".setup_assistant"
 SETTINGS_KEY = "moveit_setup_assistant_config"

@@ -15,10 +15,10 @@ from modular_framework_setup.checks.pipeline_checks import check_planners
 from modular_framework_setup.checks.sensor_checks import check_sensors
 from modular_framework_setup.checks.srdf_checks import check_srdf
 from modular_framework_setup.checks.urdf_checks import check_urdf
-from modular_framework_setup.config_package import ConfigPackage, packages_beside, read_config_package
-from modular_framework_setup.description_files import parse_document, read_document
-from modular_framework_setup.robot_tree import RobotTree, Semantics
-from modular_framework_setup.yaml_files import is_open, load_yaml
+from modular_framework_setup.config_files.config_package import ConfigPackage, packages_beside, read_config_package
+from modular_framework_setup.config_files.description_files import parse_document, read_document
+from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
+from modular_framework_setup.config_files.yaml_files import is_open, load_yaml
 
 
 def check_package(folder: Path) -> tuple[Fault, ...]:
