@@ -140,6 +140,7 @@ class IndependentChecker:
                 else (mimic.get("joint"), float(mimic.get("multiplier", 1)), float(mimic.get("offset", 0))),
             )
         self._links = [link.get("name") for link in root.findall("link")]
+        self._add_base(semantics)
         self.parts: list[Part] = []
         for link in root.findall("link"):
             for collision in link.findall("collision"):
@@ -148,6 +149,27 @@ class IndependentChecker:
         self._allowed = {frozenset((e.get("link1"), e.get("link2"))) for e in semantics.iter("disable_collisions")}
         self._robot_parts = len(self.parts)
         self.pairs = self._robot_pairs()
+
+    def _add_base(self, semantics: ET.Element) -> None:
+        """Puts the variables of a planar or floating virtual joint above the root link, the outermost first."""
+        turns = {"planar": ("theta",), "floating": ("yaw", "pitch", "roll")}
+        slides = {"planar": ("x", "y"), "floating": ("trans_x", "trans_y", "trans_z")}
+        axes = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1], "theta": [0, 0, 1], "yaw": [0, 0, 1]}
+        axes |= {"pitch": [0, 1, 0], "roll": [1, 0, 0]}
+        root = next(link for link in self._links if link not in self._joints)
+        for joint in semantics.iter("virtual_joint"):
+            kind, name = joint.get("type"), joint.get("name")
+            if joint.get("child_link") != root or kind not in turns:
+                continue
+            variables, child = (*slides[kind], *turns[kind]), root
+            for number in reversed(range(len(variables))):
+                variable = variables[number]
+                motion = "prismatic" if variable in slides[kind] else "continuous"
+                axis = axes[variable.removeprefix("trans_")]
+                parent = f"{name}/{variables[number - 1]}" if number else ""
+                self._joints[child] = (f"{name}/{variable}", motion, parent, np.eye(4), axis, None)
+                child = parent
+            break
 
     @staticmethod
     def _read(geometry: ET.Element, resolve: Callable[[str], str]) -> Solid:
@@ -175,8 +197,8 @@ class IndependentChecker:
             if roots[i] != roots[j] and frozenset((self.parts[i].link, self.parts[j].link)) not in self._allowed
         ]
 
-    def set_world(self, objects: World) -> None:
-        """Replaces the world: name, solid, pose in the root frame."""
+    def set_world(self, objects: World, base_moves: bool = False) -> None:
+        """Replaces the world: name, solid, pose in the planning frame; only a base that moves can touch it."""
         self.parts = self.parts[: self._robot_parts]
         self.pairs = self._robot_pairs()
         base = self._moving_root(self._links[0])
@@ -185,7 +207,7 @@ class IndependentChecker:
             self.pairs += [
                 (i, len(self.parts) - 1)
                 for i in range(self._robot_parts)
-                if self._moving_root(self.parts[i].link) != base
+                if base_moves or self._moving_root(self.parts[i].link) != base
             ]
 
     def link_poses(self, positions: Mapping[str, float | np.ndarray]) -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ from modular_framework_urdf import robot as urdf_robot
 from modular_framework_urdf import srdf_reader
 from modular_framework_urdf.mimics import Mimic, resolved
 from modular_framework_urdf.robot import MOVABLE_KINDS, Vector
-from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription, read_srdf
+from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription, VirtualJoint, read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
 from moveit_commander.exception import RobotModelError
@@ -132,7 +132,9 @@ class RobotModel:
             raise RobotModelError(f"URDF '{self.name}': {len(roots)} links have no parent joint; exactly one may")
         self.root_link = roots[0]
         root_joint = _root_joint(semantics, self.root_link)
-        self.planning_frame = self.root_link  # as in MoveIt, also below a fixed virtual joint
+        self.base = _moving_base(semantics, self.root_link)
+        # As in MoveIt: the frame that a planar or floating base moves in; the root link below a fixed virtual joint.
+        self.planning_frame = self.base.parent_frame if self.base else self.root_link
         ordered = [root_joint, *_depth_first(tree.values(), self.root_link)]
         self.joints = {joint.name: joint for joint in ordered}
         self.links = tuple(joint.child for joint in ordered)
@@ -256,6 +258,12 @@ def _root_joint(semantics: SemanticDescription, root_link: str) -> Joint:
         if item.child_link == root_link:
             return Joint(item.name, "fixed", item.parent_frame, root_link)
     return Joint(ASSUMED_ROOT_JOINT, "fixed", "", root_link)
+
+
+def _moving_base(semantics: SemanticDescription, root_link: str) -> VirtualJoint | None:
+    """Returns the planar or floating virtual joint above the root link, if there is one."""
+    joints = [item for item in semantics.virtual_joints if item.child_link == root_link]
+    return joints[0] if joints and joints[0].kind in ("planar", "floating") else None
 
 
 def _depth_first(joints: Iterable[Joint], root_link: str) -> list[Joint]:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The current robot: its description from the parameter server, its joint positions from joint_states."""
+"""The current robot: its description from the parameter server, joint positions from joint_states, a base from tf."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import rospy
 from moveit_msgs.msg import RobotState
@@ -52,6 +53,15 @@ def current_state(robot_description: str, ns: str) -> CurrentState:
         return _shared[key]
 
 
+def _tf_buffer() -> Any:
+    """Returns a buffer that listens to tf."""
+    import tf2_ros  # few robots need it, and it takes long to import
+
+    buffer = tf2_ros.Buffer()
+    buffer.listener = tf2_ros.TransformListener(buffer)  # kept as long as the buffer
+    return buffer
+
+
 def _forget_all() -> None:
     with _sharing:
         for state in _shared.values():
@@ -62,7 +72,7 @@ def _forget_all() -> None:
 class CurrentState:
     """Stores the latest joint states of a topic.
 
-    Subscribes: joint_states (sensor_msgs/JointState).
+    Subscribes: joint_states (sensor_msgs/JointState); tf where the robot has a planar or floating virtual joint.
     """
 
     def __init__(self, model: RobotModel, topic: str) -> None:
@@ -71,12 +81,15 @@ class CurrentState:
         self._positions: dict[str, float] = {}
         self._arrivals: dict[str, float] = {}
         self._changed = threading.Condition()
+        self._transforms = _tf_buffer() if model.base else None
         self._subscriber = rospy.Subscriber(topic, JointState, self._on_joint_state, queue_size=10, tcp_nodelay=True)
         on_shutdown(_forget_all)
 
     def close(self) -> None:
         """Stops listening. May be called twice."""
         self._subscriber.unregister()
+        if self._transforms is not None:
+            self._transforms.listener.unregister()
 
     def positions(self, needed: Iterable[str] = (), timeout_s: float = STATE_TIMEOUT_S) -> dict[str, float]:
         """Returns positions that arrived after this call [rad or m], mimic joints included.
@@ -102,8 +115,22 @@ class CurrentState:
             return self.model.complete(self._positions)
 
     def message(self, needed: Iterable[str] = ()) -> RobotState:
-        """Returns the whole known state as a message, in the planning frame; `needed` as above."""
-        return self.message_of(self.positions(needed))
+        """Returns the whole known state as a message, in the planning frame; `needed` as above.
+
+        It has a planar or floating base where tf has it; without, move_group leaves the base where it knows it to be.
+        """
+        state = self.message_of(self.positions(needed))
+        self._write_base(state)
+        return state
+
+    def _write_base(self, state: RobotState) -> None:
+        base = self.model.base
+        if base is None or self._transforms is None:
+            return
+        if self._transforms.can_transform(base.parent_frame, base.child_link, rospy.Time(0)):
+            found = self._transforms.lookup_transform(base.parent_frame, base.child_link, rospy.Time(0))
+            state.multi_dof_joint_state.joint_names = [base.name]
+            state.multi_dof_joint_state.transforms = [found.transform]
 
     def message_of(self, positions: Mapping[str, float]) -> RobotState:
         """Returns a message of given positions; as in MoveIt, it has no time stamp."""

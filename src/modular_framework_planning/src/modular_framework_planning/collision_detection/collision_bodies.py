@@ -74,6 +74,7 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
         moving: joints that will move, as indices in a position vector; all by default.
     """
     supports = _supports(scene.model, moving)
+    standing = _standing(scene.model, moving)
     verdicts: dict[tuple[str, str, str, str], bool] = {}
     result = []
     for first, one in enumerate(parts):
@@ -81,7 +82,9 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
             break  # the world comes last, and its bodies do not move relative to each other
         for second in range(first + 1, len(parts)):
             other = parts[second]
-            if one.joint_id == other.joint_id and ATTACHED not in (one.body.kind, other.body.kind):
+            if standing.get(one.joint_id, one.joint_id) == standing.get(other.joint_id, other.joint_id) and (
+                ATTACHED not in (one.body.kind, other.body.kind)
+            ):
                 continue  # rigidly connected: no motion changes whether they touch
             key = (one.body.kind, one.body.name, other.body.kind, other.body.name)
             allowed = verdicts.get(key)
@@ -97,6 +100,16 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
                     )
                 )
     return result
+
+
+def _standing(model: RobotModel, moving: Joints) -> dict[int, int]:
+    """Returns {joint of the base: 0, the world's} where a planar or floating base stands still, else nothing.
+
+    What only the base moves is then as rigid to the world as the foot of a robot that is screwed to it.
+    """
+    if moving is None or not len(model.base_indices) or set(model.base_indices.tolist()) & set(moving):
+        return {}
+    return {int(model.base_indices[-1]) + 1: 0}
 
 
 def _may_touch(scene: PlanningScene, first: Body, second: Body) -> bool:

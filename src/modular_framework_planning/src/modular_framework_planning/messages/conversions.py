@@ -15,6 +15,13 @@ from modular_framework_planning.contacts import ATTACHED, LINK, WORLD
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.multi_dof import (
+    multi_dof_message,
+    multi_dof_trajectory,
+    names_joints,
+    single_joints,
+    with_multi_dof,
+)
 from modular_framework_planning.messages.scene_conversions import apply_attached_object, attached_to_message
 from modular_framework_planning.planning_interface.planning_request import ConstraintGoal, JointGoal, PoseGoal
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
@@ -52,13 +59,13 @@ def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[fl
 def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robot state") -> PlanningScene:
     """Returns the scene with the robot in the state of a message.
 
-    Joints that are not named stay as they are. A state that names joints and is not a diff replaces the attached
-    objects; otherwise those of the message are added.
+    Joints that are not named stay as they are, and so does a planar or floating base. A state that names joints and is
+    not a diff replaces the attached objects; otherwise those of the message are added.
     """
-    names = state.joint_state.name
-    if names:
-        values = joint_values(scene.model, names, state.joint_state.position, where)
+    if names_joints(state):
+        values = joint_values(scene.model, state.joint_state.name, state.joint_state.position, where)
         scene = scene.with_positions(scene.model.merge(scene.positions, values))
+        scene = with_multi_dof(scene, state.multi_dof_joint_state, where)
         if not state.is_diff:
             scene = scene.without_attached(scene.attached)
     for item in state.attached_collision_objects:
@@ -69,11 +76,14 @@ def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robo
 def state_message(
     scene: PlanningScene, positions: Array | None = None, with_attached: bool = True, with_geometry: bool = True
 ) -> RobotState:
-    """Writes joint positions (the scene's by default) and attached objects."""
-    message = RobotState()
-    message.joint_state.header.frame_id = scene.model.planning_frame
-    message.joint_state.name = list(scene.model.joint_names)
-    message.joint_state.position = [float(v) for v in (scene.positions if positions is None else positions)]
+    """Writes joint positions (the scene's by default), where the base is, and attached objects."""
+    message, model = RobotState(), scene.model
+    values = scene.positions if positions is None else positions
+    message.joint_state.header.frame_id = model.planning_frame
+    for number in single_joints(model, model.joint_names):
+        message.joint_state.name.append(model.joint_names[number])
+        message.joint_state.position.append(float(values[number]))
+    message.multi_dof_joint_state = multi_dof_message(model, values)
     if with_attached:
         message.attached_collision_objects = [
             attached_to_message(scene, item, with_geometry) for item in scene.attached.values()
@@ -127,11 +137,15 @@ def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
         raise PlanningError(code, f"{where}: constraints are not supported here; leave them empty")
 
 
-def trajectory_message(trajectory: Trajectory, frame: str) -> RobotTrajectory:
-    """Writes a trajectory with positions, velocities and accelerations."""
+def trajectory_message(trajectory: Trajectory, model: RobotModel) -> RobotTrajectory:
+    """Writes a trajectory with positions, velocities and accelerations; that of the base as a multi-DOF trajectory."""
     message = RobotTrajectory()
-    message.joint_trajectory.header.frame_id = frame
-    message.joint_trajectory.joint_names = list(trajectory.joint_names)
+    message.joint_trajectory.header.frame_id = model.planning_frame
+    message.multi_dof_joint_trajectory = multi_dof_trajectory(model, trajectory)
+    columns = single_joints(model, trajectory.joint_names)
+    message.joint_trajectory.joint_names = [trajectory.joint_names[number] for number in columns]
+    if not columns:
+        return message
     message.joint_trajectory.points = [
         JointTrajectoryPoint(
             positions=row.tolist(),
@@ -140,7 +154,11 @@ def trajectory_message(trajectory: Trajectory, frame: str) -> RobotTrajectory:
             time_from_start=genpy.Duration.from_sec(float(stamp)),
         )
         for stamp, row, speed, change in zip(
-            trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
+            trajectory.times,
+            trajectory.positions[:, columns],
+            trajectory.velocities[:, columns],
+            trajectory.accelerations[:, columns],
+            strict=True,
         )
     ]
     return message

@@ -42,7 +42,9 @@ def difference_message(before: PlanningScene, after: PlanningScene) -> SceneMess
     empty = SceneMessage(is_diff=True, name=before.name, robot_model_name=after.model.name)
     message.robot_state.is_diff = empty.robot_state.is_diff = True
     if joints_moved(before, after):
-        message.robot_state.joint_state = state_message(after, with_attached=False).joint_state
+        state = state_message(after, with_attached=False)
+        message.robot_state.joint_state = state.joint_state
+        message.robot_state.multi_dof_joint_state = state.multi_dof_joint_state
     if any(before.fixed_frames.get(name) is not transform for name, transform in after.fixed_frames.items()):
         message.fixed_frame_transforms = frames_to_message(after)
     if before.acm is not after.acm:

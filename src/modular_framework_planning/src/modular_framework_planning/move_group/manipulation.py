@@ -211,7 +211,7 @@ class Manipulation:
     def _message(self, stage: Stage) -> RobotTrajectory:
         model = self._context.model
         if stage.motion is not None:
-            return trajectory_message(stage.motion, model.planning_frame)
+            return trajectory_message(stage.motion, model)
         message = RobotTrajectory()
         motion = message.joint_trajectory
         motion.header.frame_id, motion.joint_names = model.planning_frame, list(stage.fingers)

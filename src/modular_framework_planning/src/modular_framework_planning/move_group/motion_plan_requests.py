@@ -19,6 +19,7 @@ from modular_framework_planning.messages.conversions import (
     state_message,
     trajectory_message,
 )
+from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.planners.pilz.auxiliary_point import auxiliary_point
 from modular_framework_planning.planning_interface.planning_request import AuxiliaryPoint, PlanningRequest, Workspace
@@ -134,7 +135,7 @@ def answer(
     }
     context.reporter.request(message)
     try:
-        if not message.start_state.joint_state.name or message.start_state.is_diff:
+        if not names_joints(message.start_state) or message.start_state.is_diff:
             context.monitor.wait_for_state()
         request = read_request(context, change(context.monitor.snapshot()), message, cancelled)
         scene = request.scene
@@ -148,7 +149,7 @@ def answer(
         raise PlanningError(ErrorCode(code), f"planning failed: {type(error).__name__}: {error}") from error
     response = MotionPlanResponse(group_name=message.group_name)
     response.trajectory_start = state_message(scene, found.start)
-    response.trajectory = trajectory_message(found.trajectory, scene.model.planning_frame)
+    response.trajectory = trajectory_message(found.trajectory, scene.model)
     response.planning_time = found.total_time_s
     response.error_code.val = ErrorCode.SUCCESS
     details.update(

@@ -53,9 +53,7 @@ def solve_sequence(
         return SolvedSequence(response, (), str(error))
     response.planning_time = time.monotonic() - begun
     response.error_code.val = ErrorCode.SUCCESS
-    response.planned_trajectories = [
-        trajectory_message(part.trajectory, context.model.planning_frame) for part in parts
-    ]
+    response.planned_trajectories = [trajectory_message(part.trajectory, context.model) for part in parts]
     if parts:
         response.sequence_start = state_message(parts[0].scene, parts[0].answers[0].start)
         _show(context, parts, response)

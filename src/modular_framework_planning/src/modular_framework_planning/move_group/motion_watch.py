@@ -65,6 +65,8 @@ class WatchedMotion:
                 where it was cancelled, else what the execution says.
         """
         if self._watch is None:
+            if self._trajectory.multi_dof_joint_trajectory.points:
+                self._context.execution.execute(self._trajectory, self._stop)
             return
         self._check_scene()
         self._raise_if_blocked()

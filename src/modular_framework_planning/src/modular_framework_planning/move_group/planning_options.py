@@ -11,6 +11,7 @@ import rospy
 from moveit_msgs.msg import RobotState
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.messages.scene_messages import apply_scene
 from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
@@ -37,9 +38,9 @@ def scene_change(options: Any, keep_state: bool) -> SceneChange:
     """
     diff = copy.copy(options.planning_scene_diff)
     diff.is_diff = True
-    if keep_state and (diff.robot_state.joint_state.name or diff.robot_state.attached_collision_objects):
+    if keep_state and (names_joints(diff.robot_state) or diff.robot_state.attached_collision_objects):
         rospy.logwarn("planning_scene_diff.robot_state is ignored: a motion to execute starts where the robot is")
-    if keep_state or not diff.robot_state.joint_state.name:
+    if keep_state or not names_joints(diff.robot_state):
         diff.robot_state = RobotState(
             is_diff=True, attached_collision_objects=[] if keep_state else diff.robot_state.attached_collision_objects
         )
@@ -54,7 +55,7 @@ def with_current_start(request: Any, where: str) -> Any:
         where: its name in a warning.
     """
     start = request.start_state
-    if start.joint_state.name or start.attached_collision_objects:
+    if names_joints(start) or start.attached_collision_objects:
         rospy.logwarn("%s.start_state is ignored: a motion to execute starts where the robot is", where)
     request = copy.copy(request)
     request.start_state = RobotState(is_diff=True)

@@ -50,10 +50,23 @@ def _shape(entry: Mapping[str, Any], where: str) -> Shape:
     return SHAPES[kind](*entry["dimensions"])
 
 
+def _with_base(scene: PlanningScene, state: Mapping[str, Any] | None, where: str) -> PlanningScene:
+    """Returns the scene with a planar or floating base where a robot state's multi_dof_joint_state puts it."""
+    entry, base = (state or {}).get("multi_dof_joint_state") or {}, scene.model.base
+    frame = str((entry.get("header") or {}).get("frame_id", ""))
+    for name, item in zip(entry.get("joint_names") or (), entry.get("transforms") or (), strict=True):
+        if base is not None and name == base.name:
+            pose = make_transform(item["translation"], item["rotation"], f"{where} '{name}'")
+            placed = scene.frame_transform(frame) * pose
+            scene = scene.with_positions(scene.model.with_base(scene.positions, placed))
+    return scene
+
+
 def read_scene(model: RobotModel, path: Path) -> PlanningScene:
     """Returns the scene of a YAML file; the robot's own allowed collisions come from its SRDF."""
-    scene = empty_scene(model)
-    for entry in _load(path)["world"]["collision_objects"]:
+    content = _load(path)
+    scene = _with_base(empty_scene(model), content.get("robot_state"), path.name)
+    for entry in content["world"]["collision_objects"]:
         where = f"{path.name} '{entry['id']}'"
         poses = entry.get("primitive_poses") or [None] * len(entry["primitives"])
         shapes = tuple(
@@ -73,6 +86,7 @@ def read_problem(model: RobotModel, scene_path: Path, request_path: Path, allowe
     }
     scene = read_scene(model, scene_path)
     scene = scene.with_positions(model.merge(scene.positions, values))
+    scene = _with_base(scene, request["start_state"], request_path.name)
     goals = tuple(
         JointGoal({item["joint_name"]: float(item["position"]) for item in goal["joint_constraints"]})
         for goal in request["goal_constraints"]

@@ -61,7 +61,7 @@ def hand_links(model: RobotModel, effector: EndEffector) -> tuple[str, ...]:
     parents = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
     links = list(model.group(effector.group).links)
     for link in tuple(links):
-        while link in parents and parents[link] != effector.parent_link:
+        while model.has_link(parents.get(link, "")) and parents[link] != effector.parent_link:
             link = parents[link]
             if link not in links:
                 links.append(link)

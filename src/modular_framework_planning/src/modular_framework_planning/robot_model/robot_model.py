@@ -72,18 +72,26 @@ class JointGroup:
         return bool(self.tip_link and self.joints)
 
 
+def _entry(entries: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Returns a joint's entry in joint_limits.yaml; the parameter server splits "joint/variable" at the slash."""
+    joint, _, variable = name.rpartition("/")
+    return entries.get(name) or (entries.get(joint) or {}).get(variable) or {}
+
+
 class RobotModel:
     """The robot; nothing in it changes after construction, so threads may share it.
 
-    Position vectors hold one value per movable joint (mimic joints included) in the order of `joint_names`.
+    Position vectors hold one value per movable joint (mimic joints included) in the order of `joint_names`. A planar or
+    floating virtual joint (`base`) stands there as its variables, each a joint of its own.
     """
 
     def __init__(
         self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None, resolve: MeshResolver = package_resolver
     ) -> None:
         self.source = (urdf, srdf, dict(limits or {}), resolve)  # makes the same robot in another process
-        self.document = load_urdf(urdf, resolve)
         self.semantics: SemanticDescription = parse_srdf(srdf)
+        self.document = load_urdf(urdf, resolve, self.semantics.virtual_joints)
+        self.base = self.document.multi_dof_joint
         self.name = self.document.robot_name
         self.pin_model = pin.buildModelFromXML(self.document.xml)
         self.joint_names: tuple[str, ...] = tuple(self.pin_model.names)[1:]
@@ -93,8 +101,13 @@ class RobotModel:
                 f"URDF: {self.pin_model.nq} position variables for {len(self.joint_names)} joints; "
                 "only joints with one degree of freedom are supported"
             )
-        self.follower_joints = frozenset(self.document.mimics) | self.semantics.passive_joints
-        self.planning_frame = self._planning_frame()
+        self.base_indices = np.array(
+            [self.index[name] for name in self.base.variables] if self.base else [], dtype=np.int64
+        )
+        self.follower_joints = frozenset(self._expanded((*self.document.mimics, *self.semantics.passive_joints)))
+        # As in MoveIt: the frame in which the base moves, or the root link; the parent frame of a fixed virtual joint
+        # comes from tf, as other frames do.
+        self.planning_frame = self.base.parent_frame if self.base else self.document.root_link
         self.frame_ids = {link: self.pin_model.getFrameId(link, pin.FrameType.BODY) for link in self.document.links}
         self.limits = self._joint_limits(limits or {})
         self.lower, self.upper, self.max_velocity, self.max_acceleration, self.max_jerk = (
@@ -114,15 +127,12 @@ class RobotModel:
         }
         self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
 
-    def _planning_frame(self) -> str:
-        """The root link, as in MoveIt; the parent frame of a fixed virtual joint comes from tf, as other frames do."""
-        for joint in self.semantics.virtual_joints:
-            if joint.child_link == self.document.root_link and joint.kind != "fixed":
-                raise ModelError(
-                    f"SRDF virtual_joint '{joint.name}': type '{joint.kind}'; only 'fixed' is "
-                    "supported, a moving base needs its own joints in the URDF"
-                )
-        return self.document.root_link
+    def _expanded(self, joints: Iterable[str]) -> set[str]:
+        """Returns names of joints, the planar or floating one replaced by its variables; one of these means all."""
+        names = set(joints)
+        if self.base and names & {self.base.name, *self.base.variables}:
+            names = (names - {self.base.name}) | set(self.base.variables)
+        return names
 
     def _joint_limits(self, entries: Mapping[str, Any]) -> dict[str, JointLimits]:
         result = {}
@@ -135,7 +145,7 @@ class RobotModel:
                 velocity if known else DEFAULT_VELOCITY,
                 DEFAULT_ACCELERATION,
             )
-            result[name] = tighten(name, limits, entries.get(name) or {})
+            result[name] = tighten(name, limits, _entry(entries, name))
         return result
 
     def _load_geometry(self) -> tuple[LinkGeometry, ...]:
@@ -169,13 +179,9 @@ class RobotModel:
         if spec.name in seen:
             raise ModelError(f"SRDF group '{spec.name}': contains itself through {' -> '.join(seen)}")
         parent_joint = {child: joint for joint, child in self.document.joint_children.items()}
-        joints = set(spec.joints) | {parent_joint[link] for link in spec.links if link in parent_joint}
-        unknown = [
-            name
-            for name in spec.joints
-            if name not in self.document.joint_kinds
-            and name not in {joint.name for joint in self.semantics.virtual_joints}
-        ]
+        joints = self._expanded((*spec.joints, *(parent_joint[link] for link in spec.links if link in parent_joint)))
+        virtual = {joint.name for joint in self.semantics.virtual_joints}
+        unknown = [name for name in spec.joints if name not in self.document.joint_kinds and name not in virtual]
         unknown += [link for link in spec.links if link not in self.document.links]
         if unknown:
             raise ModelError(f"SRDF group '{spec.name}': {', '.join(unknown)} is not in the URDF")
@@ -274,6 +280,22 @@ class RobotModel:
     def is_continuous(self, number: int) -> bool:
         """Whether the joint at that index of a position vector turns without end."""
         return bool(self.upper[number] >= CONTINUOUS_BOUND)
+
+    def with_base(self, positions: Array, transform: Transform) -> Array:
+        """Returns a copy with the root link elsewhere in the planning frame; angles are given near the present ones.
+
+        Args:
+            positions: of the whole robot [rad or m].
+            transform: of the root link; the robot has a planar or floating virtual joint.
+        """
+        assert self.base is not None
+        result = np.array(positions, dtype=float)
+        result[self.base_indices] = self.base.values(transform, result[self.base_indices])
+        return result
+
+    def base_transform(self, positions: Array) -> Transform:
+        """Returns the pose of the root link in the planning frame."""
+        return self.base.transform(positions[self.base_indices]) if self.base else pin.SE3.Identity()
 
     def bound_violations(self, positions: Array, indices: Iterable[int], tolerance: float = 1e-9) -> list[str]:
         """Returns one sentence per joint that is out of its bounds."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,11 +13,13 @@ import pinocchio as pin
 from modular_framework_planning.errors import GeometryError, ModelError
 from modular_framework_planning.geometry.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.geometry.spatial import Transform
+from modular_framework_planning.robot_model.multi_dof_joint import MultiDofJoint, Variable, multi_dof_joint
 from modular_framework_urdf import robot as urdf
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 from modular_framework_urdf.mimics import Mimic, resolved
 from modular_framework_urdf.robot import MOVABLE_KINDS, Link, PlacedShapes, Robot
+from modular_framework_urdf.srdf_reader import VirtualJoint
 from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
 
 MeshResolver = Callable[[str], str]
@@ -28,7 +30,11 @@ CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
 
 @dataclass(frozen=True, slots=True)
 class UrdfDocument:
-    """A URDF prepared for Pinocchio, and what Pinocchio does not keep; the links' geometry is not in `xml`."""
+    """A URDF prepared for Pinocchio, and what Pinocchio does not keep; the links' geometry is not in `xml`.
+
+    The joints of `xml` and of the mappings are those of the URDF and, above the root link, the variables of a planar or
+    floating virtual joint.
+    """
 
     xml: str
     robot_name: str
@@ -42,6 +48,7 @@ class UrdfDocument:
     visual_shapes: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
     collisions: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()  # what was ignored, and why
+    multi_dof_joint: MultiDofJoint | None = None  # above the root link
 
 
 def directory_resolver(root: Path) -> MeshResolver:
@@ -100,12 +107,25 @@ def _mimics(robot: Robot) -> tuple[dict[str, Mimic], tuple[str, ...]]:
     )
 
 
-def _xml_for_pinocchio(text: str) -> str:
-    """Returns the document as Pinocchio gets it: kinematics and inertias, continuous joints bounded, no mimics."""
+def _xml_for_pinocchio(text: str, base: Sequence[Variable]) -> str:
+    """Returns the document as Pinocchio gets it: kinematics and inertias, continuous joints bounded, no mimics.
+
+    Args:
+        text: the URDF.
+        base: joints to put above the root link.
+    """
     root = xml_text.parse(text, "URDF")
     for link in root.findall("link"):
         for element in (*link.findall("collision"), *link.findall("visual")):
             link.remove(element)
+    for variable in base:
+        xml_text.add_child(root, "link", name=variable.parent)
+        joint = xml_text.add_child(root, "joint", name=variable.name, type=variable.kind)
+        xml_text.add_child(joint, "parent", link=variable.parent)
+        xml_text.add_child(joint, "child", link=variable.child)
+        xml_text.add_child(joint, "axis", xyz=variable.axis)
+        bounds = {"lower": repr(-variable.bound), "upper": repr(variable.bound)}
+        xml_text.add_child(joint, "limit", **bounds, effort="0", velocity="0")
     for joint in root.findall("joint"):
         for mimic in joint.findall("mimic"):
             joint.remove(mimic)
@@ -171,12 +191,15 @@ def _collisions(link: Link, resolve: MeshResolver) -> Iterator[PlacedShape]:
             raise ModelError(f"{where}: {error.reason}") from error
 
 
-def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocument:
+def load_urdf(
+    text: str, resolve: MeshResolver = package_resolver, virtual_joints: Sequence[VirtualJoint] = ()
+) -> UrdfDocument:
     """Parses a URDF and makes it ready for Pinocchio.
 
     Args:
         text: the document, xacro already expanded.
         resolve: turns a mesh URI into the path of an existing file.
+        virtual_joints: of the SRDF; one that moves the root link becomes a part of the tree.
 
     Raises:
         ModelError: not XML, a DOCTYPE, a wrong number, no root link, an unsupported joint type, a mesh that cannot be
@@ -193,17 +216,22 @@ def load_urdf(text: str, resolve: MeshResolver = package_resolver) -> UrdfDocume
     roots = robot.root_links()
     if len(roots) != 1:
         raise ModelError(f"URDF: {len(roots)} links without a parent joint ({', '.join(roots)}); exactly one is needed")
+    links = tuple(link.name for link in robot.links)
+    base, ignored = multi_dof_joint(virtual_joints, roots[0], links)
+    variables = base.chain() if base else ()
+    joints = (*variables, *robot.joints)
     return UrdfDocument(
-        _xml_for_pinocchio(text),
+        _xml_for_pinocchio(text, variables),
         robot.name,
         roots[0],
-        tuple(link.name for link in robot.links),
-        {joint.name: joint.parent for joint in robot.joints},
-        {joint.name: joint.child for joint in robot.joints},
-        {joint.name: joint.kind for joint in robot.joints},
+        links,
+        {joint.name: joint.parent for joint in joints},
+        {joint.name: joint.child for joint in joints},
+        {joint.name: joint.kind for joint in joints},
         mimics,
         {link.name: tuple(_visual_meshes(link)) for link in robot.links},
         {link.name: tuple(_visual_shapes(link)) for link in robot.links},
         {link.name: tuple(_collisions(link, resolve)) for link in robot.links},
-        notes,
+        (*notes, *ignored),
+        base,
     )

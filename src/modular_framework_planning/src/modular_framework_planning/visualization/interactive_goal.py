@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import textwrap
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -18,10 +18,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.messages.conversions import joint_values
+from modular_framework_planning.messages.conversions import joint_values, state_message
+from modular_framework_planning.messages.multi_dof import with_multi_dof
 from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group.markers.scene_markers import robot_markers
 from modular_framework_planning.move_group.robot_parameters import load_robot_model
+from modular_framework_planning.planning_scene.planning_scene import empty_scene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.visualization.goal_marker import Choice, GoalMarker
 from modular_framework_planning.visualization.move_group_client import MotionOptions, MoveGroupClient
@@ -68,6 +70,7 @@ class InteractiveGoal:
         self._ghosts = {
             name: rospy.Publisher(f"~{name}_ghost", MarkerArray, queue_size=1, latch=True) for name in ("goal", "start")
         }
+        self._scene = empty_scene(model)  # writes and reads states
         self._goal: Array = model.default_positions()
         self._start: RobotState | None = None
         self._trajectory: Any = None
@@ -310,16 +313,14 @@ class InteractiveGoal:
         return pose_message(self._model.link_transforms(self._goal)[self._group.tip_link])
 
     def _positions_of(self, state: RobotState) -> Array:
-        values: Mapping[str, float] = joint_values(
-            self._model, state.joint_state.name, state.joint_state.position, "robot state"
-        )
-        return self._model.merge(self._goal, values)
+        where, joints = "robot state", state.joint_state
+        placed = with_multi_dof(self._scene.with_positions(self._goal), state.multi_dof_joint_state, where)
+        return self._model.merge(placed.positions, joint_values(self._model, joints.name, joints.position, where))
 
     def _state_of(self, positions: Array) -> RobotState:
         """A difference to the current state, so that held objects stay held."""
-        state = RobotState(is_diff=True)
-        state.joint_state.name = list(self._model.joint_names)
-        state.joint_state.position = [float(value) for value in positions]
+        state = state_message(self._scene, positions, with_attached=False)
+        state.is_diff = True
         return state
 
 

@@ -23,6 +23,7 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
 from modular_framework_planning.messages.conversions import scene_with_state, state_message, trajectory_message
+from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.messages.poses import transform_from_pose
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
@@ -81,7 +82,7 @@ class CartesianPathService(ServiceCapability):
             response.error_code.val = self._context.reporter.failure("cartesian_path", error, **details)
             return response
         response.start_state = state_message(lines.scene)
-        response.solution = trajectory_message(trajectory, lines.scene.model.planning_frame)
+        response.solution = trajectory_message(trajectory, lines.scene.model)
         response.fraction = found.fraction
         response.error_code.val = ErrorCode.SUCCESS
         if found.stop:
@@ -100,7 +101,7 @@ class CartesianPathService(ServiceCapability):
         """Reads the message; raises PlanningError."""
         group = self._context.model.group(request.group_name)
         solver = self._context.kinematics.solver(group.name)
-        if not request.start_state.joint_state.name or request.start_state.is_diff:
+        if not names_joints(request.start_state) or request.start_state.is_diff:
             self._context.monitor.wait_for_state()
         scene = scene_with_state(self._context.monitor.snapshot(), request.start_state, "start_state")
         name = (request.link_name or group.tip_link).removeprefix("/")

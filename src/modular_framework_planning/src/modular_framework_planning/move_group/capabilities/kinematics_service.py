@@ -23,6 +23,7 @@ from modular_framework_planning.kinematics.inverse_kinematics import InverseKine
 from modular_framework_planning.kinematics.solution_choice import clearest, first_free
 from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
 from modular_framework_planning.messages.conversions import scene_with_state, state_message
+from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.messages.poses import pose_message, stamped_in_scene
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
@@ -78,7 +79,7 @@ class KinematicsService(MoveGroupCapability):
         rospy.Service(names.FK_SERVICE, GetPositionFK, self._serve_fk)
 
     def _scene(self, state: Any) -> PlanningScene:
-        if not state.joint_state.name or state.is_diff:
+        if not names_joints(state) or state.is_diff:
             self._context.monitor.wait_for_state()
         scene = scene_with_state(self._context.monitor.snapshot(), state)
         if not np.isfinite(scene.positions).all():

@@ -14,6 +14,7 @@ from modular_framework_planning.contacts import Contact
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.constraint_conversions import evaluated_one_by_one, result_messages
 from modular_framework_planning.messages.conversions import BODY_TYPES, scene_with_state
+from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
 
@@ -37,7 +38,7 @@ class StateValidationService(ServiceCapability):
         visibility); one that is refused is not satisfied, its distance is infinite, the log has the reason. Cost
         sources stay empty: the scene has no costs, space is either free or not.
         """
-        if not request.robot_state.joint_state.name or request.robot_state.is_diff:
+        if not names_joints(request.robot_state) or request.robot_state.is_diff:
             self._context.monitor.wait_for_state()
         scene = scene_with_state(self._context.monitor.snapshot(), request.robot_state)
         model = self._context.model

@@ -96,7 +96,12 @@ class TrajectoryExecution:
                 f"{rospy.resolve_name('~allow_trajectory_execution')} is false: this move_group plans only",
             )
         if trajectory.multi_dof_joint_trajectory.points:
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "multi_dof_joint_trajectory is not supported")
+            raise PlanningError(
+                ErrorCode.INVALID_MOTION_PLAN,
+                f"multi_dof_joint_trajectory of {', '.join(trajectory.multi_dof_joint_trajectory.joint_names)}: no "
+                "controller of move_group moves a planar or floating joint; hand it to that of the base, and plan for "
+                "a group without the joint to move the rest here",
+            )
         check_trajectory(trajectory.joint_trajectory)
         if not trajectory.joint_trajectory.points:
             return

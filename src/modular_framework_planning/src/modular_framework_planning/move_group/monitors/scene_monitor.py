@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the current planning scene: changes arrive by service and topic, joint positions by joint_states."""
+"""Keeps the current planning scene: changes arrive by service and topic, joints by joint_states, a base by tf."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from moveit_msgs.msg import PlanningScene as SceneMessage
 from sensor_msgs.msg import JointState
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_planning.messages.conversions import state_message
 from modular_framework_planning.messages.scene_conversions import apply_attached_object, apply_collision_object
 from modular_framework_planning.messages.scene_difference import difference_message
@@ -51,12 +52,14 @@ class SceneMonitor:
         self._scene = empty_scene(model).with_padding(padding or Padding())
         self._lock = threading.RLock()
         self._positions = model.default_positions()
+        self._base_is_seen = False  # tf has shown where a planar or floating base is
         self._history = JointHistory()
         self._stamps: dict[int, rospy.Time] = {}
         self._arrivals = 0
         self._arrived = threading.Condition()
-        followers = set(model.document.mimics) | set(model.semantics.passive_joints)
-        self._needed = [number for number, name in enumerate(model.joint_names) if name not in followers]
+        base = set(model.base.variables if model.base else ())  # joint_states does not have it
+        needless = model.follower_joints | base
+        self._needed = [number for number, name in enumerate(model.joint_names) if name not in needless]
         self.listeners: list[Callable[[PlanningScene], None]] = []
         self._publisher: Any = None
         self._published_scene = self._scene
@@ -135,12 +138,21 @@ class SceneMonitor:
 
     def apply(self, change: SceneChange) -> PlanningScene:
         """Changes the scene, all or nothing; the next snapshot has the change. Raises PlanningError."""
-        frames = self._frames.now()
+        frames, base = self._frames.now(), self._frames.base()
         with self._lock:
+            self._follow_base(base)
             self._scene = change(self._scene.with_positions(self._positions.copy()).with_fixed_frames(frames))
+            if self.model.base is not None and not self._base_is_seen:
+                self._positions = self._positions.copy()
+                self._positions[self.model.base_indices] = self._scene.positions[self.model.base_indices]
             scene = self._scene
         self._scene_changed.set()
         return scene
+
+    def _follow_base(self, transform: Transform | None) -> None:
+        """Puts the base where tf shows it; until it does, it is where the last change of the scene put it."""
+        if transform is not None:
+            self._positions, self._base_is_seen = self.model.with_base(self._positions, transform), True
 
     def _on_joint_state(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
@@ -156,8 +168,10 @@ class SceneMonitor:
             for name, position in zip(message.name, message.position, strict=True)
             if name in self.model.index and np.isfinite(position)
         }
+        base = self._frames.base()
         with self._lock:
             self._positions = self.model.merge(self._positions, changed)
+            self._follow_base(base)
             self._history.add(message.header.stamp.to_sec(), self._positions)
             self._stamps.update({self.model.index[name]: message.header.stamp for name in changed})
         with self._arrived:
@@ -193,6 +207,23 @@ class SceneMonitor:
                 )
             with self._arrived:
                 self._arrived.wait(min(remaining, 0.1))
+        self._warn_of_unseen_base()
+
+    def _warn_of_unseen_base(self) -> None:
+        """Warns where tf does not show a planar or floating base; as in MoveIt that stops no plan."""
+        joint = self.model.base
+        if joint is None or joint.name in self.model.semantics.passive_joints or self._frames.base() is not None:
+            return
+        rospy.logwarn_throttle(
+            30.0,
+            "tf has no transform from '%s' to '%s' (%s virtual joint '%s' of the SRDF): the robot is taken to be where "
+            "the planning scene last put it, at first at the origin; publish the transform, or place the robot by "
+            "multi_dof_joint_state",
+            joint.parent_frame,
+            joint.child_link,
+            joint.kind,
+            joint.name,
+        )
 
     def wait_for_next_state(self, timeout_s: float) -> bool:
         """Waits for one more joint_states message; false when none came in time."""
@@ -202,13 +233,16 @@ class SceneMonitor:
 
     def snapshot(self) -> PlanningScene:
         """Returns the scene as it is now, with the robot and the frames of tf where they are now."""
-        frames = self._frames.now()
+        frames, base = self._frames.now(), self._frames.base()
         with self._lock:
+            self._follow_base(base)
             return self._scene.with_positions(self._positions.copy()).with_fixed_frames(frames)
 
     def positions(self) -> Any:
         """Returns a copy of the current joint positions [rad or m]."""
+        base = self._frames.base()
         with self._lock:
+            self._follow_base(base)
             return self._positions.copy()
 
     def state(self) -> Any:

@@ -37,13 +37,20 @@ class TfFrames:
         names = set(self._buffer._getFrameStrings())  # tf2's Python interface has no other list of frames
         model, known = self._model, self._known
         fresh = {}
-        for name in names - model.frame_ids.keys():
+        for name in names - model.frame_ids.keys() - {model.planning_frame}:
             transform, old = self._lookup(model.planning_frame, name), known.get(name)
             if transform is not None:
                 fresh[name] = old if old is not None and old.isApprox(transform, SAME) else transform
         if any(known.get(name) is not transform for name, transform in fresh.items()):
             self._known = known = {**known, **fresh}
         return known
+
+    def base(self) -> Transform | None:
+        """Returns where tf last saw the root link of a robot with a planar or floating virtual joint; None: nowhere."""
+        joint = self._model.base
+        if self._buffer is None or joint is None:
+            return None
+        return self._lookup(joint.parent_frame, joint.child_link)
 
     def _lookup(self, base: str, name: str) -> Transform | None:
         """Returns the last known transform of a frame; None where no chain of transforms leads to it."""

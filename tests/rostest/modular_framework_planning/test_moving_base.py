@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot whose SRDF has a floating virtual joint: scene changes, states of requests and tf say where it stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import moveit_commander
+import numpy as np
+import pytest
+import rospy
+import tf2_ros
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, TransformStamped, Vector3
+from moveit_commander import MoveGroupCommander, PlanningSceneInterface, RobotCommander
+from moveit_msgs.msg import Constraints, MoveItErrorCodes, PlanningScene, PlanningSceneComponents, RobotState
+from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK, GetStateValidity
+from ros_session import until
+from std_msgs.msg import Header
+
+ROOT, TIP, UPRIGHT = "panda_link0", "panda_link8", Quaternion(0.0, 0.0, 0.0, 1.0)
+LAUNCH = """<launch>
+  <node name="joint_state_publisher" pkg="joint_state_publisher" type="joint_state_publisher">
+    <rosparam param="source_list">[move_group/fake_controller_joint_states]</rosparam>
+  </node>
+  <node name="robot_state_publisher" pkg="robot_state_publisher" type="robot_state_publisher"/>
+  <include file="$(find panda_moveit_config)/launch/move_group.launch">
+    <arg name="moveit_controller_manager" value="fake"/>
+    <arg name="load_robot_description" value="true"/>
+  </include>
+  <param name="robot_description_semantic" value={srdf}/>
+</launch>"""
+
+
+@pytest.fixture(scope="module")
+def arm(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
+    text = (user_packages / "panda_moveit_config/config/panda.srdf").read_text()
+    floating = text.replace('name="virtual_joint" type="fixed"', 'name="virtual_joint" type="floating"')
+    assert floating != text
+    session = ros_launch(LAUNCH.format(srdf=quoteattr(floating)))
+    session.wait_for_service("plan_kinematic_path", 120.0)
+    commander = MoveGroupCommander("panda_arm", wait_for_servers=30.0)
+    commander.set_max_velocity_scaling_factor(1.0)
+    commander.set_max_acceleration_scaling_factor(1.0)
+    yield commander
+    assert session.alive(), session.log()
+    moveit_commander.roscpp_shutdown()
+
+
+def scene() -> Any:
+    return rospy.ServiceProxy("get_planning_scene", GetPlanningScene)(PlanningSceneComponents(1023)).scene
+
+
+def placed(x: float, y: float, z: float, yaw: float) -> RobotState:
+    state = RobotState(is_diff=True)
+    state.multi_dof_joint_state.joint_names = ["virtual_joint"]
+    state.multi_dof_joint_state.transforms = [transform(x, y, z, yaw)]
+    return state
+
+
+def transform(x: float, y: float, z: float, yaw: float) -> Transform:
+    return Transform(Vector3(x, y, z), Quaternion(0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))
+
+
+def base_of(state: RobotState) -> list[float]:
+    """x, y, z and yaw of the base."""
+    assert state.multi_dof_joint_state.joint_names == ["virtual_joint"]
+    (pose,) = state.multi_dof_joint_state.transforms
+    t, q = pose.translation, pose.rotation
+    return [t.x, t.y, t.z, 2.0 * math.atan2(q.z, q.w)]
+
+
+def place(pose: Any) -> list[float]:
+    return [pose.position.x, pose.position.y, pose.position.z]
+
+
+def forward_kinematics(state: RobotState, *links: str) -> list[list[float]]:
+    answer = rospy.ServiceProxy("compute_fk", GetPositionFK)(Header(frame_id="world"), list(links), state)
+    assert answer.error_code.val == MoveItErrorCodes.SUCCESS
+    return [place(stamped.pose) for stamped in answer.pose_stamped]
+
+
+def is_valid(state: RobotState) -> bool:
+    return bool(rospy.ServiceProxy("check_state_validity", GetStateValidity)(state, "panda_arm", Constraints()).valid)
+
+
+def test_the_planning_frame_is_the_frame_the_base_moves_in(arm: MoveGroupCommander) -> None:
+    assert arm.get_planning_frame() == RobotCommander().get_planning_frame() == "world"
+    state = scene().robot_state
+    assert state.joint_state.header.frame_id == state.multi_dof_joint_state.header.frame_id == "world"
+    assert not any("/" in name for name in state.joint_state.name)
+    assert base_of(state) == pytest.approx([0.0, 0.0, 0.0, 0.0])
+
+
+def test_a_change_of_the_scene_places_the_base_and_it_stays_there(arm: MoveGroupCommander) -> None:
+    change = PlanningScene(is_diff=True, robot_state=placed(0.5, -1.0, 0.25, 0.5))
+    assert rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)(change).success
+    assert base_of(scene().robot_state) == pytest.approx([0.5, -1.0, 0.25, 0.5])
+    rospy.sleep(0.3)
+    assert base_of(scene().robot_state) == pytest.approx([0.5, -1.0, 0.25, 0.5])
+
+
+def test_the_state_of_a_request_places_the_base_for_that_request_alone(arm: MoveGroupCommander) -> None:
+    before = base_of(scene().robot_state)
+    here, tip = forward_kinematics(placed(0.0, 0.0, 0.0, 0.0), ROOT, TIP)
+    there, moved_tip = forward_kinematics(placed(1.0, 2.0, 3.0, math.pi / 2.0), ROOT, TIP)
+    assert here == pytest.approx([0.0, 0.0, 0.0]) and there == pytest.approx([1.0, 2.0, 3.0])
+    assert moved_tip == pytest.approx([1.0 - tip[1], 2.0 + tip[0], 3.0 + tip[2]])  # a quarter turn to the left
+    assert base_of(scene().robot_state) == pytest.approx(before)
+
+
+def test_objects_stay_in_the_world_when_the_base_is_elsewhere(arm: MoveGroupCommander) -> None:
+    (tip,) = forward_kinematics(placed(0.0, 0.0, 0.0, 0.0), TIP)
+    objects = PlanningSceneInterface(synchronous=True)
+    objects.add_box("crate", PoseStamped(Header(frame_id="world"), Pose(Point(*tip), UPRIGHT)), (0.1,) * 3)
+    assert not is_valid(placed(0.0, 0.0, 0.0, 0.0))
+    assert is_valid(placed(3.0, 0.0, 0.0, 0.0))
+    objects.clear()
+
+
+def test_a_plan_starts_where_its_request_puts_the_base(arm: MoveGroupCommander) -> None:
+    arm.set_start_state(placed(4.0, 0.0, 0.5, 1.0))
+    arm.set_named_target("reaching")
+    success, motion, _, _ = arm.plan()
+    arm.set_start_state_to_current_state()
+    assert success and motion.joint_trajectory.points and not motion.multi_dof_joint_trajectory.points
+
+
+def test_the_base_follows_tf_and_the_arm_reaches_poses_in_the_world(arm: MoveGroupCommander) -> None:
+    broadcaster, seen = tf2_ros.TransformBroadcaster(), [1.0, 2.0, 0.5, 0.7]
+    stamped = TransformStamped(Header(frame_id="world"), ROOT, transform(*seen))
+
+    def send(_event: Any = None) -> None:
+        stamped.header.stamp = rospy.Time.now()
+        broadcaster.sendTransform(stamped)
+
+    timer = rospy.Timer(rospy.Duration(0.02), send)
+    try:
+        until(lambda: np.allclose(base_of(scene().robot_state), seen, atol=1e-9), "base in the scene")
+        elsewhere = PlanningScene(is_diff=True, robot_state=placed(9.0, 9.0, 9.0, 0.0))
+        assert rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)(elsewhere).success
+        assert base_of(scene().robot_state) == pytest.approx(seen)  # tf knows better
+        (tip,) = forward_kinematics(RobotState(is_diff=True), TIP)
+        goal = arm.get_current_pose()
+        assert goal.header.frame_id == "world" and place(goal.pose) == pytest.approx(tip, abs=2e-3)
+        goal.pose.position.z -= 0.1
+        arm.set_pose_target(goal)
+        assert arm.go()
+        assert place(arm.get_current_pose().pose) == pytest.approx(place(goal.pose), abs=2e-3)
+        stamped.transform = transform(1.0, 2.0, 1.5, 0.7)
+        until(lambda: math.isclose(base_of(scene().robot_state)[2], 1.5), "base one metre higher")
+        (tip,) = forward_kinematics(RobotState(is_diff=True), TIP)
+        assert tip[2] == pytest.approx(goal.pose.position.z + 1.0, abs=2e-3)
+    finally:
+        timer.shutdown()
+
+
+def test_a_joint_that_is_none_of_the_robots_is_refused(arm: MoveGroupCommander) -> None:
+    state = placed(0.0, 0.0, 0.0, 0.0)
+    state.multi_dof_joint_state.joint_names = ["wheels"]
+    answer = rospy.ServiceProxy("compute_fk", GetPositionFK)(Header(), [TIP], state)
+    assert answer.error_code.val == MoveItErrorCodes.INVALID_ROBOT_STATE
