@@ -184,7 +184,7 @@ def test_collision_verdicts_follow_the_base_as_a_second_checker_says(kind: str) 
     every = ExactCollisionChecker(scene)
     verdicts = []
     for _ in range(300):
-        positions = rng.uniform(np.maximum(model.lower, -1.5), np.minimum(model.upper, 1.5))
+        positions = rng.uniform(np.maximum(model.lower, -0.8), np.minimum(model.upper, 0.8))
         verdicts.append(every.is_free(positions))
         named = dict(zip(model.joint_names, positions.tolist(), strict=True))
         assert verdicts[-1] == (not checker.collisions(named)), named

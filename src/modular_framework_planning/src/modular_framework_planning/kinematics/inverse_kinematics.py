@@ -25,6 +25,7 @@ from modular_framework_planning.kinematics.compiled_kinematics import (
     whole_turns,
 )
 from modular_framework_planning.kinematics.kinematics_settings import NUMERIC, KinematicsSettings
+from modular_framework_planning.robot_model.multi_dof_joint import UNBOUNDED_M
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
 POSE_TOLERANCE = 1.0e-6  # [m] and [rad]; every returned solution reaches the pose at least this well
@@ -123,6 +124,7 @@ class InverseKinematics:
         seed: Array,
         timeout_s: float | None = None,
         rng: Generator | None = None,
+        bounds: tuple[Array, Array] | None = None,
     ) -> list[Array]:
         """Returns all solutions found, as positions of the whole robot, nearest to the seed first.
 
@@ -133,8 +135,9 @@ class InverseKinematics:
             timeout_s: time the search may take where there is no closed form; the group's by default. With
                 math.inf only the numbers of tries bound the search.
             rng: source of restarts of the numeric search.
+            bounds: lower and upper bounds of the group's joints [rad or m]; those of the robot by default.
         """
-        problem = self._problem(target * self.tip_offset(tip_link), seed, timeout_s)
+        problem = self._problem(target * self.tip_offset(tip_link), seed, timeout_s, bounds)
         found = self._from_closed_form(problem)
         if not len(found):
             found = self._from_search(problem, rng or np.random.default_rng(0))
@@ -158,26 +161,37 @@ class InverseKinematics:
         problem = self._problem(target, seed, timeout_s).with_ball_joint(joint)
         return self._ranked(problem, self._from_search(problem, np.random.default_rng(0)))
 
-    def _problem(self, target: Transform, seed: Array, timeout_s: float | None = None) -> _Problem:
+    def _problem(
+        self,
+        target: Transform,
+        seed: Array,
+        timeout_s: float | None = None,
+        bounds: tuple[Array, Array] | None = None,
+    ) -> _Problem:
         allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
         return _Problem(
             self._chain.at(seed),
             target,
             np.asarray(seed, dtype=float),
             np.array(seed[self.group.indices], dtype=float),
-            *self._bounds(seed),
+            *self._bounds(target, seed, bounds),
             self._turning,
             time.monotonic() + allowed,
         )
 
-    def _bounds(self, seed: Array) -> tuple[Array, Array]:
-        """Returns the bounds of the group's joints; those without ends get three turns around the seed."""
+    def _bounds(self, target: Transform, seed: Array, bounds: tuple[Array, Array] | None) -> tuple[Array, Array]:
+        """Returns the bounds of the group's joints; those without ends get three turns around the seed.
+
+        A base without bounds gets twice the way from where the end of the chain is to the target, and two metres.
+        """
         values = seed[self.group.indices]
-        lower, upper = self.model.lower[self.group.indices], self.model.upper[self.group.indices]
-        return (
-            np.where(self._is_continuous, values - 3.0 * np.pi, lower),
-            np.where(self._is_continuous, values + 3.0 * np.pi, upper),
-        )
+        lower, upper = bounds or (self.model.lower[self.group.indices], self.model.upper[self.group.indices])
+        reach = np.where(self._is_continuous, 3.0 * np.pi, np.inf)
+        endless = ~self._is_continuous & (upper >= UNBOUNDED_M)
+        if endless.any():
+            gap = target.translation - self.model.link_transforms(seed)[self._last_link].translation
+            reach[endless] = 2.0 * float(np.linalg.norm(gap)) + 2.0
+        return np.maximum(lower, values - reach), np.minimum(upper, values + reach)
 
     def _from_closed_form(self, problem: _Problem) -> Array:
         """Returns the closed form's solutions within bounds, whole turns included, shape (k, joints)."""
@@ -232,8 +246,8 @@ class InverseKinematics:
 
     def _from_search(self, problem: _Problem, rng: Generator) -> Array:
         """Searches from the seed, then from random positions, until there are enough, no new ones, or no time left."""
-        lower = np.maximum(problem.lower, problem.seed - 2.0 * np.pi)
-        upper = np.minimum(problem.upper, problem.seed + 2.0 * np.pi)
+        reach = np.where(problem.turning, 2.0 * np.pi, np.inf)
+        lower, upper = np.maximum(problem.lower, problem.seed - reach), np.minimum(problem.upper, problem.seed + reach)
         found = np.empty((0, len(lower)))
         fruitless, batches, enough = 0, 0, ENOUGH if len(lower) <= 6 else ENOUGH_REDUNDANT
         starts = np.clip(problem.seed, lower, upper)[None, :]

@@ -29,6 +29,7 @@ from modular_framework_planning.geometry.regions import (
     SphereSolid,
 )
 from modular_framework_planning.geometry.spatial import IDENTITY_XYZW, Transform, make_transform, quaternion_or_identity
+from modular_framework_planning.messages.multi_dof import with_angles
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
 
@@ -65,7 +66,10 @@ def constraints_from_message(
     reader = _Reader(scene, code, tip)
     return KinematicConstraints(
         scene.model,
-        [reader.joint(item, f"{where}.joint_constraints[{n}]") for n, item in enumerate(message.joint_constraints)],
+        [
+            reader.joint(item, f"{where}.joint_constraints[{n}]")
+            for n, item in enumerate(with_angles(scene, message.joint_constraints, where, code))
+        ],
         [
             reader.position(item, f"{where}.position_constraints[{n}]")
             for n, item in enumerate(message.position_constraints)

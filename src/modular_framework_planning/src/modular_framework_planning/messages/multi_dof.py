@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import genpy
 from geometry_msgs.msg import Transform as TransformMessage
 from geometry_msgs.msg import Twist, Vector3
-from moveit_msgs.msg import RobotState
+from moveit_msgs.msg import JointConstraint, RobotState
 from sensor_msgs.msg import MultiDOFJointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.errors import ErrorCode, GeometryError, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array, Transform, make_transform, quaternion_or_identity
 from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
@@ -81,6 +82,42 @@ def _is_fixed(model: RobotModel, name: str) -> bool:
     """Whether a fixed joint of the URDF or SRDF has that name."""
     virtual = (joint.name for joint in model.semantics.virtual_joints)
     return model.document.joint_kinds.get(name) == "fixed" or name in virtual
+
+
+def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, code: ErrorCode) -> list[Any]:
+    """Replaces joint constraints on the quaternion of a floating base by ones on its angles.
+
+    Args:
+        scene: its present angles decide between equal ones.
+        constraints: moveit_msgs/JointConstraint, as MoveIt's clients write them from a state.
+        where: what they belong to, for error texts.
+        code: result code for constraints that have no meaning.
+
+    Raises:
+        PlanningError: some of the quaternion's four numbers are missing, or it is none.
+    """
+    base, model = scene.model.base, scene.model
+    given = {item.joint_name: item for item in constraints if base is not None and item.joint_name in base.quaternion}
+    if base is None or not given:
+        return list(constraints)
+    if len(given) != len(base.quaternion):
+        raise PlanningError(
+            code,
+            f"{where}: joint constraints on {', '.join(given)} alone; give all of {', '.join(base.quaternion)}, or "
+            f"{', '.join(base.angles)} [rad]",
+        )
+    try:
+        turn = make_transform((0.0, 0.0, 0.0), [given[name].position for name in base.quaternion], where)
+    except GeometryError as error:
+        raise PlanningError(code, error.reason) from error
+    values = base.values(turn, scene.positions[model.base_indices])
+    slack = 2.0 * min(min(item.tolerance_above, item.tolerance_below) for item in given.values())  # half angles
+    angles = [
+        JointConstraint(name, float(value), slack, slack, 1.0)
+        for name, value in zip(base.variables, values, strict=True)
+        if name in base.angles
+    ]
+    return [item for item in constraints if item.joint_name not in given] + angles
 
 
 def multi_dof_message(model: RobotModel, positions: Array) -> MultiDOFJointState:

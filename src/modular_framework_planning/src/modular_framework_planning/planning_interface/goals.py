@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from modular_framework_planning.constraints.constraint_kinds import JointConstraint
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -24,6 +25,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
     PlanningRequest,
     PoseGoal,
+    group_bounds,
 )
 from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
 from modular_framework_planning.robot_model.robot_model import JointGroup
@@ -65,6 +67,7 @@ class GoalResolver:
         self._path_constraints = path_constraints
         self._model = request.scene.model
         self._start = request.scene.positions[group.indices]
+        self._bounds = group_bounds(self._model, group, request.workspace)
 
     def resolve(self) -> Array:
         """Returns free goal vectors of the group, nearest to the start first, shape (n, joints).
@@ -155,28 +158,51 @@ class GoalResolver:
                     f"'{self._group.name}'; its joints are {', '.join(self._group.joints)}",
                 )
             number, column = self._model.index[name], self._group.joints.index(name)
+            bounds = self._bounds[0][column], self._bounds[1][column]
             if self._model.is_continuous(number):
                 wanted += 2.0 * np.pi * np.round((values[column] - wanted) / (2.0 * np.pi))
-            least = max(self._model.lower[number], wanted - goal.below.get(name, 0.0))
-            most = min(self._model.upper[number], wanted + goal.above.get(name, 0.0))
+            least = max(bounds[0], wanted - goal.below.get(name, 0.0))
+            most = min(bounds[1], wanted + goal.above.get(name, 0.0))
             if least > most + BEYOND_BOUND:
                 raise PlanningError(
                     ErrorCode.GOAL_STATE_INVALID,
                     f"goal: joint '{name}' at {wanted:.6f} is outside "
-                    f"[{self._model.lower[number]:.6f}, {self._model.upper[number]:.6f}]; give a "
-                    f"position at most {BEYOND_BOUND} beyond a bound",
+                    f"[{bounds[0]:.6f}, {bounds[1]:.6f}]; give a position at most {BEYOND_BOUND} beyond a bound"
+                    + ("; the base's are those of workspace_parameters" if self._is_of_base(name) else ""),
                 )
-            bounds = self._model.lower[number], self._model.upper[number]
             low[column], high[column] = np.clip((min(least, most), max(least, most)), *bounds)
             values[column] = np.clip(wanted, low[column], high[column])
         return values, low, high
+
+    def _is_of_base(self, joint: str) -> bool:
+        return self._model.base is not None and joint in self._model.base.variables
+
+    def _in_workspace(self, constraints: KinematicConstraints) -> KinematicConstraints:
+        """Returns the constraints and, where the group moves the base, one more on each coordinate of its position."""
+        moved = [
+            name for name in (self._model.base.translations if self._model.base else ()) if name in self._group.joints
+        ]
+        if not moved:
+            return constraints
+        limits = []
+        for name in moved:
+            low, high = (float(values[self._group.joints.index(name)]) for values in self._bounds)
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            limits.append(JointConstraint(name, self._model.index[name], middle, half, half))
+        return KinematicConstraints(
+            self._model,
+            (*constraints.joints, *limits),
+            constraints.positions,
+            constraints.orientations,
+            constraints.name,
+        )
 
     def _pose(self, goal: PoseGoal) -> list[Array]:
         """Returns free solutions at the target; where there are none, at other poses that are allowed."""
         seed, allowed = self._request.scene.positions, goal.allowed
         try:
             solver = self._kinematics.solver(self._group.name)
-            found = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng)
+            found = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng, self._bounds)
         except PlanningError:
             if allowed is None:
                 raise
@@ -184,7 +210,7 @@ class GoalResolver:
         candidates = [positions[self._group.indices] for positions in found]
         free = first_free(candidates, self._is_valid, MAX_GOAL_STATES)
         if allowed is not None and allowed.is_loose:
-            nearest = allowed.project(seed, self._group.indices)
+            nearest = self._in_workspace(allowed).project(seed, self._group.indices)
             if nearest is not None and self._is_valid(nearest[self._group.indices]):
                 free.append(nearest[self._group.indices])
             if not free:
@@ -208,13 +234,14 @@ class GoalResolver:
         found: list[Array] = []
         for _ in range(MAX_POSES):
             target = allowed.pose_target(seed, self._rng) * to_link
-            solutions = solver.solutions(goal.link, target, seed, math.inf, self._rng)
+            solutions = solver.solutions(goal.link, target, seed, math.inf, self._rng, self._bounds)
             found += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
         return found
 
     def _region(self, constraints: KinematicConstraints) -> list[Array]:
         """Returns free states that satisfy: the nearest to the start, then random ones."""
         seed, indices = self._request.scene.positions, self._group.indices
+        constraints = self._in_workspace(constraints)
         free: list[Array] = []
         rejected: list[Array] = []
         for number in range(MAX_SAMPLES):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import islice, product
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -17,10 +18,18 @@ from modular_framework_planning.kinematics.inverse_kinematics import KinematicsP
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
-from modular_framework_planning.planning_interface.planning_request import PipelineSettings, PlanningRequest
+from modular_framework_planning.planning_interface.planning_request import (
+    PipelineSettings,
+    PlanningRequest,
+    group_bounds,
+)
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
+from modular_framework_planning.robot_model.multi_dof_joint import UNBOUNDED_M
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+MAX_TURNED = 16  # goals by the longer way round that are searched for
 
 
 class SolutionValidator(Protocol):
@@ -94,8 +103,19 @@ class PlanningProblem:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds of the group's joints, each of shape (joints,)."""
-        return self.model.lower[self.group.indices], self.model.upper[self.group.indices]
+        """Lower and upper bounds of the group's joints within the request's workspace, each of shape (joints,)."""
+        return group_bounds(self.model, self.group, self.request.workspace)
+
+    def search_bounds(self, around: Array) -> tuple[Array, Array]:
+        """Returns the bounds, no wider than two turns around joint vectors; a workspace is kept whole.
+
+        Args:
+            around: joint vectors of the group, shape (n, joints).
+        """
+        low, high = self.bounds
+        in_workspace = (high < UNBOUNDED_M) & (self.model.upper[self.group.indices] >= UNBOUNDED_M)
+        reach = np.where(in_workspace, np.inf, 2.0 * np.pi)
+        return np.maximum(low, around.min(axis=0) - reach), np.minimum(high, around.max(axis=0) + reach)
 
     def goal_states(self) -> Array:
         """Returns free joint vectors that reach a goal, nearest to the start first, shape (n, joints).
@@ -117,6 +137,24 @@ class PlanningProblem:
                 ).resolve()
             )
         return self._goals[0]
+
+    def other_ways_round(self, goals: Array) -> Array:
+        """Returns the same goals with joints without ends turned to them by the longer way, the nearest first.
+
+        Args:
+            goals: joint vectors of the group, shape (n, joints).
+
+        Returns:
+            At most MAX_TURNED joint vectors, shape (m, joints); none where no joint of the group turns without end.
+        """
+        start, endless = self.start_values, self.model.endless[self.group.indices]
+        found: list[Array] = []
+        for goal in goals if endless.any() else ():
+            gaps = np.where(endless & (np.abs(goal - start) > BEYOND_BOUND), goal - start, 0.0)
+            turns = [(0.0,) if gap == 0.0 else (0.0, -float(np.copysign(2.0 * np.pi, gap))) for gap in gaps]
+            found += [goal + shift for shift in islice(product(*turns), 1, MAX_TURNED)]
+        found.sort(key=lambda values: float(np.linalg.norm(values - start)))
+        return np.array(found[:MAX_TURNED]).reshape(-1, len(start))
 
     def _goals_must_end(self) -> bool:
         """Whether no further goal may be tried: half the time is for the search.

@@ -12,6 +12,7 @@ import numpy as np
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
+from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 from modular_framework_urdf.mimics import Mimic
 
@@ -144,10 +145,26 @@ class PipelineSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Workspace:
-    """The box the robot may work in: lower and upper corner in the planning frame [m], each of shape (3,)."""
+    """The box a moving base may be in: lower and upper corner in the planning frame [m], each of shape (3,)."""
 
     lower: Array
     upper: Array
+
+
+def group_bounds(model: RobotModel, group: JointGroup, workspace: Workspace | None) -> tuple[Array, Array]:
+    """Returns lower and upper bounds of a group's joints, each of shape (joints,) [rad or m].
+
+    As in MoveIt the workspace bounds where a planar or floating base may be, if the group moves it.
+    """
+    lower, upper = model.lower[group.indices], model.upper[group.indices]
+    if model.base is None or workspace is None:
+        return lower, upper
+    for axis, name in enumerate(model.base.translations):
+        if name in group.joints:
+            column = group.joints.index(name)
+            lower[column] = max(lower[column], workspace.lower[axis])
+            upper[column] = min(upper[column], workspace.upper[axis])
+    return lower, upper
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,12 +50,14 @@ class PathSearch:
 
 def _require_start(problem: PlanningProblem) -> None:
     """Raises PlanningError unless the start is within bounds, free, and keeps the path constraints."""
-    faults = problem.model.bound_violations(problem.start, problem.group.indices, BOUNDS_TOLERANCE)
+    model, group = problem.model, problem.group
+    faults = model.bound_violations(problem.start, group.indices, BOUNDS_TOLERANCE, problem.bounds)
     if faults:
+        moves_base = model.base is not None and model.base.variables[0] in group.joints
         raise PlanningError(
             ErrorCode.START_STATE_INVALID,
-            f"start state: {'; '.join(faults)}; move the robot within "
-            "its bounds or use the adapter FixStartStateBounds",
+            f"start state: {'; '.join(faults)}; move the robot within its bounds or use the adapter FixStartStateBounds"
+            + ("; the base's are those of workspace_parameters" if moves_base else ""),
         )
     if not problem.motion.state_is_free(problem.start_values):
         contacts = problem.checker.contacts(problem.start, include_fixed=False)

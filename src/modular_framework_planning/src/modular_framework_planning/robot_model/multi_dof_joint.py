@@ -69,6 +69,11 @@ class MultiDofJoint:
         return tuple(f"{self.name}/{name}" for name, slides, _ in _VARIABLES[self.kind] if slides)
 
     @property
+    def angles(self) -> tuple[str, ...]:
+        """Names of its variables that are turns."""
+        return tuple(f"{self.name}/{name}" for name, slides, _ in _VARIABLES[self.kind] if not slides)
+
+    @property
     def quaternion(self) -> tuple[str, ...]:
         """Names under which MoveIt's clients give the rotation (x, y, z, w); empty where an angle is enough."""
         return tuple(f"{self.name}/{name}" for name in QUATERNION_VARIABLES) if self.kind == FLOATING else ()

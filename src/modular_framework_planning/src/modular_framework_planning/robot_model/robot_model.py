@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -114,6 +114,7 @@ class RobotModel:
             np.array([getattr(self.limits[name], key) for name in self.joint_names])
             for key in ("lower", "upper", "velocity", "acceleration", "jerk")
         )
+        self.endless = self.upper >= CONTINUOUS_BOUND
         self.max_deceleration = np.array([self.limits[name].braking for name in self.joint_names])
         self.mimics = [
             (self.index[name], self.index[mimic.leader], mimic.multiplier, mimic.offset)
@@ -279,7 +280,19 @@ class RobotModel:
 
     def is_continuous(self, number: int) -> bool:
         """Whether the joint at that index of a position vector turns without end."""
-        return bool(self.upper[number] >= CONTINUOUS_BOUND)
+        return bool(self.endless[number])
+
+    def way(self, start: Array, end: Array, indices: Sequence[int] | NDArray[np.int64] | None = None) -> Array:
+        """Returns by how much joints differ [rad or m]; those that turn without end by the short way.
+
+        Args:
+            start: positions of joints, shape (..., joints).
+            end: of the same joints.
+            indices: of the joints in a position vector; all joints by default.
+        """
+        gap = np.asarray(end, dtype=float) - start
+        endless = self.endless if indices is None else self.endless[np.asarray(indices, dtype=np.int64)]
+        return gap - np.where(endless, 2.0 * np.pi * np.round(gap / (2.0 * np.pi)), 0.0)
 
     def with_base(self, positions: Array, transform: Transform) -> Array:
         """Returns a copy with the root link elsewhere in the planning frame; angles are given near the present ones.
@@ -297,12 +310,27 @@ class RobotModel:
         """Returns the pose of the root link in the planning frame."""
         return self.base.transform(positions[self.base_indices]) if self.base else pin.SE3.Identity()
 
-    def bound_violations(self, positions: Array, indices: Iterable[int], tolerance: float = 1e-9) -> list[str]:
-        """Returns one sentence per joint that is out of its bounds."""
+    def bound_violations(
+        self,
+        positions: Array,
+        indices: Iterable[int],
+        tolerance: float = 1e-9,
+        bounds: tuple[Array, Array] | None = None,
+    ) -> list[str]:
+        """Returns one sentence per joint that is out of its bounds.
+
+        Args:
+            positions: of the whole robot [rad or m].
+            indices: of the joints to look at.
+            tolerance: how far beyond a bound counts as within [rad or m].
+            bounds: of these joints, where they are narrower than the robot's.
+        """
+        chosen = np.asarray(list(indices), dtype=np.int64)
+        lower, upper = (self.lower[chosen], self.upper[chosen]) if bounds is None else bounds
         return [
-            f"joint {self.joint_names[i]} at {positions[i]:.4f} is outside [{self.lower[i]:.4f}, {self.upper[i]:.4f}]"
-            for i in indices
-            if not self.lower[i] - tolerance <= positions[i] <= self.upper[i] + tolerance
+            f"joint {self.joint_names[number]} at {positions[number]:.4f} is outside [{low:.4f}, {high:.4f}]"
+            for number, low, high in zip(chosen, lower, upper, strict=True)
+            if not low - tolerance <= positions[number] <= high + tolerance
         ]
 
     def link_transforms(self, positions: Array) -> dict[str, Transform]:

@@ -41,7 +41,8 @@ class PathWatch:
 
     def advance(self, positions: Array) -> None:
         """Updates the progress along the path from positions of the whole robot; the progress never decreases."""
-        gaps = np.linalg.norm(self._rows - positions[self._indices], axis=1)
+        way = self._planned_in.model.way(positions[self._indices], self._rows, self._indices)
+        gaps = np.linalg.norm(way, axis=1)
         while self._reached + 1 < len(gaps) and gaps[self._reached + 1] <= gaps[self._reached]:
             self._reached += 1
 

@@ -6,6 +6,9 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import deque
 
+import numpy as np
+from numpy.typing import NDArray
+
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 
@@ -15,7 +18,13 @@ KEPT = 2000
 class JointHistory:
     """The last KEPT joint positions with their times; not thread-safe."""
 
-    def __init__(self) -> None:
+    def __init__(self, endless: NDArray[np.bool_]) -> None:
+        """Begins without positions.
+
+        Args:
+            endless: whether a joint turns without end, shape (joints,): a sensor may jump by a turn, the joint cannot.
+        """
+        self._endless = endless
         self._times: deque[float] = deque(maxlen=KEPT)
         self._positions: deque[Array] = deque(maxlen=KEPT)
 
@@ -35,7 +44,7 @@ class JointHistory:
         return bool(self._times) and self._times[-1] >= stamp_s
 
     def at(self, stamp_s: float) -> Array:
-        """Returns the positions at a time, linearly interpolated.
+        """Returns the positions at a time, interpolated; joints without ends turn by the short way.
 
         Raises:
             PlanningError: the time is later than the last known one, or earlier than the first.
@@ -53,4 +62,6 @@ class JointHistory:
             return self._positions[after]
         first, last = self._times[after - 1], self._times[after]
         share = (stamp_s - first) / (last - first)
-        return (1.0 - share) * self._positions[after - 1] + share * self._positions[after]
+        begin, way = self._positions[after - 1], self._positions[after] - self._positions[after - 1]
+        turns = np.where(self._endless, 2.0 * np.pi * np.round(way / (2.0 * np.pi)), 0.0)
+        return begin + share * (way - turns)

@@ -24,17 +24,10 @@ def constraints_are_tight(problem: PlanningProblem) -> bool:
     constraints = problem.constraints
     if constraints is None:
         return False
-    low, high = _search_bounds(problem)
+    low, high = problem.search_bounds(problem.start_values[None])
     states = problem.rng.uniform(low, high, (SAMPLES, len(low)))
     kept = sum(constraints.satisfied(problem.motion.full_positions(values)) for values in states)
     return kept < TIGHT_SHARE * SAMPLES
-
-
-def _search_bounds(problem: PlanningProblem) -> tuple[Array, Array]:
-    """Returns the joint bounds, no wider than two turns around the start."""
-    low, high = problem.bounds
-    start = problem.start_values
-    return np.maximum(low, start - 2.0 * np.pi), np.minimum(high, start + 2.0 * np.pi)
 
 
 class _Tree:
@@ -87,7 +80,7 @@ class ConstrainedSearch:
             most_states: how many states to try.
         """
         self._problem, self._step, self._goals, self._most_states = problem, step, goals, most_states
-        self._low, self._high = _search_bounds(problem)
+        self._low, self._high = problem.search_bounds(problem.start_values[None])
         self._states = 0
 
     def run(self) -> PlannedPath:

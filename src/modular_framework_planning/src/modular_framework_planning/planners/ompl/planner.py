@@ -69,26 +69,50 @@ class OmplPlanner:
                 f"planner_id '{problem.planner_id}' works in threads and "
                 "cannot repeat a plan; choose another planner or do not set a seed",
             )
-        paths, states = [], 0
-        for _ in range(max(1, problem.request.attempts)):
-            for reach, limit in stages(problem.planner_id, problem.planner_parameters):
-                search = _Search(problem, goals, step, reach, limit)
-                path = search.run()
-                states += search.states
-                if path is not None:
-                    paths.append(path)
-                if path is not None or problem.interrupted():
-                    break
-            if problem.interrupted():
-                break
-        if not paths:
-            raise no_path(problem, problem.planner_id, states)
-        return PlannedPath(min(paths, key=path_length))
+        states = 0
+        for part, targets in _parts(problem, goals):
+            paths, tried = _paths(part, targets, step)
+            states += tried
+            if paths:
+                return PlannedPath(min(paths, key=path_length))
+        raise no_path(problem, problem.planner_id, states)
 
     @staticmethod
     def repaired(problem: PlanningProblem, vertices: Array) -> Array:
         """Returns the path with every edge valid at the steps of the solution validator; raises EdgeError."""
         return repaired(problem, vertices, connection)
+
+
+def _parts(problem: PlanningProblem, goals: Array) -> list[tuple[PlanningProblem, Array]]:
+    """Returns the searches to make, one after the other: problem with its deadline, and goals.
+
+    Joints without ends turn to their goals by the short way; where half of the time finds none, by either.
+    """
+    turned = problem.other_ways_round(goals)
+    if not len(turned):
+        return [(problem, goals)]
+    both = np.vstack([goals, turned])
+    if problem.repeatable:  # the clock must not decide
+        return [(problem, both)]
+    half = 0.5 * (time.monotonic() + problem.deadline_s)
+    return [(replace(problem, deadline_s=half), goals), (problem, both)]
+
+
+def _paths(problem: PlanningProblem, goals: Array, step: float) -> tuple[list[Array], int]:
+    """Returns the paths that `attempts` searches find, and how many states they looked at."""
+    paths, states = [], 0
+    for _ in range(max(1, problem.request.attempts)):
+        for reach, limit in stages(problem.planner_id, problem.planner_parameters):
+            search = _Search(problem, goals, step, reach, limit)
+            path = search.run()
+            states += search.states
+            if path is not None:
+                paths.append(path)
+            if path is not None or problem.interrupted():
+                break
+        if problem.interrupted():
+            break
+    return paths, states
 
 
 def connection(problem: PlanningProblem, first: Array, second: Array) -> Array | None:
@@ -211,10 +235,7 @@ class _Search:
 
     def _space(self) -> Any:
         """Returns the joint space, no wider than two turns around the start and the goals."""
-        start, goals = self._problem.start_values, self._goals
-        low, high = self._problem.bounds
-        low = np.maximum(low, np.minimum(start, goals.min(axis=0)) - 2.0 * np.pi)
-        high = np.minimum(high, np.maximum(start, goals.max(axis=0)) + 2.0 * np.pi)
+        low, high = self._problem.search_bounds(np.vstack([self._problem.start_values, self._goals]))
         space, bounds = ob.RealVectorStateSpace(self._count), ob.RealVectorBounds(self._count)
         for number in range(self._count):
             bounds.setLow(number, float(low[number]))

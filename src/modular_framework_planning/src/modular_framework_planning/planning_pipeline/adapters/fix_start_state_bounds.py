@@ -22,7 +22,7 @@ class FixStartStateBounds(RequestAdapter):
         inner = np.clip(problem.start[indices], *problem.bounds)
         beyond = np.abs(problem.start[indices] - inner).max()
         if beyond > problem.settings.start_state_max_bounds_error:
-            faults = "; ".join(problem.model.bound_violations(problem.start, indices))
+            faults = "; ".join(problem.model.bound_violations(problem.start, indices, bounds=problem.bounds))
             raise PlanningError(
                 ErrorCode.START_STATE_INVALID,
                 f"start state: {faults}; at most "
