@@ -194,7 +194,8 @@ install_docker() {  # arguments of this script...
 check_engine() {  # arguments of this script...
   command -v docker >/dev/null || install_docker "$@"
   docker info >/dev/null 2>&1 || fail "the Docker engine does not answer" \
-    "start it (sudo systemctl start docker), or add this user to the group docker (sudo usermod -aG docker $(id -un)) and log in again"
+    "start it (sudo systemctl start docker; where there is only its client: sudo apt-get install docker.io), or add this \
+user to the group docker (sudo usermod -aG docker $(id -un)) and log in again"
 }
 
 # ---- image

@@ -40,6 +40,7 @@ def substituted(text: str, variables: dict[str, str]) -> str:
 def of_service(service: dict[str, Any]) -> dict[str, Any]:
     """Returns what a service of a compose file gives its container."""
     assert service.pop("init") is True
+    assert service.pop("pull_policy") == "never"
     service.pop("profiles")
     build = service.pop("build")
     assert build == {"context": "..", "dockerfile": "docker/Dockerfile", "args": {"USER_ID": str(CONTAINER_USER)}}
