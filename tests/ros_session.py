@@ -148,9 +148,9 @@ class RosSession:
         command = ["roslaunch", "-p", str(self.port), package, launch_file, *_launch_arguments(args)]
         return self._start(command)
 
-    def run_framework(self, **args: object) -> Launch:
-        """Starts the framework so that it ends with the task: `rosrun modular_framework_api run_framework ...`."""
-        return self._start(["rosrun", "modular_framework_api", "run_framework", *_launch_arguments(args)])
+    def run_framework(self, package: str = "modular_framework_api", **args: object) -> Launch:
+        """Starts the framework with a package's robot so that it ends with the task, as `run_framework PACKAGE ...`."""
+        return self._start(["rosrun", "modular_framework_api", "run_framework", package, *_launch_arguments(args)])
 
     def _start(self, command: list[str]) -> Launch:
         started = Launch(command, self.env, self.folder / f"launch_{len(self._launches)}.txt")

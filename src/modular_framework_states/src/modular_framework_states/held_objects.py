@@ -17,6 +17,7 @@ from moveit_msgs.srv import (
     GetPlanningSceneRequest,
 )
 
+from modular_framework_core.task_runner.userdata_parameters import manipulator_links
 from modular_framework_ros.calls import CallError, request_service
 
 PREFIX_PARAMETER = "manipulator_prefix"
@@ -26,7 +27,7 @@ SERVICE_TIMEOUT_S = 10.0
 def held_objects() -> dict[str, str]:
     """Returns {object: link} of what is attached to links of the manipulator in the planning scene.
 
-    The links are those with ``manipulator_prefix`` in their names; without that parameter, all links of the robot.
+    The links are those with a text of ``manipulator_prefix`` in their names; without that parameter, all links of the robot.
 
     Raises:
         CallError: move_group does not answer.
@@ -38,7 +39,7 @@ def held_objects() -> dict[str, str]:
     return {
         item.object.id: item.link_name
         for item in scene.robot_state.attached_collision_objects
-        if prefix in item.link_name
+        if not prefix or manipulator_links([item.link_name], prefix)
     }
 
 

@@ -19,6 +19,7 @@ from top_down_grasps.convex_bodies import (
     collision_body,
     column_fronts,
 )
+from top_down_grasps.hand_axes import hand_axes
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 200
@@ -30,7 +31,7 @@ class GripperGeometryError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class HandPart:
-    """A convex part of the hand in the grasp frame, at every sampled position of the gripper's joint.
+    """A convex part of the hand in the frame of the hand, at every sampled position of the gripper's joint.
 
     Attributes:
         link: Link it belongs to.
@@ -44,13 +45,21 @@ class HandPart:
     planes: Array
     is_pad: bool = False
 
+    def turned(self, axes: Array) -> HandPart:
+        """Returns the part in a frame whose axes (3, 3) are given as columns."""
+        planes = np.concatenate([self.planes[:, :, :3] @ axes, self.planes[:, :, 3:]], axis=2)
+        return HandPart(self.link, self.corners @ axes, planes, self.is_pad)
+
 
 @dataclass(frozen=True, slots=True)
 class GripperGeometry:
-    """A gripper as a function of its joint, in the grasp frame (z = approach, fingers close along x).
+    """A gripper as a function of its joint, in the frame of the hand.
+
+    That frame has the origin of the grasp frame; z is the approach, and the fingers close along x.
 
     Attributes:
         joint: Actuated joint.
+        axes: (3, 3) axes of the hand in the grasp frame, as columns.
         positions: (n,) joint positions from the lower to the upper limit [rad or m].
         openings: (n,) free width between the pads [m].
         pad_centres: (n,) z of the pads' centre [m].
@@ -61,6 +70,7 @@ class GripperGeometry:
     """
 
     joint: str
+    axes: Array
     positions: Array
     openings: Array
     pad_centres: Array
@@ -147,6 +157,8 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     positions = np.linspace(limit.lower, limit.upper, SAMPLES)
     parts = list(_parts(model, grasp_link, joint, positions))
     fingers = model.finger_links(joint)
+    axes = _hand_axes(parts, fingers, set(model.moving_links(joint)))
+    parts = [part.turned(axes) for part in parts]
     measured = [_measure(parts, fingers, grasp_link, sample) for sample in range(SAMPLES)]
     openings = np.array([each.opening for each in measured])
     middle = measured[int(np.argmin(np.abs(openings - openings.max() / 2)))]
@@ -155,6 +167,7 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     )
     return GripperGeometry(
         joint,
+        axes,
         positions,
         openings,
         np.array([each.pad_centre for each in measured]),
@@ -163,6 +176,27 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
         middle.pad_half_height,
         marked,
     )
+
+
+def _hand_axes(parts: list[HandPart], fingers: list[str], moving: set[str]) -> Array:
+    """Finds the hand's axes (3, 3) in the grasp frame, with the fingers where they are farthest from each other."""
+    centres = {
+        link: np.concatenate([part.corners for part in parts if part.link == link], axis=1).mean(axis=1)
+        for link in {part.link for part in parts}
+    }  # link -> (samples, 3)
+    ends = np.array([centres[link] for link in fingers if link in centres])
+    palm = [part.corners for part in parts if part.link not in moving]
+    if len(ends) < 2 or not palm:
+        raise GripperGeometryError(
+            f"the last finger links {fingers}, or the link they hang on, have no collision shapes; give at least two "
+            "finger links and the palm a collision element"
+        )
+    spread = np.linalg.norm(ends[:, None] - ends[None, :], axis=3).max(axis=(0, 1))
+    sample = int(np.argmax(spread))
+    try:
+        return hand_axes(ends[:, sample], np.concatenate([each[sample] for each in palm]).mean(axis=0))
+    except ValueError as error:
+        raise GripperGeometryError(f"the hand has no closing direction: {error}") from error
 
 
 def _parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:

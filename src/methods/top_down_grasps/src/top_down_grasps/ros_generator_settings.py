@@ -56,6 +56,7 @@ def read_settings() -> GeneratorSettings:
         approach_distance_m=_number("~approach_distance", defaults.approach_distance_m, 0.01, 0.5),
         lift_distance_m=_number("~lift_distance", defaults.lift_distance_m, 0.0, 1.0),
         finger_clearance_m=_number("~finger_clearance", defaults.finger_clearance_m, 0.0, 0.1),
+        min_finger_clearance_m=_number("~min_finger_clearance", defaults.min_finger_clearance_m, 0.0, 0.1),
         tip_clearance_m=_number("~tip_clearance", defaults.tip_clearance_m, 0.0, 0.1),
         min_pad_overlap_m=_number("~min_pad_overlap", defaults.min_pad_overlap_m, 0.001, 0.1),
         min_side_alignment=_number("~min_side_alignment", defaults.min_side_alignment, 0.5, 0.999),

@@ -9,6 +9,7 @@ from collections import Counter
 import rospy
 from moveit_msgs.msg import MoveItErrorCodes, PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
+from scipy.spatial.transform import Rotation
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger, TriggerResponse
 
@@ -258,8 +259,9 @@ class TopDownGraspGenerator:
     def _message(self, found: SceneObject, grasp: TopDownGrasp, settings: GeneratorSettings) -> StandardisedGrasp:
         x, y, z = grasp.position
         heights = (z + settings.top_down.approach_distance_m, z, z + settings.top_down.lift_distance_m)
+        orientation = (Rotation.from_quat(grasp.quaternion_xyzw) * Rotation.from_matrix(self._gripper.axes.T)).as_quat()
         poses = [
-            generate_pose_stamped_message(settings.frame, (x, y, height), grasp.quaternion_xyzw) for height in heights
+            generate_pose_stamped_message(settings.frame, (x, y, height), orientation.tolist()) for height in heights
         ]
         closed = [self._gripper.closed_position]
         return get_standardised_grasp(

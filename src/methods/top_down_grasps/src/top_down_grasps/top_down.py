@@ -41,6 +41,7 @@ class TopDownSettings:
         approach_distance_m: Height of the pregrasp pose over the grasp pose [m].
         lift_distance_m: Height of the postgrasp pose over the grasp pose [m].
         finger_clearance_m: Room between the hand and the object on each side when the hand comes down [m].
+        min_finger_clearance_m: The least such room, with which a hand that opens no wider comes down [m].
         tip_clearance_m: Smallest distance of the fingertips from the support [m].
         min_pad_overlap_m: Least height of the pads that must touch [m].
         min_side_alignment: Least cosine between a side's normal and the closing direction.
@@ -53,6 +54,7 @@ class TopDownSettings:
     approach_distance_m: float = 0.10
     lift_distance_m: float = 0.15
     finger_clearance_m: float = 0.012
+    min_finger_clearance_m: float = 0.003
     tip_clearance_m: float = 0.006
     min_pad_overlap_m: float = 0.008
     min_side_alignment: float = 0.95
@@ -82,7 +84,7 @@ class TopDownGrasp:
 
     @property
     def quaternion_xyzw(self) -> tuple[float, float, float, float]:
-        """Orientation of the grasp frame in the world: z down, x along the closing direction."""
+        """Orientation of the hand in the world: z down, x along the closing direction."""
         return (math.cos(self.yaw / 2), math.sin(self.yaw / 2), 0.0, 0.0)
 
 
@@ -251,35 +253,47 @@ def _highest_hold(
         low, high = float(flat.x[touching].min()), float(flat.x[touching].max())
         middle = (low + high) / 2
         straddled = flat.x[between & (flat.z >= z - gripper.max_tip)]
-        needed = 2 * (
-            max(float(straddled.max()) - middle, middle - float(straddled.min())) + settings.finger_clearance_m
-        )
-        if needed > gripper.max_opening:
+        half_width = max(float(straddled.max()) - middle, middle - float(straddled.min()))
+        clearance = min(settings.finger_clearance_m, gripper.max_opening / 2 - half_width)
+        if clearance < min(settings.min_finger_clearance_m, settings.finger_clearance_m):
             return None
-        lowest, opening = _lowest_height(flat.top_around(middle, y_grasp), high - low, needed, z, gripper, settings)
+        way = _WayDown(high - low, half_width, clearance)
+        lowest, opening = _lowest_height(flat.top_around(middle, y_grasp), way, z, gripper)
         if lowest <= z + HEIGHT_TOLERANCE_M:
             return _Hold(z, pad_z, low, high, overlap, opening, touching)
         z = lowest
     return None
 
 
-def _lowest_height(
-    top: Array, width: float, needed: float, wanted: float, gripper: GripperGeometry, settings: TopDownSettings
-) -> tuple[float, float]:
+@dataclass(frozen=True, slots=True)
+class _WayDown:
+    """Between the pads on the way down.
+
+    Attributes:
+        width: Opening at which the pads touch [m].
+        half_width: Farthest the object reaches from the middle of the hand [m].
+        clearance: Room to keep on each side [m].
+    """
+
+    width: float
+    half_width: float
+    clearance: float
+
+
+def _lowest_height(top: Array, way: _WayDown, wanted: float, gripper: GripperGeometry) -> tuple[float, float]:
     """Chooses the opening with which the hand can come down to a wanted height, or else the farthest.
 
     Args:
         top: Highest points of the object around the middle of the hand.
-        width: Opening at which the pads touch [m].
-        needed: Least opening on the way down [m].
+        way: What the pads have to pass.
         wanted: Height of the grasp frame that is wanted [m].
         gripper: Geometry of the hand.
-        settings: What counts as usable.
 
     Returns:
         The least height at which the hand is clear all the time [m], and the opening to come down with [m].
     """
-    closing = np.linspace(width, needed, CLOSING_STEPS, endpoint=False)
+    needed = 2 * (way.half_width + way.clearance)
+    closing = np.linspace(way.width, needed, CLOSING_STEPS, endpoint=False)
     coming = np.linspace(needed, gripper.max_opening, OPENING_STEPS)
     openings = np.concatenate([closing, coming])
     while_closing = np.maximum.accumulate(
@@ -287,7 +301,7 @@ def _lowest_height(
     )
     # The pads' own room is in the opening already; without the last bit, rounding would open the hand a step wider.
     coming_down = gripper.lowest_heights(
-        coming, top, max(0.0, settings.finger_clearance_m - CONTACT_DEPTH_M), with_pads=True, floor=wanted
+        coming, top, max(0.0, way.clearance - CONTACT_DEPTH_M), with_pads=True, floor=wanted
     )
     heights = np.maximum(while_closing[CLOSING_STEPS:], coming_down)
     chosen = int(np.argmax(heights <= heights.min() + HEIGHT_TOLERANCE_M))

@@ -11,6 +11,8 @@ from enum import IntEnum
 from modular_framework_core.commander.robot_groups import Group, RobotModelError
 
 CLOSED_STATE = "closed"
+TOLERANCE_SHARE, WIDEST_TOLERANCE = 0.025, 0.05
+"""Distance that counts as reached: a share of the smallest range of the fingers' joints, and the most [rad or m]."""
 
 
 class GraspCommandError(ValueError):
@@ -195,6 +197,12 @@ def refuse_no_effort(name: str, effort: float) -> None:
 def closed_positions(group: Group) -> dict[str, float]:
     """Returns where the joints are when the hand is shut: the group state ``closed``, else the upper limits."""
     return group.states.get(CLOSED_STATE) or {joint.name: joint.upper for joint in group.joints}
+
+
+def reached_tolerance(group: Group) -> float:
+    """Returns the distance that counts as reached [rad or m]: a small share of the fingers' range of motion."""
+    ranges = [joint.upper - joint.lower for joint in group.joints if 0.0 < joint.upper - joint.lower < math.inf]
+    return min([WIDEST_TOLERANCE, *(TOLERANCE_SHARE * each for each in ranges)])
 
 
 def judge(

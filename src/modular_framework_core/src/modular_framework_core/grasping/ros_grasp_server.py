@@ -18,6 +18,7 @@ from modular_framework_core.grasping.grasp_server import (
     effort_limits,
     judge,
     posture_targets,
+    reached_tolerance,
     torque_intensities,
     torque_share,
 )
@@ -44,8 +45,8 @@ class GraspServer:
 
     Parameters:
         ``~max_torque_full_scale`` (800): value of a command's ``max_torque`` that stands for the joints' full effort.
-        ``~position_tolerance`` (0.05 rad or m): distance that counts as reached; a gripper that slides needs a small
-        share of its stroke, since fingers this near to shut count as shut.
+        ``~position_tolerance`` [rad or m] (2.5 % of the smallest range of the fingers' joints, at most 0.05): distance
+        that counts as reached; fingers this near to shut count as shut.
         ``~motion_timeout`` (25 s).
 
     Args:
@@ -56,7 +57,7 @@ class GraspServer:
     def __init__(self, group: Group, manipulator: Manipulator) -> None:
         self._group, self._manipulator = group, manipulator
         self._full_scale = float(rospy.get_param("~max_torque_full_scale", 800.0))
-        self._tolerance = float(rospy.get_param("~position_tolerance", 0.05))
+        self._tolerance = float(rospy.get_param("~position_tolerance", reached_tolerance(group)))
         self._timeout_s = float(rospy.get_param("~motion_timeout", 25.0))
         self._motion_lock = threading.Lock()
         self._goals = RunningGoals()

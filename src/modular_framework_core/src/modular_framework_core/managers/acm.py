@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from modular_framework_core.files.faults import nearest
 from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix, MutableMatrix
+from modular_framework_core.task_runner.userdata_parameters import manipulator_links
 
 LINK_SEPARATOR = "__"
 DEFAULT_LINK = "link"
@@ -52,7 +53,8 @@ class AcmManager:
         Args:
             matrix: Matrix of the planning scene.
             manipulator_indices: Positions of the manipulator's links in ``matrix.names``.
-            manipulator_prefix: Text found in the names of the manipulator's links; used when no index is given.
+            manipulator_prefix: Texts separated by spaces, one of which is in the name of each of the manipulator's links;
+                used when no index is given.
 
         Returns:
             True when an earlier reference was replaced.
@@ -67,8 +69,8 @@ class AcmManager:
                 f"(0 to {len(matrix.names) - 1}); compute the indices from the matrix that is sent."
             )
         links = [matrix.names[index] for index in manipulator_indices]
-        if not links and manipulator_prefix:
-            links = [name for name in matrix.names if manipulator_prefix in name]
+        if not links:
+            links = [matrix.names[index] for index in manipulator_links(matrix.names, manipulator_prefix)]
         with self._lock:
             replaced = self._initial is not None
             self._initial = matrix

@@ -77,7 +77,7 @@ class AcmServices(ManagerServices):
 
     Parameters:
         ``manipulator_links_indices`` (list of int): rows of the manipulator's links in the matrix of ``set_init_acm``.
-        ``manipulator_prefix`` (string): text in the names of the manipulator's links; used without the indices.
+        ``manipulator_prefix`` (string): texts in the names of the manipulator's links; used without the indices.
         Both are read each time a reference matrix is set.
         ``~grip_interfaces`` (bool, false): serves ``update_acm_entry`` with GRIP's type, which has a field ``publish``.
         ``simulation`` (bool): True adds the movable objects of the simulation before a request about objects is served.

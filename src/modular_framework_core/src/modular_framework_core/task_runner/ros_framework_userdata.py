@@ -62,10 +62,11 @@ def initialise_acm(manipulator_prefix: str) -> None:
     """Sends move_group's allowed collision matrix to the ACM manager and sets which links are the manipulator's.
 
     Args:
-        manipulator_prefix: Text in the name of every link of the manipulator; "" = there is no manipulator.
+        manipulator_prefix: Texts separated by spaces, one of which is in the name of every link of the manipulator;
+            "" = there is no manipulator.
 
     Raises:
-        UserdataError: No link has that text in its name, or the ACM manager refused the matrix.
+        UserdataError: No link has such a text in its name, or the ACM manager refused the matrix.
         CallError: A service is missing or did not answer.
     """
     get_scene = rospy.ServiceProxy("/get_planning_scene", GetPlanningScene)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +25,7 @@ class UserdataParameters:
         arm_group_name: Planning group of the arm.
         number_plan_attempt: Plans made for each request; the shortest is kept.
         planning_max_time: Longest time for a plan [s].
-        manipulator_prefix: Text in the name of every link of the manipulator; "" = no manipulator.
+        manipulator_prefix: Texts, one of which is in the name of every link of the manipulator; "" = no manipulator.
         manipulator_action: Name of the manipulator's Grasp action; "" without manipulator.
         max_torque: What a torque intensity of 1 stands for; None without manipulator.
     """
@@ -78,6 +78,12 @@ def read_parameters(get: Callable[[str], Any]) -> UserdataParameters:
     )
 
 
-def manipulator_links(link_names: list[str], prefix: str) -> list[int]:
-    """Returns the indices of the links whose name contains a text; none for an empty text."""
-    return [index for index, name in enumerate(link_names) if prefix and prefix in name]
+def manipulator_links(link_names: Sequence[str], prefix: str) -> list[int]:
+    """Returns the indices of the manipulator's links.
+
+    Args:
+        link_names: Names of links.
+        prefix: Texts separated by spaces; a link belongs to the manipulator if its name contains one of them.
+    """
+    texts = prefix.split()
+    return [index for index, name in enumerate(link_names) if any(text in name for text in texts)]
