@@ -40,12 +40,13 @@ print(json.dumps([heights, ended.is_set()]))
 """
 
 
-def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSession) -> None:
+@pytest.mark.parametrize("robot", ["modular_framework_api", "panda_hand_robot"])
+def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSession, robot: str) -> None:
     watcher = subprocess.Popen(
         [sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     try:
-        launch = session.run_framework(gui="false", rviz="false")
+        launch = session.run_framework(robot, gui="false", rviz="false")
         exit_code = launch.wait(TASK_TIMEOUT_S)
         heights, ended = json.loads(watcher.communicate(timeout=60)[0].splitlines()[-1])
     finally:

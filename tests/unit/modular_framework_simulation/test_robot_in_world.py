@@ -193,19 +193,18 @@ def test_an_object_is_lifted_by_friction_and_let_go_again(
     lifter: Lifter, geometry: specs.Geometry, height: float
 ) -> None:
     grasp(lifter, geometry, height)
-    assert lifter.loop.grasp_watch.held == "thing"
-    held = lifter.loop.held_object()
-    assert held is not None
+    (held,) = lifter.loop.held_objects()
     assert (held.model, held.carrier_link) == ("thing", "palm")
+    assert "palm" in held.touch_links
     lifter.move_lift(0.2, 1.0)
     lifter.run(2.0)
     lifted = lifter.world.entity_state("thing").pose.position[2]
     assert lifted == pytest.approx(0.2 + 0.27, abs=0.005)
-    snapshot = take_snapshot(lifter.world, lifter.loop.held_object())
-    assert snapshot.held is not None
+    snapshot = take_snapshot(lifter.world, lifter.loop.held_objects())
+    assert [held.model for held in snapshot.held] == ["thing"]
     assert {model.name for model in snapshot.models} == {"floor", "thing"}
     lifter.run(1.0, lambda _time_s: setattr(lifter.commands["slide_1"], "command", 0.0))
-    assert lifter.loop.grasp_watch.held is None
+    assert lifter.loop.held_objects() == ()
     assert lifter.world.entity_state("thing").pose.position[2] < 0.1
 
 

@@ -21,7 +21,7 @@ def snapshot(x: float | None = 0.0, held_at: float | None = None, instance: int 
     models = ()
     if x is not None:
         models = (ModelSnapshot("cube", instance, False, (LinkSnapshot(LINK, at(x)),)),)
-    held = HeldObject("cube", "palm", at(held_at)) if held_at is not None else None
+    held = (HeldObject("cube", "palm", at(held_at)),) if held_at is not None else ()
     return WorldSnapshot(0.0, models, held)
 
 
@@ -55,7 +55,7 @@ def test_movements_count_from_one_millimetre_and_add_up() -> None:
 
 def test_a_turn_of_a_hundredth_radian_counts() -> None:
     turned = Pose.from_xyz_rpy((0, 0, 0), (0, 0, 0.02))
-    world = WorldSnapshot(0.0, (ModelSnapshot("cube", 1, False, (LinkSnapshot(LINK, turned),)),), None)
+    world = WorldSnapshot(0.0, (ModelSnapshot("cube", 1, False, (LinkSnapshot(LINK, turned),)),), ())
     assert changes_after(snapshot(0.0)).towards(world) == [Move(CUBE, turned)]
 
 
@@ -94,7 +94,7 @@ def three(cube_at: float = 0.0, held_at: float | None = None) -> WorldSnapshot:
         ModelSnapshot(name, number, False, (LinkSnapshot(LINK, at(x)),))
         for number, (name, x) in enumerate((("table", 1.0), ("ball", 2.0), ("cube", cube_at)))
     )
-    return WorldSnapshot(0.0, models, HeldObject("cube", "palm", at(held_at)) if held_at is not None else None)
+    return WorldSnapshot(0.0, models, (HeldObject("cube", "palm", at(held_at)),) if held_at is not None else ())
 
 
 def put_again(changes: SceneChanges, world: WorldSnapshot) -> set[tuple[str, str]]:
@@ -142,7 +142,7 @@ def test_a_new_object_does_not_hide_that_the_scene_was_cleared() -> None:
     changes = changes_after(snapshot(0.0))
     changes.compare({CUBE}, {})
     ball = ModelSnapshot("ball", 7, False, (LinkSnapshot(LINK, at(2.0)),))
-    both = WorldSnapshot(0.0, (*snapshot(0.0).models, ball), None)
+    both = WorldSnapshot(0.0, (*snapshot(0.0).models, ball), ())
     changes.towards(both)
     changes.confirm()
     assert changes.compare({BALL}, {}) == [], "the cube was cleared away before the ball came"

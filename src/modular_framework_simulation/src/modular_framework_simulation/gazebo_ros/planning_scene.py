@@ -56,13 +56,9 @@ class PlanningScenePublisher:
     Client of /apply_planning_scene (moveit_msgs/ApplyPlanningScene) and /get_planning_scene
     (moveit_msgs/GetPlanningScene), whenever they are there.
     Subscribes: /move_group/monitored_planning_scene (moveit_msgs/PlanningScene), only to notice that something changed.
-
-    Args:
-        touch_links: Links of the gripper, which may touch an object that is held.
     """
 
-    def __init__(self, touch_links: list[str]) -> None:
-        self._touch_links = touch_links
+    def __init__(self) -> None:
         self._changes = SceneChanges()
         self._snapshot: WorldSnapshot | None = None
         self._news = threading.Event()
@@ -109,7 +105,7 @@ class PlanningScenePublisher:
                 pause_s = self._fail(f"{type(error).__name__}: {error}")
             end = time.monotonic() + pause_s
             # A change of what is held is urgent: the next motion is planned with it.
-            while time.monotonic() < end and _held_model(self._snapshot) == _held_model(snapshot):
+            while time.monotonic() < end and _held_models(self._snapshot) == _held_models(snapshot):
                 if self._stop.wait(0.02):
                     return
 
@@ -200,9 +196,9 @@ class PlanningScenePublisher:
                 world.append(_moved(identity, conversions.pose_to_msg(pose)))
             case Remove():
                 world.append(CollisionObject(id=identity, operation=CollisionObject.REMOVE))
-            case Attach(link=spec, carrier_link=carrier, pose_in_carrier=pose):
+            case Attach(link=spec, carrier_link=carrier, pose_in_carrier=pose, touch_links=touching):
                 item = conversions.link_to_collision_object(model, spec, carrier, pose)
-                attached.append(conversions.attached_object(item, carrier, self._touch_links))
+                attached.append(conversions.attached_object(item, carrier, list(touching)))
             case Detach(carrier_link=carrier):
                 released = AttachedCollisionObject(link_name=carrier)
                 released.object.id = identity
@@ -216,5 +212,5 @@ def _moved(identity: str, pose: PoseMsg) -> CollisionObject:
     return message
 
 
-def _held_model(snapshot: WorldSnapshot | None) -> str:
-    return snapshot.held.model if snapshot is not None and snapshot.held is not None else ""
+def _held_models(snapshot: WorldSnapshot | None) -> list[tuple[str, str]]:
+    return [(held.model, held.carrier_link) for held in snapshot.held] if snapshot is not None else []

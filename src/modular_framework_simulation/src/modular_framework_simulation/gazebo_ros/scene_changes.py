@@ -54,6 +54,7 @@ class Attach:
     link: specs.Link
     carrier_link: str
     pose_in_carrier: Pose
+    touch_links: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +81,7 @@ class _ObjectState:
 class _Target:
     state: _ObjectState
     link: specs.Link
+    touch_links: tuple[str, ...] = ()
 
 
 class SceneChanges:
@@ -164,7 +166,7 @@ class SceneChanges:
             return []  # another node attached it, as a pick does: the gripper will take it, or that node puts it down
         self._pending[key] = now
         if now.carrier_link is not None:
-            return [Attach(key, target.link, now.carrier_link, now.pose)]
+            return [Attach(key, target.link, now.carrier_link, now.pose, target.touch_links)]
         if carrier is not None:
             return [Detach(key, carrier), Add(key, target.link, now.pose)]
         if before is None or before.carrier_link is not None or key not in self._in_world:
@@ -178,13 +180,14 @@ class SceneChanges:
 
 def _targets_of(snapshot: WorldSnapshot) -> dict[ObjectKey, _Target]:
     targets: dict[ObjectKey, _Target] = {}
-    held = snapshot.held
+    carried = {held.model: held for held in snapshot.held}
     for model in snapshot.models:
         for link in model.links:
             key = (model.name, link.spec.name)
-            if held is not None and held.model == model.name:
+            if (held := carried.get(model.name)) is not None:
                 pose_in_carrier = held.carrier_in_world.inverse() @ link.pose_in_world
-                targets[key] = _Target(_ObjectState(model.instance, pose_in_carrier, held.carrier_link), link.spec)
+                state = _ObjectState(model.instance, pose_in_carrier, held.carrier_link)
+                targets[key] = _Target(state, link.spec, held.touch_links)
             else:
                 targets[key] = _Target(_ObjectState(model.instance, link.pose_in_world, None), link.spec)
     return targets

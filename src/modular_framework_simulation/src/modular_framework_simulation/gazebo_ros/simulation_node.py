@@ -74,8 +74,7 @@ class SimulationNode:
         if parameters.paused:
             self._loop.pause()
         self._services = GazeboServices(self._loop, self._resources)
-        touch_links = actors.robot.gripper_links if actors else []
-        self._scene = PlanningScenePublisher(touch_links)
+        self._scene = PlanningScenePublisher()
         self._add_hooks()
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
         self._failed = False
@@ -115,17 +114,20 @@ class SimulationNode:
         self._loop.add_hook(Hook(every(_CLOCK_RATE_HZ), self._topics.publish_clock))
         self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
         self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
-        self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasp))
+        self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
         self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
         self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))
 
-    def _watch_grasp(self) -> None:
-        before = self._loop.grasp_watch.held
-        self._loop.watch_grasp()
-        held = self._loop.grasp_watch.held
-        self._topics.publish_grasped(held or "")  # also after a reset, which forgets what was held
+    def _watch_grasps(self) -> None:
+        before = [watch.held for watch in self._loop.grasp_watches]
+        self._loop.watch_grasps()
+        held = [watch.held for watch in self._loop.grasp_watches]
+        # also after a reset, which forgets what was held
+        self._topics.publish_grasped(sorted({name for name in held if name is not None}))
+        for was, now in zip(before, held, strict=True):
+            if now != was:
+                rospy.loginfo("the gripper %s", f"holds '{now}'" if now else f"let go of '{was}'")
         if held != before:
-            rospy.loginfo("the gripper %s", f"holds '{held}'" if held else f"let go of '{before}'")
             self._show_snapshot()
 
     def _on_paused_tick(self) -> None:
@@ -134,7 +136,7 @@ class SimulationNode:
         self._show_snapshot()
 
     def _show_snapshot(self) -> None:
-        self._scene.show(take_snapshot(self._world, self._loop.held_object()))
+        self._scene.show(take_snapshot(self._world, self._loop.held_objects()))
 
     def _report_pace(self) -> None:
         if self._world.time_ns == 0:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the clock, the states of models and links, and the object that the gripper holds."""
+"""Publishes the clock, the states of models and links, and the objects that grippers hold."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import rospy
@@ -19,7 +20,7 @@ class WorldTopics:
     """Publishers of the simulation; all methods are called by the loop's thread.
 
     Publishes: /clock (rosgraph_msgs/Clock), /gazebo/model_states, /gazebo/link_states, and /gazebo/grasped_object
-    (std_msgs/String, latched; empty while nothing is held).
+    (std_msgs/String, latched; empty while nothing is held; names of objects in several grippers are separated by commas).
 
     Args:
         world: What is published.
@@ -32,7 +33,7 @@ class WorldTopics:
         self._links = rospy.Publisher(ros_names.LINK_STATES, LinkStates, queue_size=1)
         self._grasped = rospy.Publisher(ros_names.GRASPED_OBJECT, String, queue_size=1, latch=True)
         self._last_grasped: str | None = None
-        self.publish_grasped("")
+        self.publish_grasped(())
 
     def publish_clock(self) -> None:
         """Publishes simulated time."""
@@ -52,11 +53,12 @@ class WorldTopics:
             states = [(f"{name}{SCOPE}{link}", body.link_state(link)) for name, body, link in links]
             self._links.publish(_filled(LinkStates(), states))
 
-    def publish_grasped(self, name: str) -> None:
-        """Publishes the name of the held object when it changed; "" for none."""
-        if name != self._last_grasped:
-            self._last_grasped = name
-            self._grasped.publish(String(name))
+    def publish_grasped(self, names: Sequence[str]) -> None:
+        """Publishes the names of the held objects when they changed."""
+        text = ",".join(names)
+        if text != self._last_grasped:
+            self._last_grasped = text
+            self._grasped.publish(String(text))
 
 
 def _filled(message: Any, states: list[tuple[str, BodyState]]) -> Any:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -74,8 +74,8 @@ class SimulationLoop:
         self.world = world
         self.pacer = pacer
         self.requests = requests
-        self.grasp_watch = GraspWatch()
         self._actors = actors
+        self.grasp_watches = tuple(GraspWatch() for _ in actors.robot.grippers) if actors is not None else ()
         self._hooks: list[Hook] = []
         self._on_paused_tick = on_paused_tick
         self._paused = False
@@ -103,7 +103,8 @@ class SimulationLoop:
     def reset_poses(self) -> None:
         """Puts models and robot at their initial poses, at rest; time continues."""
         self.world.reset_poses()
-        self.grasp_watch.reset()
+        for watch in self.grasp_watches:
+            watch.reset()
         if self._actors is not None:
             self._actors.robot.reset()
         self._restart_control()
@@ -179,28 +180,31 @@ class SimulationLoop:
             if steps % hook.every_steps == 0:
                 hook.action()
 
-    def watch_grasp(self) -> None:
-        """Passes the contacts of the fingers to the grasp watch; a hook."""
+    def watch_grasps(self) -> None:
+        """Passes the contacts of the fingers to the grasp watch of their gripper; a hook."""
         if self._actors is None:
             return
         robot = self._actors.robot
-        touched = []
-        for finger in robot.fingers:
-            contacts = [contact for link in finger for contact in self.world.contacts(robot.body, link)]
-            # The engine also lists bodies that are near each other and do not press.
-            touched.append(
-                {each.model for each in contacts if each.force > 0.0 and not self.world.body(each.model).static}
-            )
-        self.grasp_watch.update(self._time_s(), touched)
+        for gripper, watch in zip(robot.grippers, self.grasp_watches, strict=True):
+            watch.update(self._time_s(), [self._touched(robot, finger) for finger in gripper.fingers])
 
-    def held_object(self) -> HeldObject | None:
-        """Returns what the gripper holds now."""
-        name = self.grasp_watch.held
-        if name is None or self._actors is None or name not in self.world.names():
-            return None
+    def _touched(self, robot: RobotBody, finger: Sequence[int]) -> set[str]:
+        """Returns the movable objects that a finger presses on."""
+        contacts = [contact for link in finger for contact in self.world.contacts(robot.body, link)]
+        # The engine also lists bodies that are near each other and do not press.
+        return {each.model for each in contacts if each.force > 0.0 and not self.world.body(each.model).static}
+
+    def held_objects(self) -> tuple[HeldObject, ...]:
+        """Returns what the grippers hold now; an object in two of them counts as held by the first."""
+        if self._actors is None:
+            return ()
         robot = self._actors.robot
-        palm_in_world: Pose = robot.body.link_state(robot.palm_link).pose
-        return HeldObject(name, robot.palm_link, palm_in_world)
+        held: dict[str, HeldObject] = {}
+        for gripper, watch in zip(robot.grippers, self.grasp_watches, strict=True):
+            if watch.held is not None and watch.held not in held and watch.held in self.world.names():
+                palm_in_world: Pose = robot.body.link_state(gripper.palm_link).pose
+                held[watch.held] = HeldObject(watch.held, gripper.palm_link, palm_in_world, gripper.links)
+        return tuple(held.values())
 
     def _time_s(self) -> float:
         return self.world.time_ns * 1e-9

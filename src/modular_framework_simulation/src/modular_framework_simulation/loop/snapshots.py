@@ -37,35 +37,37 @@ class ModelSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class HeldObject:
-    """An object in the gripper.
+    """An object in a gripper.
 
     Attributes:
         model: Its instance name.
         carrier_link: Link of the robot it is carried by.
         carrier_in_world: Pose of that link.
+        touch_links: Links of the gripper, which may touch it.
     """
 
     model: str
     carrier_link: str
     carrier_in_world: Pose
+    touch_links: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class WorldSnapshot:
-    """Models and grasp at one moment.
+    """Models and grasps at one moment.
 
     Attributes:
         time_s: Simulated time [s].
         models: All models but robots.
-        held: What the gripper holds, None if nothing.
+        held: What the grippers hold.
     """
 
     time_s: float
     models: tuple[ModelSnapshot, ...]
-    held: HeldObject | None
+    held: tuple[HeldObject, ...]
 
 
-def take_snapshot(world: PhysicsWorld, held: HeldObject | None) -> WorldSnapshot:
+def take_snapshot(world: PhysicsWorld, held: tuple[HeldObject, ...]) -> WorldSnapshot:
     """Copies the state of the world; to be called from the loop's thread."""
     models = []
     for name in world.names():

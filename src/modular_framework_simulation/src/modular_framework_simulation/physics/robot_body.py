@@ -61,6 +61,21 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
+class Gripper:
+    """One of the robot's grippers.
+
+    Attributes:
+        palm_link: Link the fingers are fastened to.
+        links: Palm and everything below it: the links that may touch a held object.
+        fingers: For each finger the engine's numbers of its links.
+    """
+
+    palm_link: str
+    links: tuple[str, ...]
+    fingers: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class JointReading:
     """Measured state of one joint, in SI units."""
 
@@ -105,7 +120,7 @@ class RobotBody:
         self._indices = [self.body.joint_indices[name] for name in self.joint_names]
         self._rank = {joint_name: rank for rank, joint_name in enumerate(self.joint_names)}
         self.readings = [JointReading(0.0, 0.0, 0.0)] * len(self._indices)
-        self.fingers = self._fingers()
+        self.grippers = self._grippers()
         self.starting_positions = self._complete(positions)
         self._limit_self_collisions()
         self._set_surfaces()
@@ -115,25 +130,32 @@ class RobotBody:
 
     @property
     def gripper_joints(self) -> list[RobotJoint]:
-        """The joints of the gripper: those that mimic, and those they follow."""
+        """The joints of all grippers: those that mimic, and those they follow."""
         leaders = {joint.mimic.leader for joint in self._joints if joint.mimic is not None}
         return [joint for joint in self._joints if joint.mimic is not None or joint.name in leaders]
 
-    def _fingers(self) -> list[list[int]]:
-        """Returns the engine's link numbers of each finger: a chain of links below one palm."""
-        chains: dict[str, list[int]] = {}
-        for joint in self.gripper_joints:
-            chains.setdefault(_chain_root(joint, self.gripper_joints), []).append(
-                self.body.link_indices[joint.child_link]
-            )
-        return list(chains.values())
-
     @property
-    def gripper_links(self) -> list[str]:
-        """Names of the links that may touch a held object: the palm and everything fastened below it."""
-        parents, palm = self.description.parents, self.palm_link
-        if not self.gripper_joints:
-            return []
+    def fingers(self) -> list[tuple[int, ...]]:
+        """The engine's link numbers of each finger of every gripper."""
+        return [finger for gripper in self.grippers for finger in gripper.fingers]
+
+    def _grippers(self) -> tuple[Gripper, ...]:
+        """Sorts the joints of grippers by the link below which their leaders' fingers begin."""
+        joints = self.gripper_joints
+        by_name = {joint.name: joint for joint in joints}
+        palms: dict[str, dict[str, list[int]]] = {}
+        for joint in joints:
+            leader = by_name.get(joint.mimic.leader, joint) if joint.mimic is not None else joint
+            fingers = palms.setdefault(_chain_root(leader, joints).parent_link, {})
+            root = _chain_root(joint, joints).child_link
+            fingers.setdefault(root, []).append(self.body.link_indices[joint.child_link])
+        return tuple(
+            Gripper(palm, self._links_below(palm), tuple(tuple(finger) for finger in fingers.values()))
+            for palm, fingers in palms.items()
+        )
+
+    def _links_below(self, palm: str) -> tuple[str, ...]:
+        parents = self.description.parents
 
         def below_palm(link: str) -> bool:
             while link:
@@ -142,15 +164,7 @@ class RobotBody:
                 link = parents.get(link, "")
             return False
 
-        return [link for link in self.description.links if below_palm(link)]
-
-    @property
-    def palm_link(self) -> str:
-        """Name of the link the fingers are fastened to; the root link for a robot without a gripper."""
-        gripper = self.gripper_joints
-        below = {joint.child_link for joint in gripper}
-        roots = [joint.parent_link for joint in gripper if joint.parent_link not in below]
-        return roots[0] if roots else self.description.links[0]
+        return tuple(link for link in self.description.links if below_palm(link))
 
     def reset(self) -> None:
         """Puts the joints at their starting positions, at rest."""
@@ -295,9 +309,9 @@ def _role(joint: RobotJoint, description: RobotDescription) -> Role:
     return Role.DRIVEN if joint.interfaces else Role.FREE
 
 
-def _chain_root(joint: RobotJoint, gripper: list[RobotJoint]) -> str:
-    """Returns the first link of the finger a gripper joint belongs to."""
+def _chain_root(joint: RobotJoint, gripper: list[RobotJoint]) -> RobotJoint:
+    """Returns the first joint of the finger a gripper joint belongs to."""
     by_child = {each.child_link: each for each in gripper}
     while joint.parent_link in by_child:
         joint = by_child[joint.parent_link]
-    return joint.child_link
+    return joint

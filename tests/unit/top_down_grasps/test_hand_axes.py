@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Approach and closing direction of a hand are found from where its fingers and its palm are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from top_down_grasps.hand_axes import hand_axes
+
+FINGERS = np.array([[0.04, 0.0, -0.02], [-0.04, 0.0, -0.02]])
+PALM = np.array([0.0, 0.005, -0.08])
+
+
+def test_a_hand_that_approaches_along_z_and_closes_along_x_has_the_axes_of_its_frame() -> None:
+    assert hand_axes(FINGERS, PALM) == pytest.approx(np.eye(3))
+    assert hand_axes(FINGERS[::-1], PALM) == pytest.approx(np.eye(3))
+
+
+@pytest.mark.parametrize("approach", [(0.0, 0.0), (np.pi / 2, 0.0), (np.pi, 0.0), (0.0, np.pi / 2), (0.0, -np.pi / 2)])
+@pytest.mark.parametrize("yaw", [0.0, np.pi / 2, 0.7])
+def test_the_axes_turn_with_the_frame(approach: tuple[float, float], yaw: float) -> None:
+    # the frame may be turned about its approach by any angle, and otherwise by quarter turns
+    frame = Rotation.from_euler("xy", approach).as_matrix() @ Rotation.from_euler("z", yaw).as_matrix()
+    axes = hand_axes(FINGERS @ frame.T, PALM @ frame.T * [1.0, 1.0, 1.0])
+    assert axes[:, 2] == pytest.approx(frame[:, 2], abs=1e-9)
+    assert abs(axes[:, 0] @ frame[:, 0]) == pytest.approx(1.0)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("fingers", "fault"), [(FINGERS[:1], "1 outermost"), (FINGERS[[0, 0]], "never apart")])
+def test_a_hand_without_two_fingers_is_refused(fingers: np.ndarray, fault: str) -> None:
+    with pytest.raises(ValueError, match=fault):
+        hand_axes(fingers, PALM)
