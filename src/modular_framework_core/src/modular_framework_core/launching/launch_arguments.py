@@ -6,10 +6,12 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import roslaunch.arg_dump
 import roslaunch.config
 import roslaunch.core
+import roslaunch.substitution_args
 import roslaunch.xmlloader
 import rospkg
 
@@ -19,7 +21,7 @@ METHOD, CONFIGURATION = "method_launch_file", "config_directory"
 
 
 def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
-    """Returns the values that the arguments of a launch file have, defaults included.
+    """Returns the values of the arguments of a launch file and of those it passes all of them to, defaults included.
 
     Args:
         path: Launch file.
@@ -27,7 +29,32 @@ def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
     """
     loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False, args_only=True)
     roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False, assign_machines=False)
-    return {name: str(value) for name, value in loader.root_context.resolve_dict["arg"].items()}
+    values = {name: str(value) for name, value in loader.root_context.resolve_dict["arg"].items()}
+    for included in _files_with_all_arguments(path):
+        given = [f"{name}:={value}" for name, value in values.items() if ":=" not in value]  # roslaunch cannot read that
+        values = argument_values(included, given) | values
+    return values
+
+
+def known_arguments(path: str) -> dict[str, tuple[str, str | None]]:
+    """Returns documentation and default of every argument of a launch file, and of the files it passes all of them to.
+
+    Args:
+        path: Launch file.
+    """
+    known = dict(roslaunch.arg_dump.get_args([path]))
+    for included in _files_with_all_arguments(path):
+        known = known_arguments(included) | known
+    return known
+
+
+def _files_with_all_arguments(path: str) -> list[str]:
+    """Returns the launch files that a launch file includes with all its arguments."""
+    return [
+        roslaunch.substitution_args.resolve_args(include.get("file", ""))
+        for include in ElementTree.parse(path).getroot().findall("include")
+        if include.get("pass_all_args", "").lower() in ("true", "1")
+    ]
 
 
 def check_arguments(path: str, arguments: list[str]) -> None:
@@ -40,7 +67,7 @@ def check_arguments(path: str, arguments: list[str]) -> None:
     Raises:
         roslaunch.core.RLException: It names every wrong argument and what was probably meant.
     """
-    known = roslaunch.arg_dump.get_args([path])
+    known = known_arguments(path)
     faults = []
     for argument in arguments:
         name, assignment, value = argument.partition(":=")
