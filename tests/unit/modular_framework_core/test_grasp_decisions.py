@@ -14,6 +14,7 @@ from modular_framework_core.grasping.grasp_server import (
     effort_limits,
     judge,
     posture_targets,
+    reached_tolerance,
     refuse_no_effort,
     torque_intensities,
     torque_share,
@@ -238,3 +239,12 @@ def test_joints_are_compared_by_name_not_by_sorted_values() -> None:
 def test_an_unknown_stage_is_refused() -> None:
     with pytest.raises(GraspCommandError, match="POST_GRASP_STATE=2"):
         Stage.of(3)
+
+
+@pytest.mark.parametrize(("kind", "upper", "tolerance"), [("revolute", 1.94, 0.0485), ("prismatic", 0.04, 0.001)])
+def test_what_counts_as_reached_is_a_share_of_the_fingers_range(kind: str, upper: float, tolerance: float) -> None:
+    urdf = URDF.replace('<joint name="f" type="revolute">', f'<joint name="f" type="{kind}">').replace(
+        "1.94", str(upper)
+    )
+    assert reached_tolerance(read_group(urdf, SRDF, "hand")) == pytest.approx(tolerance)
+    assert reached_tolerance(read_group(URDF, SRDF, "arm")) == 0.05

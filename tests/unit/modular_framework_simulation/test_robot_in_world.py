@@ -70,7 +70,7 @@ class Lifter:
         for number in range(round(seconds / self.world.settings.time_step_s)):
             self.loop.step()
             if number % 10 == 0:
-                self.loop.watch_grasp()
+                self.loop.watch_grasps()
 
     def move_lift(self, target: float, seconds: float) -> None:
         start, begin = self.commands["lift"].command, self.world.time_ns * 1e-9

@@ -27,7 +27,7 @@ SERVICE_TIMEOUT_S = 10.0
 def held_objects() -> dict[str, str]:
     """Returns {object: link} of what is attached to links of the manipulator in the planning scene.
 
-    The links are those with a text of ``manipulator_prefix`` in their names; without that parameter, all links of the robot.
+    The links are those with a text of ``manipulator_prefix`` in their names; without that parameter, all of the robot.
 
     Raises:
         CallError: move_group does not answer.

@@ -16,8 +16,8 @@ NO_DISTANCE_M, ROUNDING = 1e-3, 1e-9
 def hand_axes(finger_centres: Array, palm_centre: Array) -> Array:
     """Returns the axes of the hand in the grasp frame.
 
-    The approach is the axis of the grasp frame that leads best from the palm to the fingers. The closing direction leads
-    from one finger to the other, across the approach, so it needs no axis of the frame.
+    The approach is the axis of the grasp frame that leads best from the palm to the fingers. The closing direction
+    leads from one finger to the other, across the approach, and need not be an axis of the frame.
 
     Args:
         finger_centres: (k, 3) centres of the outermost links of the fingers, opened, in the grasp frame [m]; k >= 2.

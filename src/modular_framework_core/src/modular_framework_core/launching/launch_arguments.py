@@ -31,7 +31,8 @@ def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
     roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False, assign_machines=False)
     values = {name: str(value) for name, value in loader.root_context.resolve_dict["arg"].items()}
     for included in _files_with_all_arguments(path):
-        given = [f"{name}:={value}" for name, value in values.items() if ":=" not in value]  # roslaunch cannot read that
+        # roslaunch cannot read a value that has an assignment in it
+        given = [f"{name}:={value}" for name, value in values.items() if ":=" not in value]
         values = argument_values(included, given) | values
     return values
 

@@ -53,7 +53,7 @@ class AcmManager:
         Args:
             matrix: Matrix of the planning scene.
             manipulator_indices: Positions of the manipulator's links in ``matrix.names``.
-            manipulator_prefix: Texts separated by spaces, one of which is in the name of each of the manipulator's links;
+            manipulator_prefix: Texts separated by spaces, one of which is in the name of each link of the manipulator;
                 used when no index is given.
 
         Returns:

@@ -20,7 +20,7 @@ class WorldTopics:
     """Publishers of the simulation; all methods are called by the loop's thread.
 
     Publishes: /clock (rosgraph_msgs/Clock), /gazebo/model_states, /gazebo/link_states, and /gazebo/grasped_object
-    (std_msgs/String, latched; empty while nothing is held; names of objects in several grippers are separated by commas).
+    (std_msgs/String, latched; empty while nothing is held; names of several objects are separated by commas).
 
     Args:
         world: What is published.
