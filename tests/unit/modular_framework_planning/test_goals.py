@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 import pytest
+from mobile_robots import robot, tool_in_cart
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.constraints.constraint_kinds import (
@@ -21,6 +22,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.regions import BoxSolid
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings
 from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planning_request import (
@@ -204,3 +206,31 @@ def test_a_joint_that_mimics_asks_its_leader() -> None:
     assert (both.below["left"], both.above["left"]) == pytest.approx((0.0, 0.0)), "the narrower range counts"
     with pytest.raises(PlanningError, match="'right' at 0.3000 asks 'left', which it mimics, to be at -0.1000"):
         JointGoal({"left": 0.025, "right": 0.3}).of_independent_joints(MIMICS)
+
+
+def test_position_only_ik_leaves_the_orientation_of_a_pose_goal_open() -> None:
+    arm = robot("fixed")  # three joints: hardly any orientation can be reached
+    there = tool_in_cart(0.5, 0.9, -0.7)[:3, 3]
+    tool = FrameOnRobot("tool", arm.joint_index("elbow") + 1, pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.4])))
+    offset = np.array([0.02, 0.0, 0.03])
+    constraints = KinematicConstraints(
+        arm,
+        (),
+        [PositionConstraint(tool, offset, WORLD, [(BoxSolid(0.001, 0.001, 0.001), pin.SE3(np.eye(3), there))])],
+        [OrientationConstraint(tool, WORLD, DOWN, np.full(3, 0.01))],
+    )
+    goal = PoseGoal("tool", constraints.pose_target(arm.default_positions()), constraints)
+    group, scene = arm.group("arm"), empty_scene(arm)
+    checker = ExactCollisionChecker(scene, group.indices)
+    motion = MotionChecker(checker, group.indices, scene.positions)
+
+    def resolved(position_only: bool) -> np.ndarray:
+        pool = KinematicsPool(arm, {"arm": KinematicsSettings(position_only=position_only)})
+        request, rng = PlanningRequest(scene, "arm", (goal,)), np.random.default_rng(1)
+        return GoalResolver(request, group, pool, checker, motion, rng).resolve()
+
+    for pan, lift, elbow in resolved(True):
+        reached = tool_in_cart(pan, lift, elbow) @ [*offset, 1.0]
+        np.testing.assert_allclose(reached[:3], there, atol=6e-4)
+    with pytest.raises(PlanningError, match="no inverse kinematics"):
+        resolved(False)

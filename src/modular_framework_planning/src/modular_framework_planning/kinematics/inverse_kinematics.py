@@ -268,7 +268,9 @@ class InverseKinematics:
             return []
         rows = found[np.argsort(np.linalg.norm(found - problem.seed, axis=1), kind="stable")]
         if rows.shape[1] > 6:
-            rows = self._approached(problem, rows)[:, : len(self.group.joints)]
+            rows = self._approached(problem, rows)
+        if rows.shape[1] > min(6, len(self.group.joints)):
+            rows = rows[:, : len(self.group.joints)]  # without those of a ball joint
             distances = np.linalg.norm(rows - problem.seed[: rows.shape[1]], axis=1)
             rows = rows[np.argsort(distances, kind="stable")]
         result = np.tile(problem.full_seed, (len(rows), 1))

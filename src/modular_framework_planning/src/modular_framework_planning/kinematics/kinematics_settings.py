@@ -20,7 +20,8 @@ class KinematicsSettings:
         search_resolution: step of the held joint of a seven-joint chain [rad].
         timeout_s: time one attempt of the numeric search may take, where a request gives none.
         attempts: how many such times.
-        position_only: whether compute_ik brings the link's origin to the position and leaves the orientation open.
+        position_only: whether compute_ik and pose goals bring the link's origin to the position and leave the
+            orientation open.
     """
 
     solver: str = ""

@@ -202,6 +202,8 @@ class GoalResolver:
         seed, allowed = self._request.scene.positions, goal.allowed
         try:
             solver = self._kinematics.solver(self._group.name)
+            if solver.settings.position_only:
+                return self._position(goal, solver)
             found = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng, self._bounds)
         except PlanningError:
             if allowed is None:
@@ -226,6 +228,27 @@ class GoalResolver:
             if self._path_constraints is None
             else f"goal: none of {len(candidates)} inverse kinematics solutions for '{goal.link}' will do; the nearest",
         )
+
+    def _position(self, goal: PoseGoal, solver: InverseKinematics) -> list[Array]:
+        """Returns free solutions that bring the goal's point to its position, whatever the orientation."""
+        seed, allowed, indices = self._request.scene.positions, goal.allowed, self._group.indices
+        point, position = np.zeros(3), goal.target.translation
+        if allowed is not None:
+            offset, frame = allowed.positions[0].offset, allowed.pose_target(seed)
+            point, position = (goal.target.inverse() * frame).act(offset), frame.act(offset)
+        found = [item[indices] for item in solver.position_solutions(goal.link, point, position, seed, math.inf)]
+        low, high = self._bounds
+        candidates = [values for values in found if ((low <= values) & (values <= high)).all()]
+        free = first_free(candidates, self._is_valid, MAX_GOAL_STATES)
+        if free:
+            return free
+        if allowed is not None:
+            return self._region(KinematicConstraints(self._model, (), allowed.positions, (), allowed.name))
+        if candidates:
+            raise self._rejection(
+                candidates[0], f"goal: every solution found for '{goal.link}' is refused; the nearest"
+            )
+        raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
 
     def _at_other_poses(self, goal: PoseGoal, allowed: KinematicConstraints, solver: InverseKinematics) -> list[Array]:
         """Returns solutions at random poses within the tolerances."""
