@@ -13,7 +13,8 @@ def choose_end_effector(model: RobotModel, group: str, name: str) -> tuple[Joint
 
     Args:
         model: the robot.
-        group: planning group; empty: the parent group of the end effector.
+        group: planning group; empty: the parent group of the end effector. Of a group that is no chain, such as two
+            arms, the smallest chain in it that moves the end effector is the arm.
         name: of the end effector; empty: the group's only one. An end effector belongs to a group that is its parent
             group, or that moves its parent link.
 
@@ -32,7 +33,7 @@ def choose_end_effector(model: RobotModel, group: str, name: str) -> tuple[Joint
         group = known[name].parent_group
     arm = model.group(group)
     fitting = [item for item in known.values() if item.parent_group == group] or [
-        item for item in known.values() if _moves(model, arm, item.parent_link)
+        item for item in known.values() if _chain_to(model, arm, item.parent_link) is not None
     ]
     if name:
         fitting = [item for item in fitting if item.name == name]
@@ -44,7 +45,17 @@ def choose_end_effector(model: RobotModel, group: str, name: str) -> tuple[Joint
             f"{f' named {name}' if name else ''}); exactly one is needed: name it, or add "
             "<end_effector> with this parent_group to the SRDF",
         )
-    return arm, fitting[0]
+    return _chain_to(model, arm, fitting[0].parent_link) or arm, fitting[0]
+
+
+def _chain_to(model: RobotModel, group: JointGroup, link: str) -> JointGroup | None:
+    """Returns the group, or the smallest group of some of its joints, that is a chain and moves a link."""
+    chains = [
+        item
+        for item in (group, *model.groups.values())
+        if set(item.joints) <= set(group.joints) and _moves(model, item, link)
+    ]
+    return group if group in chains else min(chains, key=lambda item: len(item.joints), default=None)
 
 
 def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
