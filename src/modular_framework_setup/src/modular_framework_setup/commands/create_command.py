@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command `create_robot`."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from lxml import etree
+
+from modular_framework_setup.checks.package_check import check_package
+from modular_framework_setup.config_files.robot_tree import RobotTree
+from modular_framework_setup.creation.errors import CreationError
+from modular_framework_setup.creation.package_writer import refuse_existing, write_packages
+from modular_framework_setup.creation.progress_bar import ProgressBar
+from modular_framework_setup.creation.questions import ask_name, confirm_parts
+from modular_framework_setup.creation.robot_parts import RobotParts
+from modular_framework_setup.creation.robot_plan import Choices, RobotPlan, make_plan
+from modular_framework_setup.creation.source_urdf import read_source
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Makes the packages of a robot; returns 0, or 1 when it could not."""
+    given = _parser().parse_args(arguments)
+    try:
+        return _create(given)
+    except CreationError as error:
+        print(f"create_robot: {error}", file=sys.stderr)
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="create_robot",
+        description="Makes ROBOT_robot (description, controllers) and ROBOT_moveit_config (planning configuration) "
+        "from a URDF. On a terminal it shows what it found and asks; otherwise options decide.",
+    )
+    parser.add_argument("urdf", type=Path, help="URDF or xacro file")
+    parser.add_argument("arguments", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro file")
+    parser.add_argument("--name", help="of the robot, in the packages' names; default: the URDF's")
+    parser.add_argument("--into", type=Path, default=Path(), help="folder that gets the packages; default: this one")
+    parser.add_argument(
+        "--arm",
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("BASE", "TIP"),
+        help="links; once an arm; default: found",
+    )
+    parser.add_argument(
+        "--gripper", nargs="+", action="append", default=[], metavar="LINK",
+        help="links of the fingers; once a gripper; default: found by mimic joints and pairs of equal joints",
+    )  # fmt: skip
+    parser.add_argument("--samples", type=int, default=10_000, help="random states for self collisions")
+    parser.add_argument("--seed", type=int, default=1, help="of the random states")
+    parser.add_argument("--author", default="maintainer", help="maintainer in package.xml")
+    parser.add_argument("--email", default="maintainer@example.com", help="maintainer's address in package.xml")
+    parser.add_argument("--yes", action="store_true", help="ask nothing: take what is found")
+    return parser
+
+
+def _create(given: argparse.Namespace) -> int:
+    if not given.urdf.is_file():
+        raise CreationError(f"{given.urdf} is no file; give the path of a URDF or xacro file")
+    if given.samples < 1:
+        raise CreationError(f"--samples is {given.samples}; allowed: 1 or more, 10000 is usual")
+    is_asking = not given.yes and sys.stdin.isatty()
+    choices = Choices(
+        _name(given, is_asking), [tuple(chain) for chain in given.arm], given.gripper, given.samples, given.seed,
+        given.author, given.email,
+    )  # fmt: skip
+    refuse_existing(given.into, (choices.robot_package, choices.config_package))
+    source = read_source(given.urdf, _mappings(given.arguments), choices.robot_package)
+    bar = ProgressBar("self collisions", sys.stderr)
+
+    def confirm(tree: RobotTree, parts: RobotParts) -> RobotParts:
+        return confirm_parts(tree, parts, choices) if is_asking else parts
+
+    plan = make_plan(source, choices, confirm, bar.show)
+    folders = write_packages(plan, given.into)
+    _report(plan, folders)
+    faults = check_package(folders[1])
+    for fault in faults:
+        print(fault)
+    return 1 if faults else 0
+
+
+def _mappings(arguments: Sequence[str]) -> dict[str, str]:
+    pairs = [argument.partition(":=") for argument in arguments]
+    wrong = [name for name, sign, _ in pairs if not sign]
+    if wrong:
+        raise CreationError(f"got '{wrong[0]}'; arguments of the xacro file are written NAME:=VALUE")
+    return {name: value for name, _, value in pairs}
+
+
+def _name(given: argparse.Namespace, is_asking: bool) -> str:
+    found = given.name or _name_in(given.urdf)
+    if not given.name and is_asking:
+        found = ask_name(found)
+    if not _NAME.fullmatch(found):
+        raise CreationError(f"--name is '{found}'; allowed: small letters, digits and '_', a letter first")
+    return str(found)
+
+
+def _name_in(path: Path) -> str:
+    """Returns the name the URDF gives the robot, as a package may be called."""
+    try:
+        name = etree.parse(str(path)).getroot().get("name", "")
+    except (OSError, etree.XMLSyntaxError):
+        name = ""
+    return (
+        re.sub(r"^[^a-z]+|_+$", "", re.sub(r"[^a-z0-9]+", "_", (name or path.name.partition(".")[0]).lower()))
+        or "robot"
+    )
+
+
+def _report(plan: RobotPlan, folders: Sequence[Path]) -> None:
+    for arm in plan.parts.arms:
+        hand = f", gripper {arm.gripper}" if arm.gripper else ""
+        print(f"{arm.name}: {arm.base} -> {arm.tip}, joints {', '.join(arm.joints)}{hand}")
+    for gripper in plan.parts.grippers:
+        print(f"{gripper.name}: on {gripper.palm}, driven by {gripper.driver}, fingers {', '.join(gripper.links)}")
+    off = sum(bool(verdict.reason) for verdict in plan.verdicts)
+    print(f"self collisions: {off} of {len(plan.verdicts)} pairs of links need no check")
+    for note in plan.notes:
+        print(f"note: {note}")
+    print(f"made {folders[0]} and {folders[1]}; build them, or put their folder on ROS_PACKAGE_PATH, and start")
+    print(f"    roslaunch {plan.choices.config_package} demo.launch")

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a gripper holds an object: a frame between its pads, found from the shapes of its fingers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modular_framework_planning.geometry.shapes import Mesh
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.robot_model.robot_model import LinkGeometry, RobotModel
+from modular_framework_setup.creation.named_states import with_gripper
+from modular_framework_setup.creation.robot_parts import Gripper
+
+BEHIND_TIPS = 0.25
+"""How far behind the finger tips an object is held, as a share of how far the fingers stand out of the palm."""
+
+
+def grasp_pose(model: RobotModel, gripper: Gripper, open_position: float, closed_position: float) -> Array:
+    """Returns the pose of the grasp frame in the palm's frame, shape (4, 4) [m].
+
+    Its z axis is the approach, from the palm to the finger tips; its x axis is that along which the fingers close.
+    """
+    opened, closed = (_finger_points(model, gripper, position) for position in (open_position, closed_position))
+    fingers = sorted(opened)
+    motion = np.array([opened[name].mean(axis=0) - closed[name].mean(axis=0) for name in fingers])
+    closing = _unit(motion[0] - motion[1:].mean(axis=0) if len(motion) > 1 else motion[0])
+    points = np.concatenate([opened[name] for name in fingers])
+    approach = _approach(points, closing)
+    along = points @ approach
+    held = along.max() - BEHIND_TIPS * np.ptp(along)
+    across = np.mean([_pads(opened[name], approach, held) for name in fingers], axis=0)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 2] = closing, approach
+    pose[:3, 1] = np.cross(approach, closing)
+    pose[:3, 3] = across + (held - across @ approach) * approach
+    return pose
+
+
+def approach_axis(model: RobotModel, gripper: Gripper, tip: str, open_position: float) -> Array:
+    """Returns the axis of a tip's frame that is nearest to the way from the palm to the finger tips, shape (3,)."""
+    state = with_gripper(model, model.default_positions(), gripper, open_position)
+    poses = model.link_transforms(state)
+    points = np.concatenate(list(_finger_points(model, gripper, open_position).values()))
+    way = poses[gripper.palm].rotation @ points.mean(axis=0)
+    local = poses[tip].rotation.T @ way
+    axis = np.zeros(3)
+    axis[np.argmax(np.abs(local))] = np.sign(local[np.argmax(np.abs(local))])
+    return axis
+
+
+def _approach(points: Array, closing: Array) -> Array:
+    """Returns the axis of the palm, across the closing direction, along which the fingers stand out furthest."""
+    mean = points.mean(axis=0)
+    axes = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    best = max(axes, key=lambda axis: float(mean @ axis) - abs(float(axis @ closing)) * np.linalg.norm(mean))
+    return _unit(best - (best @ closing) * closing)
+
+
+def _pads(points: Array, approach: Array, held: float) -> Array:
+    """Returns the middle of a finger's points beyond where objects are held."""
+    beyond = points[points @ approach >= held]
+    return np.asarray(0.5 * (beyond.min(axis=0) + beyond.max(axis=0)))
+
+
+def _unit(vector: Array) -> Array:
+    length = float(np.linalg.norm(vector))
+    return np.asarray(vector / length) if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+
+
+def _finger_points(model: RobotModel, gripper: Gripper, position: float) -> dict[str, Array]:
+    """Returns points on the shapes of each finger in the palm's frame, shape (n, 3) [m]."""
+    poses = model.link_transforms(with_gripper(model, model.default_positions(), gripper, position))
+    found: dict[str, list[Array]] = {}
+    above = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
+    for item in model.link_geometries:
+        if item.link in gripper.links:
+            finger = item.link
+            while above.get(finger, gripper.palm) != gripper.palm:
+                finger = above[finger]
+            frame = model.pin_model.frames[item.frame_id]
+            in_link = frame.placement.inverse() * item.placement
+            pose = poses[gripper.palm].inverse() * poses[item.link] * in_link
+            found.setdefault(finger, []).append(_points(item) @ pose.rotation.T + pose.translation)
+    return {name: np.concatenate(items) for name, items in found.items()}
+
+
+def _points(item: LinkGeometry) -> Array:
+    """Returns the vertices of a mesh, or the corners of the box around another shape."""
+    if isinstance(item.shape, Mesh):
+        return np.asarray(item.shape.vertices)
+    item.geometry.computeLocalAABB()
+    box = item.geometry.aabb_local
+    corners = np.array([box.min_, box.max_])
+    return np.array([[corners[i, 0], corners[j, 1], corners[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])

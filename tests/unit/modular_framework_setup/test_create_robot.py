@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From a bare URDF come two packages without a fault, which plan at once."""
+
+from __future__ import annotations
+
+import builtins
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import fcl
+import numpy as np
+import pinocchio
+import pybullet_data
+import pytest
+import roslaunch
+import trimesh
+import yaml
+from xacro_rospkg import expand
+
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_setup.checks.package_check import check_package
+from modular_framework_setup.commands.create_command import main
+
+PYPI = Path(pybullet_data.getDataPath())
+BARE = {"panda": PYPI / "franka_panda" / "panda.urdf", "lbr_iiwa": PYPI / "kuka_iiwa" / "model.urdf"}
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def link(name: str, size: str = "", xyz: str = "0 0 0") -> str:
+    shape = f'{INERTIAL}<collision><origin xyz="{xyz}"/><geometry><box size="{size}"/></geometry></collision>'
+    return f'<link name="{name}">{shape if size else ""}</link>'
+
+
+def joint(name: str, parent: str, child: str, xyz: str, axis: str = "0 1 0", kind: str = "revolute") -> str:
+    limit = '<limit lower="-2" upper="2" effort="10" velocity="1"/>'
+    if kind == "prismatic":
+        limit = '<limit lower="0" upper="0.04" effort="10" velocity="0.1"/>'
+    ends = f'<parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{"" if kind == "fixed" else limit}</joint>'
+
+
+def arm(prefix: str, base: str, xyz: str) -> str:
+    """Three joints and a gripper whose two fingers are not said to move together."""
+    return "".join(
+        (
+            link(f"{prefix}turret", "0.1 0.1 0.1", "0 0 0.05"),
+            link(f"{prefix}boom", "0.05 0.05 0.3", "0 0 0.2"),
+            link(f"{prefix}stick", "0.05 0.05 0.3", "0 0 0.2"),
+            link(f"{prefix}palm", "0.05 0.1 0.04", "0 0 0.02"),
+            link(f"{prefix}finger_a", "0.02 0.01 0.08", "0 0.005 0.04"),
+            link(f"{prefix}finger_b", "0.02 0.01 0.08", "0 -0.005 0.04"),
+            joint(f"{prefix}pan", base, f"{prefix}turret", xyz, "0 0 1"),
+            joint(f"{prefix}lift", f"{prefix}turret", f"{prefix}boom", "0 0 0.11"),
+            joint(f"{prefix}elbow", f"{prefix}boom", f"{prefix}stick", "0 0 0.36"),
+            joint(f"{prefix}hand", f"{prefix}stick", f"{prefix}palm", "0 0 0.36", kind="fixed"),
+            joint(f"{prefix}slide_a", f"{prefix}palm", f"{prefix}finger_a", "0 0 0.041", kind="prismatic"),
+            joint(f"{prefix}slide_b", f"{prefix}palm", f"{prefix}finger_b", "0 0 0.041", "0 -1 0", "prismatic"),
+        )
+    )
+
+
+CRANE = f'<robot name="Crane-1">{link("base", "0.2 0.2 0.1", "0 0 -0.05")}{arm("", "base", "0 0 0.01")}</robot>'
+TWINS = (
+    f'<robot name="twins">{link("base", "0.2 0.2 0.1")}{link("chest", "0.2 0.2 0.2", "0 0 0.2")}'
+    f"{joint('waist', 'base', 'chest', '0 0 0', '0 0 1')}"
+    f"{arm('left_', 'chest', '0 0.4 0.4')}{arm('right_', 'chest', '0 -0.4 0.4')}</robot>"
+)
+
+
+@dataclass(frozen=True)
+class Made:
+    """The packages of a robot."""
+
+    name: str
+    into: Path
+
+    @property
+    def config(self) -> Path:
+        return self.into / f"{self.name}_moveit_config"
+
+    def text(self) -> str:
+        """The description, with meshes by their paths."""
+        text = expand(self.into / f"{self.name}_robot/urdf/{self.name}.urdf.xacro")
+        return text.replace("package://", f"{self.into}/")
+
+    def srdf(self) -> ElementTree.Element:
+        return ElementTree.parse(self.config / f"config/{self.name}.srdf").getroot()
+
+    def states(self) -> dict[str, dict[str, float]]:
+        return {
+            f"{state.get('group')} {state.get('name')}": {
+                item.get("name", ""): float(item.get("value", "")) for item in state
+            }
+            for state in self.srdf().findall("group_state")
+        }
+
+
+def make(name: str, into: Path, *options: str) -> Made:
+    assert main([*options, "--into", str(into), "--yes"]) == 0
+    return Made(name, into)
+
+
+def write(folder: Path, text: str) -> str:
+    path = folder / "bare.urdf"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.fixture
+def package_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for packages that ROS finds."""
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}{os.pathsep}{os.environ['ROS_PACKAGE_PATH']}")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The packages of robots as PyPI has them."""
+    path = tmp_path_factory.mktemp("robots")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_PACKAGE_PATH", f"{path}{os.pathsep}{os.environ['ROS_PACKAGE_PATH']}")
+        for name, urdf in BARE.items():
+            make(name, path, str(urdf), "--samples", "250")
+        yield path
+
+
+@pytest.fixture(params=BARE)
+def bare(request: pytest.FixtureRequest, folder: Path) -> Made:
+    """One of them."""
+    return Made(request.param, folder)
+
+
+def test_a_bare_urdf_makes_packages_without_a_fault(bare: Made) -> None:
+    assert check_package(bare.config) == ()
+    arm_group = bare.srdf().find("group[@name='arm']/chain")
+    assert arm_group is not None
+    assert len(yaml.safe_load((bare.config / "config/joint_limits.yaml").read_text())["joint_limits"]) in (7, 8)
+
+
+def test_its_matrix_keeps_every_pair_that_can_collide(bare: Made) -> None:
+    """Bodies are read by trimesh and checked by FCL, at states that the command did not see."""
+    never = [
+        (item.get("link1"), item.get("link2"))
+        for item in bare.srdf().findall("disable_collisions")
+        if item.get("reason") == "Never"
+    ]
+    assert never
+    model = pinocchio.buildModelFromXML(bare.text(), mimic=True)
+    bodies = dict(collision_meshes(bare.text()))
+    data, random = model.createData(), np.random.default_rng(20)
+    lower, upper = (np.clip(limit, -np.pi, np.pi) for limit in (model.lowerPositionLimit, model.upperPositionLimit))
+    for state in random.uniform(lower, upper, size=(300, len(lower))):
+        pinocchio.framesForwardKinematics(model, data, state)
+        for name, body in bodies.items():
+            pose = data.oMf[model.getFrameId(name)]
+            body.setTransform(fcl.Transform(pose.rotation, pose.translation))
+        for one, other in never:
+            assert not fcl.collide(bodies[one], bodies[other], fcl.CollisionRequest(), fcl.CollisionResult())
+
+
+def collision_meshes(urdf: str) -> Iterator[tuple[str, fcl.CollisionObject]]:
+    """Yields the body of each link that has one, in the link's frame."""
+    for element in ElementTree.fromstring(urdf).findall("link"):
+        parts = []
+        for item in element.findall("collision"):
+            mesh = trimesh.load(item.find("geometry/mesh").get("filename"), force="mesh", process=False)  # type: ignore[union-attr]
+            origin = item.find("origin")
+            xyz, rpy = (
+                [float(word) for word in (origin.get(key, "0 0 0") if origin is not None else "0 0 0").split()]
+                for key in ("xyz", "rpy")
+            )
+            mesh.apply_transform(trimesh.transformations.compose_matrix(angles=rpy, translate=xyz))
+            parts.append(mesh)
+        if parts:
+            body, whole = fcl.BVHModel(), trimesh.util.concatenate(parts)
+            body.beginModel(len(whole.vertices), len(whole.faces))
+            body.addSubModel(whole.vertices, whole.faces)
+            body.endModel()
+            yield element.get("name", ""), fcl.CollisionObject(body)
+
+
+def test_it_can_be_launched(bare: Made) -> None:
+    loaded = roslaunch.config.load_config_default([str(bare.config / "launch/demo.launch")], None, verbose=False)
+    assert {node.type for node in loaded.nodes} >= {
+        "move_group",
+        "robot_state_publisher",
+        "joint_state_publisher",
+        "rviz",
+    }
+    assert loaded.params["/robot_description_semantic"].value.count("<group name=") == len(bare.srdf().findall("group"))
+
+
+def test_the_planner_loads_it_and_the_ready_state_points_down(bare: Made) -> None:
+    srdf = (bare.config / f"config/{bare.name}.srdf").read_text()
+    model = RobotModel(bare.text(), srdf)
+    state = model.merge(model.default_positions(), bare.states()["arm ready"])
+    assert model.bound_violations(state, range(len(state))) == []
+    pose = model.link_transforms(state)[model.group("arm").tip_link]
+    assert pose.rotation[2, 2] < -0.9
+    assert pose.translation[0] > 0.3
+    assert abs(pose.translation[1]) < 0.1
+
+
+def test_a_gripper_gets_a_grasp_frame_and_its_second_finger_follows_the_first(package_path: Path) -> None:
+    made = make("crane_1", package_path, write(package_path, CRANE), "--samples", "100")
+    assert check_package(made.config) == ()
+    chain = made.srdf().find("group[@name='arm']/chain")
+    assert chain is not None
+    assert (chain.get("base_link"), chain.get("tip_link")) == ("base", "gripper_grasp_frame")
+    assert made.states()["gripper open"] == {"slide_a": 0.04}
+    assert made.states()["gripper closed"]["slide_a"] == pytest.approx(0.0, abs=6e-4)
+    robot = ElementTree.fromstring(made.text())
+    mimic = robot.find("joint[@name='slide_b']/mimic")
+    assert mimic is not None
+    assert mimic.get("joint") == "slide_a"
+    driven = [item.get("name") for item in robot.findall("transmission/joint")]
+    assert driven == ["pan", "lift", "elbow", "slide_a"]
+    origin = robot.find("joint[@name='gripper_grasp_frame_joint']/origin")
+    assert origin is not None
+    x, y, z = map(float, origin.get("xyz", "").split())
+    assert (x, y) == pytest.approx((0.0, 0.0), abs=2e-3)
+    assert 0.08 < z < 0.12  # the fingers reach from 0.041 to 0.121
+    pair = made.srdf().find("disable_collisions[@link1='finger_a'][@link2='finger_b']")
+    assert pair is not None
+    assert pair.get("reason") == "Default"
+
+
+def test_two_arms_on_a_torso_get_groups_of_their_own(package_path: Path) -> None:
+    made = make("twins", package_path, write(package_path, TWINS), "--samples", "100")
+    assert check_package(made.config) == ()
+    groups = [item.get("name") for item in made.srdf().findall("group")]
+    assert groups == ["left_arm", "right_arm", "torso", "all_arms", "left_gripper", "right_gripper"]
+    controllers = yaml.safe_load((made.config / "config/moveit_controllers.yaml").read_text())["controller_list"]
+    assert [len(item["joints"]) for item in controllers] == [3, 3, 1, 1, 1]
+    assert len(made.srdf().findall("end_effector")) == 2
+
+
+def test_options_name_the_arm_and_the_fingers(package_path: Path) -> None:
+    source = write(package_path, CRANE)
+    options = ("--name", "boom", "--arm", "turret", "stick", "--gripper", "finger_a", "finger_b", "--samples", "50")
+    made = make("boom", package_path, source, *options)
+    chain = made.srdf().find("group[@name='arm']/chain")
+    assert chain is not None
+    assert dict(chain.attrib) == {"base_link": "turret", "tip_link": "stick"}
+
+
+def test_the_same_seed_makes_the_same_package(package_path: Path) -> None:
+    source = write(package_path, CRANE)
+    for name in ("one", "two"):
+        make("crane", package_path / name, source, "--name", "crane", "--samples", "60", "--seed", "7")
+    texts = [(package_path / name / "crane_moveit_config/config/crane.srdf").read_text() for name in ("one", "two")]
+    assert texts[0] == texts[1]
+
+
+def test_nothing_is_overwritten(package_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write(package_path, CRANE)
+    (package_path / "crane_1_robot").mkdir()
+    assert main([source, "--into", str(package_path), "--yes"]) == 1
+    assert "nothing is overwritten" in capsys.readouterr().err
+    assert list((package_path / "crane_1_robot").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "says"),
+    [
+        (CRANE, ("--arm", "base", "plam"), "link 'plam' is not in the URDF"),
+        (CRANE, ("--arm", "palm", "base"), "'base' must hang below 'palm'"),
+        (CRANE, ("--gripper", "turet"), "did you mean 'turret'?"),
+        (CRANE, ("--name", "My Robot"), "allowed: small letters"),
+        (CRANE, ("--samples", "0"), "allowed: 1 or more"),
+        (CRANE, ("speed",), "NAME:=VALUE"),
+        (CRANE.replace("<box size=", '<mesh filename="a/b.stl" size='), (), "mesh files are not found: a/b.stl"),
+        ('<robot name="r"><link name="a"/></robot>', (), "no arm is found"),
+        (CRANE.replace('lower="-2"', 'lower="low"'), (), "expected a number"),
+        (CRANE.replace("</robot>", '<link name="alone"/></robot>'), (), "2 root links (base, alone)"),
+        ("<robot>", (), "not an XML document"),
+    ],
+)
+def test_what_cannot_be_made_is_said(
+    text: str, options: tuple[str, ...], says: str, package_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([write(package_path, text), *options, "--into", str(package_path), "--yes"]) == 1
+    assert says in capsys.readouterr().err
+    assert list(package_path.glob("*_moveit_config")) == []
+
+
+def test_on_a_terminal_it_asks(package_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["asked", "", "turret", "turret stick", "", "turret stick"])
+    asked: list[str] = []
+
+    def answer(question: str) -> str:
+        asked.append(question)
+        return next(answers)
+
+    monkeypatch.setattr(builtins, "input", answer)
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
+    assert main([write(package_path, CRANE), "--into", str(package_path), "--samples", "50"]) == 0
+    assert "[crane_1]" in asked[0]
+    assert "[finger_a finger_b]" in asked[1]
+    chain = Made("asked", package_path).srdf().find("group[@name='arm']/chain")
+    assert chain is not None
+    assert chain.get("tip_link") == "stick"
