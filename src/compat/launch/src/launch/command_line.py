@@ -85,6 +85,8 @@ def _file_and_arguments(words: Sequence[str]) -> tuple[Path, dict[str, str]]:
     match names:
         case [path] if Path(path).is_file():
             return Path(path).resolve(), given
+        case [path, word, *_] if Path(path).is_file():
+            raise LaunchError(f"argument '{word}' is not of the form name:=value; allowed: {USAGE}")
         case [package, file]:
             return file_of_package(package, file), given
         case [path] if "/" in path or path.endswith((".py", ".launch", ".xml")):

@@ -48,8 +48,9 @@ def program_of_package(package: str, program: str) -> str:
 
 def programs_of_package(package: str) -> set[str]:
     """Returns the names of the executable files of a package."""
-    folders = [Path(package_share_directory(package))]
-    folders += [Path(each) / "lib" / package for each in os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if each]
+    share = Path(package_share_directory(package))
+    prefixes = [Path(each) for each in os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if each]
+    folders = [share, *(prefix / "lib" / package for prefix in [share.parent.parent, *prefixes])]
     found = set()
     for folder in folders:
         files = folder.rglob("*") if folder.is_dir() else ()

@@ -138,8 +138,7 @@ class RosProcessSession(roslaunch.pmon.ProcessListener):
             with self._lock:
                 self._running[process.name] = running
             parent.pm.register(process)
-            if not process.start():
-                raise LaunchError(f"{request.name}: the program ended at once")
+            process.start()  # one that has ended meanwhile is reported as any other
         except (roslaunch.core.RLException, roslaunch.node_args.NodeParamsException) as error:
             raise LaunchError(f"{request.name}: {error}") from error
         return running

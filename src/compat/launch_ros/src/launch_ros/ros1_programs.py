@@ -130,7 +130,7 @@ def _spawner(plan: NodePlan) -> NodePlan:
     if given.unload_on_kill or given.u:
         executable, command = "spawner", [*options, *(["--stopped"] if inactive else [])]
     else:
-        executable, command = "controller_manager", ["load" if inactive else "spawn", *options]
+        executable, command = "controller_manager", [*options, "load" if inactive else "spawn"]
     return replace(
         plan,
         package="controller_manager",
@@ -148,7 +148,7 @@ def _unspawner(plan: NodePlan) -> NodePlan:
     parser.add_argument("-c", "--controller-manager", default="controller_manager")
     given = parser.parse_args(list(plan.arguments))
     namespace = ros2_control.namespace_of_manager(given.controller_manager, plan.namespace)
-    arguments = ("kill", "--namespace", namespace, *given.controller_names)
+    arguments = ("--namespace", namespace, "kill", *given.controller_names)
     return replace(plan, executable="controller_manager", arguments=arguments)
 
 

@@ -65,7 +65,7 @@ class Node(ExecuteProcess):
             raise TypeError(f"Node: arguments is one text, '{arguments}'; allowed: a list of them; write [...]")
         super().__init__(cmd=[executable], name=exec_name, **options)
         self._package = None if package is None else normalize_to_list_of_substitutions(package)
-        self._node_name, self._namespace = name, namespace
+        self._node_name, self._namespace, self._exec_name = name, namespace, exec_name
         self._parameters = [] if parameters is None else parameters
         self._remappings = list(remappings or ())
         self._arguments = list(arguments or ())
@@ -87,8 +87,12 @@ class Node(ExecuteProcess):
         plan, own = self._plan(context)
         super().execute(context)
         request = context.requests[-1]
-        self._complete(context, request, ros1_plan(plan), own)
-        for companion in ros1_plan(plan).companions:
+        ros1 = ros1_plan(plan)
+        self._complete(context, request, ros1, own)
+        if self._exec_name is not None or not ros1.name:
+            label = name_from(plan.executable.rpartition("/")[2])
+            request.name = perform_text(context, self._exec_name) if self._exec_name is not None else label
+        for companion in ros1.companions:
             added = ProcessRequest(None, "", [], dict(request.environment), on_screen=request.on_screen)
             context.requests.append(added)
             self._complete(context, added, companion, RosArguments())
