@@ -74,6 +74,13 @@ def test_of_moveit_1_a_file_that_lists_no_controllers_is_passed_over(
     assert names(execution({**files, "fake_controllers": listing("fake")})) == ["fake"]
 
 
+def test_fake_controllers_are_not_taken_while_another_file_lists_real_ones(
+    execution: Callable[..., dict[str, Any]],
+) -> None:
+    with pytest.raises(RuntimeError, match="- arm_controllers.yaml\n - fake_controllers.yaml"):
+        execution({"fake_controllers": listing("fake"), "arm_controllers": listing("arm")})
+
+
 def test_files_of_which_none_is_meant_more_than_others_are_an_error_with_the_options(
     execution: Callable[..., dict[str, Any]],
 ) -> None:
@@ -131,17 +138,22 @@ def test_the_names_are_also_where_launch_files_of_moveit_2_look_for_them(
 
 
 def test_fake_controllers_of_moveit_1_are_run_by_the_manager_of_fake_ones(
-    execution: Callable[..., dict[str, Any]],
+    execution: Callable[..., dict[str, Any]], caplog: pytest.LogCaptureFixture
 ) -> None:
     text = "controller_list: [{name: fake_arm, type: $(arg fake_execution_type), joints: [j1]}]\n"
     parameters = execution({"fake_controllers": text})
+    assert "fake_controllers.yaml: its controllers are fake ones: motions are not executed by a robot" in caplog.text
     assert parameters["moveit_controller_manager"] == "moveit_fake_controller_manager/MoveItFakeControllerManager"
     assert parameters["controller_list"] == [{"name": "fake_arm", "type": "interpolate", "joints": ["j1"]}]
 
 
-def test_managers_of_ros2_control_have_the_names_of_ros_control(execution: Callable[..., dict[str, Any]]) -> None:
-    text = f"moveit_controller_manager: moveit_ros_control_interface/Ros2ControlManager\n{listing('arm')}"
+@pytest.mark.parametrize("controllers", ["", listing("arm")])
+def test_managers_of_ros2_control_have_the_names_of_ros_control_and_need_no_list(
+    execution: Callable[..., dict[str, Any]], controllers: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    text = f"moveit_controller_manager: moveit_ros_control_interface/Ros2ControlManager\n{controllers}"
     parameters = execution({"moveit_controllers": text})
+    assert "lists no controllers" not in caplog.text
     assert parameters["moveit_controller_manager"] == "moveit_ros_control_interface::MoveItControllerManager"
 
 

@@ -150,6 +150,14 @@ def test_a_missing_package_of_the_urdf_is_named_when_it_is_needed(make_package: 
         MoveItConfigsBuilder("r").to_moveit_configs()
 
 
+def test_a_urdf_outside_every_package_is_named_by_its_path(make_package: PackageMaker, tmp_path: Path) -> None:
+    path = tmp_path / "elsewhere.urdf"
+    path.write_text(urdf("elsewhere"))
+    config = f"moveit_setup_assistant_config: {{URDF: {{package: '', relative_path: {path}}}}}"
+    make_package({".setup_assistant": config})
+    assert links(MoveItConfigsBuilder("r").to_moveit_configs().robot_description)[0] == "elsewhere"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

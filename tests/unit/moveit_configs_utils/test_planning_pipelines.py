@@ -34,7 +34,7 @@ LAUNCH_FILE = """<launch>
   <param name="planning_plugin" value="ompl_interface/OMPLPlanner"/>
   <param name="request_adapters" value="$(arg planning_adapters)"/>
   <param name="start_state_max_bounds_error" value="$(arg start_state_max_bounds_error)"/>
-  <rosparam command="load" file="$(find r_moveit_config)/config/ompl_planning.yaml"/>
+  <rosparam command="load" file="$(dirname)/../config/ompl_planning.yaml"/>
 </launch>
 """
 
@@ -164,7 +164,7 @@ def test_a_launch_file_that_roslaunch_refuses_is_a_warning_and_the_packaged_plan
     folder = make_package(
         {
             "config/ompl_planning.yaml": "arm: {default_planner_config: RRT}\n",
-            "launch/ompl_planning_pipeline.launch.xml": LAUNCH_FILE.replace("r_moveit_config", "lost_package"),
+            "launch/ompl_planning_pipeline.launch.xml": LAUNCH_FILE.replace("$(dirname)/..", "$(find lost_package)"),
         }
     )
     pipeline = loaded(pipelines=["ompl"])["planning_pipelines"]["ompl"]
@@ -172,3 +172,12 @@ def test_a_launch_file_that_roslaunch_refuses_is_a_warning_and_the_packaged_plan
     assert f"{MOVEIT1}AddTimeOptimalParameterization" in pipeline["request_adapters"].split()
     assert pipeline["arm"] == {"default_planner_config": "RRT"}
     assert f"{folder}/launch/ompl_planning_pipeline.launch.xml: its parameters are left out" in caplog.text
+
+
+def test_an_argument_that_a_launch_file_requires_has_the_value_of_the_package(make_package: PackageMaker) -> None:
+    required = '<launch><arg name="side"/><param name="planning_plugin" value="$(arg side)/Planner"/></launch>'
+    make_package({"launch/own_planning_pipeline.launch.xml": required, "config/r.urdf": "<robot/>"})
+    builder = (
+        MoveItConfigsBuilder("r").robot_description(mappings={"side": "left"}).planning_pipelines(pipelines=["own"])
+    )
+    assert builder.to_dict()["planning_pipelines"]["own"]["planning_plugin"] == "left/Planner"

@@ -11,6 +11,7 @@ from launch_param_builder.utils import (
     load_xacro,
     load_yaml,
     package_folder,
+    parse_parameters,
     raise_if_file_not_found,
 )
 
@@ -24,5 +25,6 @@ __all__ = [
     "load_xacro",
     "load_yaml",
     "package_folder",
+    "parse_parameters",
     "raise_if_file_not_found",
 ]

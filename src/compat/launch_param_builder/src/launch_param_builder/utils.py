@@ -78,14 +78,27 @@ def load_file(file_path: Path | str) -> str:
 def load_yaml(file_path: Path | str) -> dict[str, Any]:
     """Returns the parameters in a YAML file; none for an empty one.
 
-    Entries without a value are left out and names are texts, since ROS 1's parameter server takes nothing else.
-
     Raises:
         ParameterBuilderFileNotFoundError: there is no such file.
         ParameterFileError: it is not valid YAML, or no mapping.
     """
+    return parse_parameters(load_file(file_path), file_path)
+
+
+def parse_parameters(text: str, file_path: Path | str) -> dict[str, Any]:
+    """Returns the parameters in the text of a YAML file; none for an empty one.
+
+    Entries without a value are left out and names are texts, since ROS 1's parameter server takes nothing else.
+
+    Args:
+        text: of the file.
+        file_path: the file, for messages.
+
+    Raises:
+        ParameterFileError: it is not valid YAML, or no mapping.
+    """
     try:
-        content = parse_yaml(load_file(file_path))
+        content = parse_yaml(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""

@@ -23,12 +23,12 @@ from launch_param_builder import (
     ParameterBuilder,
     ParameterBuilderFileNotFoundError,
     load_xacro,
-    load_yaml,
     package_folder,
     raise_if_file_not_found,
 )
 
 from moveit_configs_utils.moveit_configs import MoveItConfigs
+from moveit_configs_utils.package_yaml import PackageYaml
 from moveit_configs_utils.pipeline_files import OMPL, PipelineFiles
 from moveit_configs_utils.ros1_controllers import choose_controllers_file, ros1_controllers
 from moveit_configs_utils.ros1_sensors import ros1_sensors
@@ -64,6 +64,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         self._description = robot_description
         self._configs = MoveItConfigs(package_path=self._package_path)
         self._setup = read_setup_assistant_file(self._package_path)
+        self._yaml = PackageYaml(self._package_path, dict(self._setup.xacro_arguments))
         own = CONFIG / f"{robot_name}.urdf.xacro"
         self._own_urdf: Path | None = own if (self._package_path / own).is_file() else None
         if self._own_urdf is None and not self._setup.urdf_path:
@@ -96,9 +97,14 @@ class MoveItConfigsBuilder(ParameterBuilder):
         elif self._own_urdf is not None:
             path = self._package_path / self._own_urdf
         else:
-            path = package_folder(self._setup.urdf_package) / self._setup.urdf_path
+            package = self._setup.urdf_package
+            path = (package_folder(package) if package else self._package_path) / self._setup.urdf_path
+        arguments = _texts(mappings or self._setup.xacro_arguments)
+        self._yaml.arguments.update(
+            {name: value for name, value in arguments.items() if isinstance(name, str) and isinstance(value, str)}
+        )
         try:
-            text = _expanded(path, mappings or self._setup.xacro_arguments)
+            text = _expanded(path, arguments)
         except ParameterBuilderFileNotFoundError as error:
             LOGGER.warning(
                 "%s; the robot description is not loaded: somebody else has to set the parameter %s",
@@ -116,7 +122,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
             ParameterBuilderFileNotFoundError: there is no such file.
             ParameterFileError: xacro cannot expand it.
         """
-        text = _expanded(self._package_path / (file_path or self._srdf), mappings or {})
+        text = _expanded(self._package_path / (file_path or self._srdf), _texts(mappings or {}))
         self._configs.robot_description_semantic = {f"{self._description}_semantic": text}
         return self
 
@@ -149,11 +155,11 @@ class MoveItConfigsBuilder(ParameterBuilder):
             RuntimeError: several files might be meant.
         """
         path = (
-            choose_controllers_file(self._package_path / CONFIG, self._robot_name)
+            choose_controllers_file(self._package_path / CONFIG, self._robot_name, self._yaml.load)
             if file_path is None
             else self._package_path / file_path
         )
-        found = ros1_controllers(load_yaml(path), path) if path else {}
+        found = ros1_controllers(self._yaml.load(path), path) if path else {}
         self._configs.trajectory_execution = {"moveit_manage_controllers": moveit_manage_controllers, **found}
         return self
 
@@ -184,7 +190,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         path = self._package_path / (file_path or CONFIG / "sensors_3d.yaml")
         if file_path is not None:
             raise_if_file_not_found(path)
-        self._configs.sensors_3d = ros1_sensors(load_yaml(path), path) if path.is_file() else {}
+        self._configs.sensors_3d = ros1_sensors(self._yaml.load(path), path) if path.is_file() else {}
         return self
 
     def planning_pipelines(
@@ -204,7 +210,8 @@ class MoveItConfigsBuilder(ParameterBuilder):
             RuntimeError: the default is none of them.
             ParameterFileError: a pipeline has no file or no planner.
         """
-        files = PipelineFiles(self._package_path, package_folder("moveit_configs_utils") / "default_configs")
+        defaults = package_folder("moveit_configs_utils") / "default_configs"
+        files = PipelineFiles(self._package_path, defaults, self._yaml)
         loaded = files.load(files.names(load_all) if pipelines is None else pipelines, leave_out=pipelines is None)
         default = default_planning_pipeline or (OMPL if OMPL in loaded else next(iter(loaded), ""))
         if default not in loaded:
@@ -267,7 +274,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         return {**own, **self.to_moveit_configs().to_dict()} if include_moveit_configs else own
 
     def _content(self, file_path: Path | str | None, name: str) -> dict[str, Any]:
-        return load_yaml(self._package_path / (file_path or CONFIG / name))
+        return self._yaml.load(self._package_path / (file_path or CONFIG / name))
 
 
 def _if_present(load: Callable[[], object], consequence: str) -> None:
@@ -286,14 +293,17 @@ def _expanded(path: Path, mappings: Mappings) -> Any:
         ParameterFileError: xacro cannot expand it.
     """
     raise_if_file_not_found(path)
-    texts = {_text(name): _text(value) for name, value in mappings.items()}
-    if all(isinstance(item, str) for pair in texts.items() for item in pair):
-        return load_xacro(path, texts)
+    if all(isinstance(item, str) for pair in mappings.items() for item in pair):
+        return load_xacro(path, mappings)
     from launch_ros.parameter_descriptions import ParameterValue
 
     from moveit_configs_utils.substitutions import Xacro
 
-    return ParameterValue(Xacro(str(path), mappings=texts), value_type=str)
+    return ParameterValue(Xacro(str(path), mappings=mappings), value_type=str)
+
+
+def _texts(mappings: Mappings) -> dict[Any, Any]:
+    return {_text(name): _text(value) for name, value in mappings.items()}
 
 
 def _text(value: Any) -> Any:

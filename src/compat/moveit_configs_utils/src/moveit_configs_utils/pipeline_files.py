@@ -11,6 +11,7 @@ from typing import Any
 
 from launch_param_builder import ParameterFileError, load_yaml
 
+from moveit_configs_utils.package_yaml import PackageYaml
 from moveit_configs_utils.ros1_pipelines import COMPLETED, completed, ros1_pipeline
 from moveit_configs_utils.ros_launch_files import launch_file_parameters
 
@@ -27,10 +28,12 @@ class PipelineFiles:
         package: folder of the config package: `config/<name>_planning.yaml`, and in packages of MoveIt 1 also
             `launch/<name>_planning_pipeline.launch.xml`.
         defaults: folder with what serves packages that have neither.
+        yaml: loads the package's YAML files.
     """
 
     package: Path
     defaults: Path
+    yaml: PackageYaml
 
     def names(self, with_defaults: bool) -> list[str]:
         """Returns the pipelines with a YAML file in the package, then those with a packaged one."""
@@ -70,9 +73,10 @@ class PipelineFiles:
         own, launch_file, default = self._files(name)
         found: dict[str, Any] = {}
         if own.is_file():
-            found = ros1_pipeline(load_yaml(own), own)
+            found = ros1_pipeline(self.yaml.load(own), own)
         if "planning_plugin" not in found and launch_file.is_file():
-            found = completed(found, ros1_pipeline(launch_file_parameters(launch_file), launch_file), ())
+            parameters = launch_file_parameters(launch_file, self.yaml.values())
+            found = completed(found, ros1_pipeline(parameters, launch_file), ())
         if default.is_file():
             found = completed(found, ros1_pipeline(load_yaml(default), default), COMPLETED if found else ())
         if name == OMPL and "planner_configs" not in found:

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from launch_param_builder import ParameterFileError, load_yaml
+from launch_param_builder import ParameterFileError
 
 LOGGER = logging.getLogger(__name__)
 SIMPLE, FAKE = "moveit_simple_controller_manager", "moveit_fake_controller_manager"
@@ -20,23 +20,25 @@ RENAMED = {
     f"{ROS_CONTROL}/Ros2ControlManager": f"{ROS_CONTROL}::MoveItControllerManager",
     f"{ROS_CONTROL}/Ros2ControlMultiManager": f"{ROS_CONTROL}::MoveItMultiControllerManager",
 }
-CONTROLLER_TYPES = {"ParallelGripperCommand": "GripperCommand", "$(arg fake_execution_type)": "interpolate"}
+CONTROLLER_TYPES = {"ParallelGripperCommand": "GripperCommand"}
 FILE_NAME = re.compile(r"^(.*)_controllers\.yaml$")
 PUBLIC_ORDER = ("moveit", "moveit2")
 # Files of MoveIt 1's Setup Assistant, those of real controllers first; "" is controllers.yaml.
-MOVEIT1_ORDER = ("simple_moveit", "", "ros", "fake")
+MOVEIT1_ORDER = ("simple_moveit", "", "ros")
+PRETENDED = "fake"
 
 
-def choose_controllers_file(folder: Path, robot_name: str) -> Path | None:
+def choose_controllers_file(folder: Path, robot_name: str, load: Callable[[Path], Mapping[str, Any]]) -> Path | None:
     """Returns the file of a config folder that says which controllers execute motions.
 
     The only `*_controllers.yaml`; of several `moveit_`, `moveit2_` or `<robot_name>_controllers.yaml`, and, in packages
-    of MoveIt 1, the first of `simple_moveit_controllers.yaml`, `controllers.yaml`, `ros_controllers.yaml` and
-    `fake_controllers.yaml` that lists any.
+    of MoveIt 1, the first of `simple_moveit_controllers.yaml`, `controllers.yaml` and `ros_controllers.yaml` that lists
+    any, or `fake_controllers.yaml` where no other file does.
 
     Args:
         folder: the config folder.
         robot_name: name given to the builder.
+        load: loads one of the files.
 
     Returns:
         The file, or None, with a warning, where there is none of that name.
@@ -55,8 +57,9 @@ def choose_controllers_file(folder: Path, robot_name: str) -> Path | None:
     for name in (*PUBLIC_ORDER, robot_name):
         if name in files:
             return files[name]
-    for name in MOVEIT1_ORDER:
-        if name in files and lists_controllers(load_yaml(files[name])):
+    listing = [name for name, path in files.items() if lists_controllers(load(path))]
+    for name in (*MOVEIT1_ORDER, *([PRETENDED] if listing == [PRETENDED] else [])):
+        if name in listing:
             return files[name]
     options = "\n - ".join(path.name for path in files.values())
     raise RuntimeError(
@@ -95,9 +98,15 @@ def ros1_controllers(content: Mapping[str, Any], where: Path) -> dict[str, Any]:
     """
     result = dict(content)
     manager = next((name for name in PLUGINS if _listed_names(content, name)), SIMPLE)
+    plugin = str(content.get("moveit_controller_manager") or _plugin(manager, where))
+    result["moveit_controller_manager"] = plugin = RENAMED.get(plugin, plugin)
     if "controller_list" not in content and _listed_names(content, manager):
         result["controller_list"] = _controller_list(content[manager], manager, where)
     entries = _checked_list(result.get("controller_list", []), where)
+    if plugin == PLUGINS[FAKE]:
+        LOGGER.warning("%s: its controllers are fake ones: motions are not executed by a robot or a simulation", where)
+    if not entries and plugin.startswith(ROS_CONTROL):
+        return result  # it asks the controller manager which controllers there are
     if not entries:
         LOGGER.warning(
             "%s: lists no controllers (looked for controller_list and %s/controller_names): motions can be planned, "
@@ -107,10 +116,8 @@ def ros1_controllers(content: Mapping[str, Any], where: Path) -> dict[str, Any]:
         )
         return result
     result["controller_list"] = [{**entry, **_type(entry)} for entry in entries]
-    described = {str(entry["name"]): _without_name(entry) for entry in result["controller_list"]}
+    described = {str(entry["name"]): _without_name(entry) for entry in result["controller_list"] if entry["name"]}
     result.setdefault(manager, {"controller_names": list(described), **described})
-    plugin = str(content.get("moveit_controller_manager") or _plugin(manager, where))
-    result["moveit_controller_manager"] = RENAMED.get(plugin, plugin)
     return result
 
 

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import roslaunch.arg_dump
 import roslaunch.config
 import roslaunch.core
 import roslaunch.xmlloader
@@ -15,19 +17,28 @@ import rospkg
 LOGGER = logging.getLogger(__name__)
 
 
-def launch_file_parameters(path: Path) -> dict[str, Any]:
+def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, Any]:
     """Returns the parameters that a launch file of roslaunch sets with its default arguments, as nested mappings.
 
     Nothing is started, and no master is needed.
+
+    Args:
+        path: the launch file.
+        values: of arguments that have no default there.
 
     Returns:
         The parameters; none, with a warning, where roslaunch refuses the file.
     """
     config = roslaunch.config.ROSLaunchConfig()
     try:
-        roslaunch.xmlloader.XmlLoader().load(str(path), config, argv=[], verbose=False)
+        loader = roslaunch.xmlloader.XmlLoader()
+        loader.ignore_unset_args = False
+        required = [name for name, (_, default) in roslaunch.arg_dump.get_args([str(path)]).items() if default is None]
+        given = [f"{name}:={values[name]}" for name in required if name in values]
+        loader.load(str(path), config, argv=given, verbose=False)
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError, OSError) as error:
-        LOGGER.warning("%s: its parameters are left out, roslaunch cannot load it: %s", path, error)
+        reason = str(error).partition("\nROS path")[0]  # rospkg lists the whole search path behind it
+        LOGGER.warning("%s: its parameters are left out, roslaunch cannot load it: %s", path, reason)
         return {}
     result: dict[str, Any] = {}
     for name, parameter in sorted(config.params.items()):

@@ -19,8 +19,8 @@ class SetupAssistantFile:
     """What the file says; all of it may be absent.
 
     Attributes:
-        urdf_package: ROS package that holds the URDF.
-        urdf_path: of the URDF in that package.
+        urdf_package: ROS package that holds the URDF; empty for a file outside every package.
+        urdf_path: of the URDF in that package; absolute where there is none.
         xacro_arguments: arguments the URDF's xacro file is expanded with.
         srdf_path: of the SRDF in the config package.
     """
@@ -42,11 +42,11 @@ def read_setup_assistant_file(package_path: Path) -> SetupAssistantFile:
         return SetupAssistantFile()
     config = _section(load_yaml(path), "moveit_setup_assistant_config", path)
     urdf, srdf = (_section(config, key if key in config else key.upper(), path) for key in ("urdf", "srdf"))
-    if urdf and not (urdf.get("package") and urdf.get("relative_path")):
+    if urdf and not urdf.get("relative_path"):
         raise ParameterFileError(f"{path}: section urdf has {', '.join(urdf)}; needed are package and relative_path")
     return SetupAssistantFile(
         str(urdf.get("package", "")),
-        _relative(urdf),
+        _relative(urdf) if urdf.get("package") else str(urdf.get("relative_path", "")),
         _arguments(str(urdf.get("xacro_args", "")), path),
         _relative(srdf),
     )

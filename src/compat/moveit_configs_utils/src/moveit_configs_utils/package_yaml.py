@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Loads YAML files of a config package, and fills in `$(arg NAME)` as the package's launch files would.
+
+Packages of MoveIt 1 may write `$(arg arm_id)_joint1` in their YAML files: their launch files load these with
+`subst_value="true"`, and say what the argument is by default.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from launch_param_builder import load_file, parse_parameters
+
+from modular_framework_urdf.xml_text import XmlError, parse
+
+LOGGER = logging.getLogger(__name__)
+ARGUMENT = re.compile(r"\$\(arg +([^)\s]+) *\)")
+FIRST = ("planning_context.launch", "move_group.launch")  # of launch files that give an argument different defaults
+
+
+@dataclass(slots=True)
+class PackageYaml:
+    """Loads YAML files.
+
+    Attributes:
+        package: folder of the config package.
+        arguments: values that come before the defaults of its launch files.
+    """
+
+    package: Path
+    arguments: dict[str, str] = field(default_factory=dict)
+
+    def load(self, path: Path) -> dict[str, Any]:
+        """Returns the parameters in a file.
+
+        An argument that nothing gives a value stays as it is, with a warning.
+
+        Raises:
+            ParameterBuilderFileNotFoundError: there is no such file.
+            ParameterFileError: it is not valid YAML, or no mapping.
+        """
+        text = load_file(path)
+        if ARGUMENT.search(text):
+            values = self.values()
+            unknown = sorted({name for name in ARGUMENT.findall(text) if name not in values})
+            if unknown:
+                LOGGER.warning(
+                    "%s: no value for %s (looked in the xacro arguments of robot_description and in the defaults of "
+                    "launch/*); it stays as it is",
+                    path,
+                    ", ".join(f"$(arg {name})" for name in unknown),
+                )
+            text = ARGUMENT.sub(lambda match: values.get(match[1], match[0]), text)
+        return parse_parameters(text, path)
+
+    def values(self) -> dict[str, str]:
+        """Returns the values of arguments: those given, then plain defaults in the package's launch files."""
+        files = sorted(self.package.glob("launch/*.launch*"), key=lambda path: (path.name not in FIRST, path.name))
+        result = dict(self.arguments)
+        for path in files:
+            if path.suffix not in (".launch", ".xml"):
+                continue
+            try:
+                root = parse(path.read_bytes(), str(path))
+            except (XmlError, OSError) as error:
+                LOGGER.warning("%s: defaults of its arguments are not known: %s", path, error)
+                continue
+            for argument in root.findall("arg"):
+                name, default = argument.get("name"), argument.get("default")
+                if name and default is not None and "$(" not in default:
+                    result.setdefault(name, default)
+        return {"fake_execution_type": "interpolate", **result}
