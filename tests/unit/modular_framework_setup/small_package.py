@@ -48,6 +48,7 @@ SRDF = """<?xml version="1.0"?>
   <virtual_joint name="fixed_base" type="fixed" parent_frame="world" child_link="base"/>
   <passive_joint name="grip_2"/>
   <disable_collisions link1="base" link2="turret" reason="Adjacent"/>
+  <disable_collisions link1="turret" link2="boom" reason="Never"/>
 </robot>
 """
 JOINT_LIMITS = """default_velocity_scaling_factor: 0.5

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 import rospkg
+from lxml import html
 from small_package import SmallPackage
 
 from modular_framework_setup.commands.check_command import main
 
+SHAPE = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 SHIPPED = [name for name in rospkg.RosPack().list() if name.endswith("_moveit_config")]
 SRDF, LIMITS, IK = "config/crane.srdf", "config/joint_limits.yaml", "config/kinematics.yaml"
 MOVEIT, HARDWARE = "config/simple_moveit_controllers.yaml", "config/ros_controllers.yaml"
@@ -202,3 +204,36 @@ def test_values_that_launch_files_fill_in_are_understood(small: SmallPackage) ->
     assert small.faults() == ()
     small.edit(LAUNCH, 'default="arm"', 'default="am"')
     assert ["group 'am' is unknown" in fault.message for fault in small.faults()] == [True]
+
+
+def test_the_page_shows_the_robot_and_needs_no_other_file(small: SmallPackage, tmp_path: Path) -> None:
+    small.edit(LIMITS, "pan:\n", "pan:\n    has_position_limits: true\n    min_position: -1.5\n    max_position: 1.5\n")
+    small.edit("urdf", '<link name="finger_1"/>', f'<link name="finger_1">{SHAPE}</link>')
+    page = tmp_path / "robot.html"
+    assert main([str(small.folder), "--html", str(page)]) == 0
+    text = page.read_text()
+    root = html.document_fromstring(text)
+    assert not root.xpath("//@src | //@href | //link | //script")
+    assert "@import" not in text
+    assert "url(" not in text
+    matrix = root.xpath("//table[@class='matrix']")[0]
+    assert [cell.text_content() for cell in matrix.xpath(".//thead//div")] == ["turret", "boom", "finger_1"]
+    kinds = [[cell.get("class") for cell in row.xpath("td")] for row in matrix.xpath(".//tbody/tr")]
+    assert kinds[0] == ["self", "Never", "checked"]
+    assert kinds[1] == ["Never", "self", "checked"]
+    pan = root.xpath("//tr[td[1]='pan']")[0]
+    bars = [item.get("style") for item in pan.xpath(".//div[contains(@class, 'range')]")]
+    assert bars == ["left:0.0%;width:100.0%", "left:25.0%;width:50.0%"]
+    assert pan.xpath(".//div[@class='mark']/@title") == ["arm home: 0 rad"]
+    assert "No fault" in text
+
+
+def test_the_page_of_a_broken_package_lists_its_faults(small: SmallPackage, tmp_path: Path) -> None:
+    small.edit(IK, "arm:", "'<b>arn</b>':")
+    page = tmp_path / "robot.html"
+    assert main([str(small.folder), "--html", str(page)]) == 1
+    assert "&#39;&lt;b&gt;arn&lt;/b&gt;&#39; is unknown" in page.read_text()
+    small.edit("urdf", "</robot>", "")
+    assert main([str(small.folder), "--html", str(page)]) == 1
+    assert "not an XML document" in page.read_text()
+    assert main([str(small.folder), "--html", str(tmp_path / "none" / "robot.html")]) == 1

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Values
+from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_core.files.faults import Fault, FaultList
@@ -16,9 +18,31 @@ from modular_framework_setup.checks.sensor_checks import check_sensors
 from modular_framework_setup.checks.srdf_checks import check_srdf
 from modular_framework_setup.checks.urdf_checks import check_urdf
 from modular_framework_setup.config_files.config_package import ConfigPackage, packages_beside, read_config_package
-from modular_framework_setup.config_files.description_files import parse_document, read_document
+from modular_framework_setup.config_files.description_files import XmlDocument, parse_document, read_document
 from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
 from modular_framework_setup.config_files.yaml_files import is_open, load_yaml
+from modular_framework_urdf.srdf_reader import SemanticDescription, read_srdf
+from modular_framework_urdf.xml_text import XmlError
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedPackage:
+    """A config package, as far as it could be read.
+
+    Attributes:
+        tree: of its robot; None without a readable URDF.
+        semantics: groups of its SRDF; None without a readable one.
+        srdf: the whole SRDF; None without a readable one.
+        files: the YAML files, by the name of the file without its ending.
+        faults: all that is inconsistent, by file and line.
+    """
+
+    package: ConfigPackage
+    tree: RobotTree | None
+    semantics: Semantics | None
+    srdf: SemanticDescription | None
+    files: Values[str, Mapping]
+    faults: tuple[Fault, ...]
 
 
 def check_package(folder: Path) -> tuple[Fault, ...]:
@@ -30,14 +54,21 @@ def check_package(folder: Path) -> tuple[Fault, ...]:
     Returns:
         All its faults by file and line; none when it is consistent.
     """
+    return read_and_check(folder).faults
+
+
+def read_and_check(folder: Path) -> CheckedPackage:
+    """Reads and checks a config package in a folder; it need not be built."""
     faults = FaultList()
     with packages_beside(folder):
         package = read_config_package(folder, faults)
         tree = _read_robot(package, faults)
-        semantics = _read_semantics(package, tree, faults) if tree else None
-        _check_yaml_files(package, tree, semantics, faults)
+        document = _read_srdf(package, faults)
+        root = parse_document(document, faults) if document else None
+        semantics = check_srdf(root, document.where, tree, faults) if document and root is not None and tree else None
+        files = _check_yaml_files(package, tree, semantics, faults)
         check_launch_files(package, faults)
-    return faults.sorted()
+    return CheckedPackage(package, tree, semantics, _contents(document), files, faults.sorted())
 
 
 def _read_robot(package: ConfigPackage, faults: FaultList) -> RobotTree | None:
@@ -48,24 +79,32 @@ def _read_robot(package: ConfigPackage, faults: FaultList) -> RobotTree | None:
     return check_urdf(document, faults) if document else None
 
 
-def _read_semantics(package: ConfigPackage, tree: RobotTree, faults: FaultList) -> Semantics | None:
+def _read_srdf(package: ConfigPackage, faults: FaultList) -> XmlDocument | None:
     if package.srdf is None:
         return None
-    document = read_document(package.srdf, package.launch_mappings(package.srdf.name), faults)
-    root = parse_document(document, faults) if document else None
-    return None if document is None or root is None else check_srdf(root, document.where, tree, faults)
+    return read_document(package.srdf, package.launch_mappings(package.srdf.name), faults)
+
+
+def _contents(document: XmlDocument | None) -> SemanticDescription | None:
+    """Returns what the reader of the run time finds; None where it refuses the file, which a fault has said."""
+    try:
+        return read_srdf(document.text, document.where) if document else None
+    except XmlError:
+        return None
 
 
 def _check_yaml_files(
     package: ConfigPackage, tree: RobotTree | None, semantics: Semantics | None, faults: FaultList
-) -> None:
+) -> dict[str, Mapping]:
     """Checks each file by what its name says it is; files of other names must be YAML, that is all."""
+    files = {}
     arguments = {**package.launch_arguments(), **package.xacro_arguments}
     controllers = ControllerChecker(tree, semantics, faults) if tree else None
     for path in package.yaml_files():
         top = load_yaml(path, faults, arguments)
         if top is None:
             continue
+        files[path.stem] = top
         if "controllers" in path.stem or path.parent.name == "controllers":
             if controllers:
                 controllers.add_file(path.name, top)
@@ -73,6 +112,7 @@ def _check_yaml_files(
             _check_file(path, top, tree, semantics, faults)
     if controllers:
         controllers.check_together()
+    return files
 
 
 def _check_file(

@@ -57,21 +57,27 @@ def read_document(path: Path, arguments: Mapping[str, str], faults: FaultList) -
         with contextlib.redirect_stderr(words):
             return XmlDocument(expand(path, arguments), f"{path} (expanded)")
     except Exception as error:  # noqa: BLE001 - xacro evaluates Python expressions, which raise what they like
-        line = getattr(getattr(error, "exc", error), "lineno", None) or _line_of(text, str(error), error)
+        file, line = _place_of(path, str(error), error)
         reason = " ".join(str(error).split()) or type(error).__name__
-        faults.add(SourceLocation(str(path), line, 1), f"xacro fails: {reason}; mend the file, or give the argument")
+        faults.add(SourceLocation(str(file), line, 1), f"xacro fails: {reason}; mend the file, or give the argument")
         return None
 
 
-def _line_of(text: str, reason: str, error: Exception) -> int:
-    """Returns the first line of a file that has a name out of the reason of a failure, 1 when none has."""
+def _place_of(path: Path, reason: str, error: Exception) -> tuple[Path, int]:
+    """Returns where xacro failed: the first line, here or in a file beside it, that has a name out of the reason."""
+    line = getattr(getattr(error, "exc", error), "lineno", None)
+    if line:
+        return path, int(line)
     names = [error.package] if isinstance(error, PackageNotFoundError) else []
     names += [name for match in _NAMES.findall(reason) for name in match if name]
+    neighbours = sorted(item for item in path.parent.glob("*.xacro") if item != path)
     for name in names:
-        for number, line in enumerate(text.splitlines(), start=1):
-            if re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line):
-                return number
-    return 1
+        pattern = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
+        for file in (path, *neighbours):
+            for number, text in enumerate(file.read_text(errors="replace").splitlines(), start=1):
+                if pattern.search(text):
+                    return file, number
+    return path, 1
 
 
 def add_xml_error(error: XmlError, faults: FaultList) -> None:

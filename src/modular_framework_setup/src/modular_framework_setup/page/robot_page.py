@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes a config package as one HTML page: groups, joints with their limits and states, and the collision matrix."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from modular_framework_core.files.located_yaml import Mapping as YamlMapping
+from modular_framework_core.files.located_yaml import Scalar
+from modular_framework_setup.checks.package_check import CheckedPackage
+from modular_framework_setup.config_files.config_package import find_package
+from modular_framework_setup.config_files.robot_tree import PlanningGroup, RobotTree, Semantics
+from modular_framework_urdf.robot import Joint
+from modular_framework_urdf.srdf_reader import SemanticDescription
+
+REASONS = ("Adjacent", "Never", "Always", "Default")
+OTHER, CHECKED = "Other", "checked"
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A position of a named state on the bar of a joint."""
+
+    state: str
+    position: float
+    percent: float
+
+
+@dataclass(frozen=True, slots=True)
+class JointRow:
+    """A joint that moves: its range on a scale that all joints of its kind share.
+
+    Attributes:
+        unit: of positions.
+        left, width: of the bar on the scale [%].
+        zero: place of position 0 on the scale [%].
+        tight: left and width of the part that joint_limits.yaml leaves [%]; None where it tightens nothing.
+        follows: what a mimic joint does.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    lower: float | None
+    upper: float | None
+    left: float
+    width: float
+    zero: float
+    tight: tuple[float, float] | None
+    velocity: float | None
+    velocity_in_file: float | None
+    acceleration: float | None
+    effort: float | None
+    follows: str
+    groups: tuple[str, ...]
+    marks: tuple[Mark, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupRow:
+    """A planning group."""
+
+    name: str
+    ends: str
+    active: tuple[str, ...]
+    others: tuple[str, ...]
+    solver: str
+    states: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What is done with two links: one of REASONS, OTHER, CHECKED; empty for a link and itself."""
+
+    kind: str
+    text: str
+
+
+def page_text(checked: CheckedPackage) -> str:
+    """Returns a page that needs no other file.
+
+    Args:
+        checked: the package; what could not be read is left out.
+    """
+    tree = checked.tree
+    semantics, srdf = checked.semantics or Semantics(), checked.srdf or SemanticDescription("")
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(find_package("modular_framework_setup")) / "templates" / "page"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )
+    links = [link.name for link in tree.robot.links if link.collisions] if tree else []
+    cells = [[_cell(one, other, srdf) for other in links] for one in links]
+    kinds = [cell.kind for number, row in enumerate(cells) for cell in row[:number]]
+    return environment.get_template("robot.html.jinja").render(
+        package=checked.package.name,
+        robot=tree.robot.name if tree else "",
+        faults=checked.faults,
+        groups=[_group_row(group, checked, srdf) for group in semantics.groups.values()],
+        joints=_joint_rows(tree, checked, semantics, srdf) if tree else [],
+        states=srdf.group_states,
+        effectors=srdf.end_effectors,
+        virtual_joints=srdf.virtual_joints,
+        links=links,
+        cells=cells,
+        counts={kind: kinds.count(kind) for kind in (*REASONS, OTHER, CHECKED)},
+    )
+
+
+def _cell(one: str, other: str, srdf: SemanticDescription) -> Cell:
+    if one == other:
+        return Cell("", one)
+    pair = frozenset((one, other))
+    if pair in srdf.disabled_pairs and pair not in srdf.enabled_pairs:
+        reason = srdf.disabled_pairs[pair]
+        return Cell(reason if reason in REASONS else OTHER, f"{one} – {other}: not checked, {reason or 'no reason'}")
+    if set(srdf.touching_links) & pair and pair not in srdf.enabled_pairs:
+        return Cell(OTHER, f"{one} – {other}: not checked, disable_default_collisions")
+    return Cell(CHECKED, f"{one} – {other}: checked")
+
+
+def _value(node: Any, *keys: str) -> Any:
+    """Returns a value of a YAML file; None where it is not there."""
+    for key in keys:
+        node = node.entries.get(key) if isinstance(node, YamlMapping) else None
+    return node.value if isinstance(node, Scalar) else None
+
+
+def _number(node: Any, *keys: str) -> float | None:
+    value = _value(node, *keys)
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _group_row(group: PlanningGroup, checked: CheckedPackage, srdf: SemanticDescription) -> GroupRow:
+    spec = srdf.groups.get(group.name)
+    chains = [f"{base} → {tip}" for base, tip in spec.chains] if spec else []
+    parts = [*chains, *(f"group {name}" for name in spec.subgroups)] if spec else []
+    return GroupRow(
+        group.name,
+        ", ".join(parts),
+        group.active,
+        tuple(sorted(group.joints - set(group.active))),
+        str(_value(checked.files.get("kinematics"), group.name, "kinematics_solver") or ""),
+        tuple(srdf.group_states.get(group.name, {})),
+    )
+
+
+def _joint_rows(
+    tree: RobotTree, checked: CheckedPackage, semantics: Semantics, srdf: SemanticDescription
+) -> list[JointRow]:
+    joints = list(tree.robot.movable_joints())
+    slides = [joint for joint in joints if joint.kind == "prismatic"]
+    slide_scale, turn_scale = _scale(slides), _scale([joint for joint in joints if joint not in slides])
+    limits = checked.files.get("joint_limits")
+    return [
+        _joint_row(joint, slide_scale if joint in slides else turn_scale, limits, semantics, srdf.group_states)
+        for joint in joints
+    ]
+
+
+def _scale(joints: Sequence[Joint]) -> tuple[float, float]:
+    """Returns the lowest and highest position of some joints; a turn to each side for one without an end."""
+    ends = [_range(joint) for joint in joints]
+    return min((low for low, _ in ends), default=0.0), max((high for _, high in ends), default=1.0)
+
+
+def _range(joint: Joint) -> tuple[float, float]:
+    if joint.kind == "continuous" or joint.limit is None:
+        return -math.pi, math.pi
+    return joint.limit.lower, joint.limit.upper
+
+
+def _joint_row(
+    joint: Joint,
+    scale: tuple[float, float],
+    limits: YamlMapping | None,
+    semantics: Semantics,
+    states: Mapping[str, Mapping[str, Mapping[str, float]]],
+) -> JointRow:
+    low, high = _range(joint)
+    length = max(scale[1] - scale[0], 1e-9)
+
+    def percent(position: float) -> float:
+        return round(100.0 * min(max((position - scale[0]) / length, 0.0), 1.0), 2)
+
+    has_end = joint.kind != "continuous" and joint.limit is not None
+    entry = ("joint_limits", joint.name)
+    tight_low, tight_high = _number(limits, *entry, "min_position"), _number(limits, *entry, "max_position")
+    tight = (max(low, low if tight_low is None else tight_low), min(high, high if tight_high is None else tight_high))
+    return JointRow(
+        joint.name,
+        joint.kind,
+        "m" if joint.kind == "prismatic" else "rad",
+        low if has_end else None,
+        high if has_end else None,
+        percent(low),
+        round(percent(high) - percent(low), 2),
+        percent(0.0),
+        (percent(tight[0]), round(percent(tight[1]) - percent(tight[0]), 2)) if tight != (low, high) else None,
+        joint.limit.velocity if joint.limit else None,
+        _number(limits, *entry, "max_velocity"),
+        _number(limits, *entry, "max_acceleration"),
+        joint.limit.effort if joint.limit else None,
+        f"{joint.mimic.multiplier:g} × {joint.mimic.leader} + {joint.mimic.offset:g}" if joint.mimic else "",
+        tuple(name for name, group in semantics.groups.items() if joint.name in group.active),
+        tuple(
+            Mark(f"{group} {name}", positions[joint.name], percent(positions[joint.name]))
+            for group, named in states.items()
+            for name, positions in named.items()
+            if joint.name in positions
+        ),
+    )
