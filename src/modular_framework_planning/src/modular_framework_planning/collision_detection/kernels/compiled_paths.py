@@ -104,31 +104,107 @@ def _write_reach(vertices, numbers, low, high, first, last, reach):  # type: ign
             reach[1, joint] = max(reach[1, joint], vertices[vertex, joint])
 
 
+class Stretch(NamedTuple):
+    """What is known about a stretch of a path and the sample in its middle.
+
+    Attributes:
+        placements: poses of the joints at the sample, shape (joints, 3, 4).
+        poses: of the bodies at the sample, shape (b, 3, 4).
+        centres: of the spheres around the bodies at the sample, shape (b, 3).
+        axes: point and direction of each joint's axis at the sample, shape (joints, 6).
+        still: least and largest positions at the sample, shape (2, joints).
+        reach: least and largest positions on the stretch, shape (2, joints).
+        change: how far each joint moves at most from the sample to either end, shape (joints,).
+        motions: how far a point of each body moves at most meanwhile [m]; shape (b,).
+        rows: working memory, shape (3, joints).
+    """
+
+    placements: Array
+    poses: Array
+    centres: Array
+    axes: Array
+    still: Array
+    reach: Array
+    change: Array
+    motions: Array
+    rows: Array
+
+
 @njit(cache=True, nogil=True)
-def _motion_of(parents, prismatic, axes, placements, change, sphere, joint, until):  # type: ignore[no-untyped-def]
+def _new_stretch(joints, bodies):  # type: ignore[no-untyped-def]
+    placements, poses, centres = np.empty((joints, 3, 4)), np.empty((bodies, 3, 4)), np.empty((bodies, 3))
+    axes, still, reach = np.empty((joints, 6)), np.empty((2, joints)), np.empty((2, joints))
+    change, motions, rows = np.empty(joints), np.zeros(bodies), np.empty((3, joints))
+    return Stretch(placements, poses, centres, axes, still, reach, change, motions, rows)
+
+
+@njit(cache=True, nogil=True)
+def _look_at(world, samples, low, high, begins, stretch):  # type: ignore[no-untyped-def]
+    """Places the bodies at the sample in the middle of two others, and bounds their motion to these.
+
+    Args:
+        world: what is checked.
+        samples: of the path.
+        low: the first of the two samples.
+        high: the last of them.
+        begins: whether this is the first sample looked at; only then are bodies of the world placed.
+        stretch: filled; what bounds the motion only where low and high differ.
+    """
+    numbers, middle, still, hangs_on = samples.numbers, (low + high) // 2, stretch.still, world.joints
+    write_row(samples.vertices, numbers, middle, still[0])
+    still[1] = still[0]
+    joint_placements(world.tree, still[0], stretch.placements)
+    place_bodies(world, stretch.placements, stretch.poses, stretch.centres, begins)
+    if low == high:
+        return
+    begun, ended, row, change, axes = stretch.rows[0], stretch.rows[1], stretch.rows[2], stretch.change, stretch.axes
+    write_row(samples.vertices, numbers, low, begun)
+    write_row(samples.vertices, numbers, high, ended)
+    _write_reach(samples.vertices, numbers, low, high, begun, ended, stretch.reach)
+    write_row(samples.travelled, numbers, low, begun)
+    write_row(samples.travelled, numbers, high, ended)
+    write_row(samples.travelled, numbers, middle, row)
+    for joint in range(len(change)):
+        change[joint] = max(row[joint] - begun[joint], ended[joint] - row[joint])
+    _write_axes(world.tree.axes, world.tree.prismatic, stretch.placements, axes)
+    parents, centres, spheres = world.tree.parents, stretch.centres, world.spheres
+    for body in range(len(hangs_on)):
+        if hangs_on[body] >= 0:
+            stretch.motions[body] = _motion_of(parents, axes, change, centres, spheres, body, hangs_on[body], -1)
+
+
+@njit(cache=True, nogil=True)
+def _write_axes(directions, prismatic, placements, out):  # type: ignore[no-untyped-def]
+    """Writes a point and the direction of each joint's axis; the direction is not a number where a joint slides."""
+    for joint in range(len(out)):
+        a, b, c = directions[joint, 0], directions[joint, 1], directions[joint, 2]
+        for row in range(3):
+            pose = placements[joint, row]
+            out[joint, row] = pose[3]
+            out[joint, 3 + row] = np.nan if prismatic[joint] else pose[0] * a + pose[1] * b + pose[2] * c
+
+
+@njit(cache=True, nogil=True)
+def _motion_of(parents, axes, change, centres, spheres, body, joint, until):  # type: ignore[no-untyped-def]
     """Bounds how far a point of a body moves [m], seen from the joint `until`, when every joint changes by `change`.
 
     Going from the body's joint to the base, the distance of the body (a sphere) from each axis can grow by what the
     joints already passed can move it.
     """
-    centre_x, centre_y, centre_z, radius = sphere
     moved = 0.0
     while joint != until:
         if change[joint] > 0.0:
-            if prismatic[joint]:
+            ax, ay, az = axes[joint, 3], axes[joint, 4], axes[joint, 5]
+            if np.isnan(ax):
                 moved += change[joint]
             else:
-                a, b, c = axes[joint, 0], axes[joint, 1], axes[joint, 2]
-                ax = placements[joint, 0, 0] * a + placements[joint, 0, 1] * b + placements[joint, 0, 2] * c
-                ay = placements[joint, 1, 0] * a + placements[joint, 1, 1] * b + placements[joint, 1, 2] * c
-                az = placements[joint, 2, 0] * a + placements[joint, 2, 1] * b + placements[joint, 2, 2] * c
                 x, y, z = (
-                    centre_x - placements[joint, 0, 3],
-                    centre_y - placements[joint, 1, 3],
-                    centre_z - placements[joint, 2, 3],
+                    centres[body, 0] - axes[joint, 0],
+                    centres[body, 1] - axes[joint, 1],
+                    centres[body, 2] - axes[joint, 2],
                 )
                 reach = np.sqrt((ay * z - az * y) ** 2 + (az * x - ax * z) ** 2 + (ax * y - ay * x) ** 2)
-                moved += change[joint] * (reach + radius + moved)
+                moved += change[joint] * (reach + spheres[body, 3] + moved)
         joint = parents[joint]
     return moved
 
@@ -145,26 +221,20 @@ def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _first_within(travelled, numbers, near, far, reference, change, share, row):  # type: ignore[no-untyped-def]
-    """Returns the sample farthest from `near`, towards `far`, where no joint has gone further than a share of `change`.
+def _certified(samples, near, far, change, rows):  # type: ignore[no-untyped-def]
+    """Returns the sample farthest from `near`, towards `far`, where no joint has gone further than `change`.
 
-    Args:
-        travelled: how far each joint has gone at the vertices, shape (n, joints).
-        numbers: sample at each vertex.
-        near: the sample that is certified.
-        far: the sample where the search ends.
-        reference: the travel at the certified sample.
-        change: how far each joint may have gone where share is 1.
-        share: of the change.
-        row: working memory.
+    The last argument is working memory, shape (2, joints) at least.
     """
+    travelled, numbers, begun, row = samples.travelled, samples.numbers, rows[0], rows[1]
+    write_row(travelled, numbers, near, begun)
     write_row(travelled, numbers, far, row)
-    if _is_within(row, reference, change, share):
+    if _is_within(row, begun, change):
         return far
     while abs(far - near) > 1:
         middle = (near + far) // 2
         write_row(travelled, numbers, middle, row)
-        if _is_within(row, reference, change, share):
+        if _is_within(row, begun, change):
             near = middle
         else:
             far = middle
@@ -172,9 +242,9 @@ def _first_within(travelled, numbers, near, far, reference, change, share, row):
 
 
 @njit(cache=True, nogil=True)
-def _is_within(one, other, change, share):  # type: ignore[no-untyped-def]
+def _is_within(one, other, change):  # type: ignore[no-untyped-def]
     for joint in range(len(change)):  # noqa: SIM110 - numba compiles no generator
-        if abs(one[joint] - other[joint]) > share * change[joint]:
+        if abs(one[joint] - other[joint]) > change[joint]:
             return False
     return True
 
@@ -189,6 +259,18 @@ def _table_says(world, tables, table_joints, table_of, pair, reach):  # type: ig
 
 
 @njit(cache=True, nogil=True)
+def _with_room(rows, count):  # type: ignore[no-untyped-def]
+    """Returns an array that begins with the same rows and has at least `count`."""
+    if count <= len(rows):
+        return rows
+    larger = np.empty((max(count, 2 * len(rows)), *rows.shape[1:]), rows.dtype)
+    larger[: len(rows)] = rows
+    return larger
+
+
+# What is done to each pair stands in the loop, on single arrays: numba counts references to every array of a tuple in
+# a call, which costs more than most of what is asked about a pair.
+@njit(cache=True, nogil=True)
 def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def]
     """Checks samples of a path; those within the clearance of a looked-at sample are not looked at.
 
@@ -200,76 +282,43 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
 
     Returns:
         (status, number): TOUCHING with the number of a sample that touches; TOO_CLOSE with the number of undecided
-        entries, one more than fit when they do not fit; CLEAR with the number of samples looked at.
+        entries, more than n when they do not fit; CLEAR with the number of samples looked at.
     """
-    vertices, numbers, travelled = samples.vertices, samples.numbers, samples.travelled
-    last, joints, bodies = numbers[-1], vertices.shape[1], len(world.joints)
-    # a call that is handed the whole world costs more than most of what is asked here: hence single arrays
-    parents, prismatic, axes, hangs_on = world.tree.parents, world.tree.prismatic, world.tree.axes, world.joints
     pairs, margins, spheres, kinds, sizes = world.pairs, world.margins, world.spheres, world.kinds, world.sizes
     tables, table_joints, table_of = world.tables, world.table_joints, world.table_of
-    placements, poses, centres = np.empty((joints, 3, 4)), np.empty((bodies, 3, 4)), np.empty((bodies, 3))
-    relative, change, motions = np.empty((3, 4)), np.empty(joints), np.zeros(bodies)
-    state, begun, ended, row = np.empty(joints), np.empty(joints), np.empty(joints), np.empty(joints)
-    reach, still = np.empty((2, joints)), np.empty((2, joints))
+    parents, hangs_on, relative = world.tree.parents, world.joints, np.empty((3, 4))
+    stretch = _new_stretch(samples.vertices.shape[1], len(hangs_on))
+    _, poses, centres, axes, still, reach, change, motions, rows = stretch
     ranges = np.empty((64, 4), np.int64)  # first sample, last sample, and their pairs' indices in `active`
-    active = np.arange(4 * len(pairs) + 16)
-    used = len(pairs)
-    ranges[0] = last, last, 0, used
-    ranges[1] = first, last - 1, 0, used
+    active, used, last = np.arange(4 * len(pairs) + 16), len(pairs), samples.numbers[-1]
+    ranges[0], ranges[1] = (last, last, 0, used), (first, last - 1, 0, used)
     head, tail, looked_at, open_questions = 0, 2, 0, 0
     while head < tail:
         low, high, begin, end = ranges[head, 0], ranges[head, 1], ranges[head, 2], ranges[head, 3]
         head += 1
         if low > high:
             continue
-        middle = (low + high) // 2
-        write_row(vertices, numbers, middle, state)
-        still[0], still[1] = state, state
-        if low < high:
-            write_row(vertices, numbers, low, begun)
-            write_row(vertices, numbers, high, ended)
-            _write_reach(vertices, numbers, low, high, begun, ended, reach)
-            write_row(travelled, numbers, low, begun)
-            write_row(travelled, numbers, high, ended)
-            write_row(travelled, numbers, middle, row)
-            for joint in range(joints):
-                change[joint] = max(row[joint] - begun[joint], ended[joint] - row[joint])
-        joint_placements(world.tree, state, placements)
-        place_bodies(world, placements, poses, centres, looked_at == 0)
-        for body in range(bodies):
-            if low < high and hangs_on[body] >= 0:
-                sphere = centres[body, 0], centres[body, 1], centres[body, 2], spheres[body, 3]
-                motions[body] = _motion_of(parents, prismatic, axes, placements, change, sphere, hangs_on[body], -1)
+        middle, moves, kept, share = (low + high) // 2, low < high, used, 1.0
+        _look_at(world, samples, low, high, looked_at == 0, stretch)
         looked_at += 1
-        if used + end - begin > len(active):
-            larger = np.empty(2 * len(active), active.dtype)
-            larger[:used] = active[:used]
-            active = larger
-        kept, share = used, 1.0
+        active = _with_room(active, used + end - begin)
         for index in range(begin, end):
             pair = active[index]
             if table_of[pair] >= 0:
-                if low < high and _table_says(world, tables, table_joints, table_of, pair, reach) == APART:
+                if moves and _table_says(world, tables, table_joints, table_of, pair, reach) == APART:
                     continue
                 if _table_says(world, tables, table_joints, table_of, pair, still) == APART:
-                    if low < high:
-                        active[kept] = pair
-                        kept += 1
-                        share = 0.0
+                    active[kept] = pair
+                    kept, share = kept + 1, 0.0
                     continue
-            one, two = pairs[pair, 0], pairs[pair, 1]
-            needed = 2.0 * ROUNDING
-            if low < high:
+            one, two, needed = pairs[pair, 0], pairs[pair, 1], 2.0 * ROUNDING
+            if moves:
                 common = _common_joint(parents, hangs_on[one], hangs_on[two])
                 if common < 0:
                     needed += motions[one] + motions[two]
                 else:
-                    for body in (one, two):
-                        sphere = centres[body, 0], centres[body, 1], centres[body, 2], spheres[body, 3]
-                        needed += _motion_of(
-                            parents, prismatic, axes, placements, change, sphere, hangs_on[body], common
-                        )
+                    needed += _motion_of(parents, axes, change, centres, spheres, one, hangs_on[one], common)
+                    needed += _motion_of(parents, axes, change, centres, spheres, two, hangs_on[two], common)
             if centre_gap(centres, one, two) - spheres[one, 3] - spheres[two, 3] - margins[pair] >= needed:
                 continue
             if kinds[two] != SURFACE:
@@ -281,29 +330,20 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
             if status == TOUCHING:
                 return TOUCHING, middle
             if status == TOO_CLOSE:
-                if open_questions >= len(undecided):
-                    return TOO_CLOSE, open_questions + 1
-                undecided[open_questions, 0], undecided[open_questions, 1] = middle, pair
+                if open_questions < len(undecided):
+                    undecided[open_questions] = middle, pair
                 open_questions += 1
             if bound < needed:
                 active[kept] = pair
-                kept += 1
-                share = min(share, bound / needed)
-        if len(vertices) == 1 and surrounded_pair(world, poses, centres) >= 0:  # a path would cross the surface
+                kept, share = kept + 1, min(share, bound / needed)
+        if len(samples.vertices) == 1 and surrounded_pair(world, poses, centres) >= 0:  # a path would cross the surface
             return TOUCHING, middle
-        if kept == used or low == high:
-            continue
-        write_row(travelled, numbers, middle, begun)
-        below = _first_within(travelled, numbers, middle, low, begun, change, share, row) - 1
-        above = _first_within(travelled, numbers, middle, high, begun, change, share, row) + 1
-        if tail + 2 > len(ranges):
-            longer = np.empty((2 * len(ranges), 4), ranges.dtype)
-            longer[:tail] = ranges[:tail]
-            ranges = longer
-        ranges[tail] = low, below, used, kept
-        ranges[tail + 1] = above, high, used, kept
-        tail += 2
-        used = kept
+        if moves and kept > used:
+            change *= share
+            ranges = _with_room(ranges, tail + 2)
+            ranges[tail] = low, _certified(samples, middle, low, change, rows) - 1, used, kept
+            ranges[tail + 1] = _certified(samples, middle, high, change, rows) + 1, high, used, kept
+            tail, used = tail + 2, kept
     return (TOO_CLOSE, open_questions) if open_questions else (CLEAR, looked_at)
 
 
