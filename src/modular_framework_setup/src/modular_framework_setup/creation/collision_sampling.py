@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -69,9 +69,14 @@ class CollisionSampling:
 
     def distance(self, pair: Pair, positions: Array) -> float:
         """Returns the distance of two links at a state [m]; 0 or less when they touch."""
+        return self.least_distance((pair,), positions)
+
+    def least_distance(self, pairs: Sequence[Pair], positions: Array) -> float:
+        """Returns the distance of the closest of some pairs at a state [m]; 0 or less when one touches."""
         pin.updateGeometryPlacements(self.model.pin_model, self._data, self._geometry, self._geometry_data, positions)
         return min(
             float(pin.computeDistance(self._geometry, self._geometry_data, number).min_distance)
+            for pair in pairs
             for number in self._members[pair]
         )
 

@@ -28,7 +28,8 @@ def grasp_pose(model: RobotModel, gripper: Gripper, open_position: float, closed
     approach = _approach(points, closing)
     along = points @ approach
     held = along.max() - BEHIND_TIPS * np.ptp(along)
-    across = np.mean([_pads(opened[name], approach, held) for name in fingers], axis=0)
+    pads = [pad for name in fingers if (pad := _pads(opened[name], approach, held)) is not None]
+    across = np.mean(pads, axis=0)
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 2] = closing, approach
     pose[:3, 1] = np.cross(approach, closing)
@@ -56,9 +57,11 @@ def _approach(points: Array, closing: Array) -> Array:
     return _unit(best - (best @ closing) * closing)
 
 
-def _pads(points: Array, approach: Array, held: float) -> Array:
-    """Returns the middle of a finger's points beyond where objects are held."""
+def _pads(points: Array, approach: Array, held: float) -> Array | None:
+    """Returns the middle of a finger's points beyond where objects are held; None when it does not reach there."""
     beyond = points[points @ approach >= held]
+    if not len(beyond):
+        return None
     return np.asarray(0.5 * (beyond.min(axis=0) + beyond.max(axis=0)))
 
 

@@ -15,7 +15,7 @@ from modular_framework_setup.creation.robot_parts import Arm, Gripper
 
 TOUCHING_M = 5.0e-4
 """Fingers this close hold nothing between them."""
-STATES, STEPS, POSES = 2000, 600, 81
+STATES, STEPS, POSES = 2000, 600, 21
 REACH_SHARE, HEIGHT_SHARE = 0.55, 0.35
 """Where the tip is held, in front of the base and above it, as shares of how far the arm reaches."""
 
@@ -31,7 +31,7 @@ def gripper_states(sampling: CollisionSampling, gripper: Gripper) -> tuple[float
 
     def gap(position: float) -> float:
         state = with_gripper(model, model.default_positions(), gripper, position)
-        return min(sampling.distance(pair, state) for pair in pairs)
+        return sampling.least_distance(pairs, state)
 
     positions = np.linspace(lower, upper, POSES)
     gaps = np.array([gap(position) for position in positions])

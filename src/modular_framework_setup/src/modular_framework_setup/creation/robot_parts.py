@@ -263,17 +263,15 @@ def _carries(tree: RobotTree, link: str, ends: Sequence[tuple[str, str]]) -> boo
 
 
 def tip_of(tree: RobotTree, link: str) -> str:
-    """Returns the frame at the end of a link: a link without a shape that is fixed to it, else the link itself."""
-    frames = [
+    """Returns the frame at the end of a link: one fixed to it that is called a flange or has no shape, else itself."""
+    fixed = [
         joint.child
         for joint in below(tree, link)
-        if not tree.children(joint.child)
-        and not tree.links[joint.child].collisions
-        and not tree.links[joint.child].visuals
-        and all(item.kind == "fixed" for item in tree.chain(link, joint.child) or ())
+        if not tree.children(joint.child) and all(item.kind == "fixed" for item in tree.chain(link, joint.child) or ())
     ]
     for word in FLANGES:
-        for name in frames:
+        for name in fixed:
             if name == word or name.endswith(f"_{word}"):
                 return name
+    frames = [name for name in fixed if not tree.links[name].collisions and not tree.links[name].visuals]
     return frames[-1] if frames else link

@@ -15,11 +15,11 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_setup.config_files.config_package import find_package
 from modular_framework_setup.config_files.robot_tree import RobotTree
-from modular_framework_setup.creation.collision_sampling import CollisionSampling
+from modular_framework_setup.creation.collision_sampling import CollisionSampling, Pair
 from modular_framework_setup.creation.errors import CreationError
 from modular_framework_setup.creation.grasp_frame import approach_axis, grasp_pose
 from modular_framework_setup.creation.named_states import gripper_states, ready_state, with_gripper
-from modular_framework_setup.creation.robot_parts import Arm, Gripper, RobotParts, find_parts, tip_of
+from modular_framework_setup.creation.robot_parts import Arm, Gripper, RobotParts, find_parts
 from modular_framework_setup.creation.self_collisions import Hand, PairVerdict, Progress, find_verdicts
 from modular_framework_setup.creation.source_urdf import SourceUrdf
 from modular_framework_setup.creation.urdf_completion import add_frame, complete_urdf
@@ -31,6 +31,8 @@ from modular_framework_urdf.xml_text import XmlError
 SEGMENT_RAD = 0.05  # between two states that a planner checks on its way
 ACCELERATION_PER_VELOCITY = 2.0  # full speed in half a second
 
+Ends = Mapping[str, tuple[float, float]]
+"""Of each gripper by name: the positions of its driver in which it is open and closed [rad or m]."""
 ConfirmParts = Callable[[RobotTree, RobotParts], RobotParts]
 """Shows what was found to a person, and returns what they want."""
 
@@ -124,9 +126,11 @@ def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progr
         raise CreationError(f"{source.path}: {len(tree.roots)} root links ({', '.join(tree.roots)}); one is needed")
     parts = confirm(tree, find_parts(tree, choices.chains, choices.fingers))
     notes = complete_urdf(source.root, tree, parts.grippers)
-    parts = _with_grasp_frames(source, choices, parts)
     model = _model(source, choices)
-    verdicts = find_verdicts(model, _hands(model, parts), choices.samples, choices.seed, progress)
+    ends = _gripper_ends(model, parts)
+    parts = _with_grasp_frames(source, model, parts, ends)
+    model = _model(source, choices)
+    verdicts = find_verdicts(model, _hands(model, parts, ends), choices.samples, choices.seed, progress)
     disabled = [verdict.pair for verdict in verdicts if verdict.reason]
     return RobotPlan(
         choices,
@@ -134,7 +138,7 @@ def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progr
         source.copies,
         tree.roots[0],
         parts,
-        _states(model, parts, disabled, choices.seed),
+        _states(model, parts, ends, disabled, choices.seed),
         verdicts,
         {name: _moved_joint(model, name) for name in _moved(parts)},
         {arm.name: _segment_fraction(model, arm.joints) for arm in parts.arms},
@@ -162,29 +166,30 @@ def _model(source: SourceUrdf, choices: Choices) -> RobotModel:
         raise CreationError(f"{source.path}: {error}") from error
 
 
-def _with_grasp_frames(source: SourceUrdf, choices: Choices, parts: RobotParts) -> RobotParts:
+def _gripper_ends(model: RobotModel, parts: RobotParts) -> dict[str, tuple[float, float]]:
+    """Returns the positions of each gripper's driver in which it is open and closed [rad or m]."""
+    sampling = CollisionSampling(model)
+    return {gripper.name: gripper_states(sampling, gripper) for gripper in parts.grippers}
+
+
+def _with_grasp_frames(source: SourceUrdf, model: RobotModel, parts: RobotParts, ends: Ends) -> RobotParts:
     """Adds a frame between the pads of each gripper that has none, and makes it the tip of its arm."""
-    tree, arms = _tree(source), []
-    sampling = None
+    arms = []
     for arm in parts.arms:
         gripper = parts.gripper_of(arm)
-        if gripper is not None and arm.tip == gripper.palm:
-            sampling = sampling or CollisionSampling(_model(source, choices))
-            if tip_of(tree, gripper.palm) == gripper.palm and _has_fingers(sampling.model, gripper):
-                frame = f"{gripper.name}_grasp_frame"
-                opened, closed = gripper_states(sampling, gripper)
-                add_frame(source.root, frame, gripper.palm, grasp_pose(sampling.model, gripper, opened, closed))
-                arm = replace(arm, tip=frame)
+        if gripper is not None and arm.tip == gripper.palm and _has_fingers(model, gripper):
+            frame = f"{gripper.name}_grasp_frame"
+            add_frame(source.root, frame, gripper.palm, grasp_pose(model, gripper, *ends[gripper.name]))
+            arm = replace(arm, tip=frame)
         arms.append(arm)
     return replace(parts, arms=tuple(arms))
 
 
-def _hands(model: RobotModel, parts: RobotParts) -> list[Hand]:
-    sampling = CollisionSampling(model)
+def _hands(model: RobotModel, parts: RobotParts, ends: Ends) -> list[Hand]:
     return [
         Hand(
             frozenset((item.palm, *item.links)),
-            tuple(with_gripper(model, model.default_positions(), item, at) for at in gripper_states(sampling, item)),
+            tuple(with_gripper(model, model.default_positions(), item, position) for position in ends[item.name]),
         )
         for item in parts.grippers
     ]
@@ -215,23 +220,24 @@ def _segment_fraction(model: RobotModel, joints: Sequence[str]) -> float:
 
 
 def _states(
-    model: RobotModel, parts: RobotParts, disabled: Sequence[tuple[str, str]], seed: int
+    model: RobotModel, parts: RobotParts, ends: Ends, disabled: Sequence[Pair], seed: int
 ) -> dict[str, dict[str, dict[str, float]]]:
     """Returns the named states; the arms are placed one after the other, with open grippers."""
     sampling = CollisionSampling(model)
     states: dict[str, dict[str, dict[str, float]]] = {}
     positions = model.default_positions()
-    opened = {}
     for gripper in parts.grippers:
-        opened[gripper.name], closed = gripper_states(sampling, gripper)
+        opened, closed = ends[gripper.name]
         states[gripper.name] = {
             name: {gripper.driver: _rounded(model, gripper.driver, value)}
-            for name, value in (("open", opened[gripper.name]), ("closed", closed))
+            for name, value in (("open", opened), ("closed", closed))
         }
-        positions = with_gripper(model, positions, gripper, opened[gripper.name])
+        positions = with_gripper(model, positions, gripper, opened)
     for arm in parts.arms:
         hand = parts.gripper_of(arm)
-        approach = np.array([0.0, 0.0, 1.0]) if hand is None else approach_axis(model, hand, arm.tip, opened[hand.name])
+        approach = (
+            np.array([0.0, 0.0, 1.0]) if hand is None else approach_axis(model, hand, arm.tip, ends[hand.name][0])
+        )
         positions = ready_state(sampling, arm, approach, positions, disabled, seed)
         states[arm.name] = {"ready": _values(model, arm, positions)}
     return states
