@@ -75,6 +75,7 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
     """
     supports = _supports(scene.model, moving)
     standing = _standing(scene.model, moving)
+    joints = [standing.get(part.joint_id, part.joint_id) for part in parts]
     verdicts: dict[tuple[str, str, str, str], bool] = {}
     result = []
     for first, one in enumerate(parts):
@@ -82,9 +83,7 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
             break  # the world comes last, and its bodies do not move relative to each other
         for second in range(first + 1, len(parts)):
             other = parts[second]
-            if standing.get(one.joint_id, one.joint_id) == standing.get(other.joint_id, other.joint_id) and (
-                ATTACHED not in (one.body.kind, other.body.kind)
-            ):
+            if joints[first] == joints[second] and ATTACHED not in (one.body.kind, other.body.kind):
                 continue  # rigidly connected: no motion changes whether they touch
             key = (one.body.kind, one.body.name, other.body.kind, other.body.name)
             allowed = verdicts.get(key)
