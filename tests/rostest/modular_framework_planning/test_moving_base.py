@@ -16,11 +16,22 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, TransformStamped, Vector3
 from moveit_commander import MoveGroupCommander, PlanningSceneInterface, RobotCommander
-from moveit_msgs.msg import Constraints, MoveItErrorCodes, PlanningScene, PlanningSceneComponents, RobotState
-from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK, GetStateValidity
+from moveit_msgs.msg import (
+    Constraints,
+    JointConstraint,
+    MotionPlanRequest,
+    MoveItErrorCodes,
+    PlanningScene,
+    PlanningSceneComponents,
+    RobotState,
+    RobotTrajectory,
+)
+from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetPositionFK, GetStateValidity
 from ros_session import until
 from std_msgs.msg import Header
+from trajectory_msgs.msg import MultiDOFJointTrajectoryPoint
 
+MOBILE = '<group name="mobile"><joint name="virtual_joint"/><group name="panda_arm"/></group>'
 ROOT, TIP, UPRIGHT = "panda_link0", "panda_link8", Quaternion(0.0, 0.0, 0.0, 1.0)
 LAUNCH = """<launch>
   <node name="joint_state_publisher" pkg="joint_state_publisher" type="joint_state_publisher">
@@ -39,6 +50,7 @@ LAUNCH = """<launch>
 def arm(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
     text = (user_packages / "panda_moveit_config/config/panda.srdf").read_text()
     floating = text.replace('name="virtual_joint" type="fixed"', 'name="virtual_joint" type="floating"')
+    floating = floating.replace("<end_effector", f"{MOBILE}<end_effector", 1)
     assert floating != text
     session = ros_launch(LAUNCH.format(srdf=quoteattr(floating)))
     session.wait_for_service("plan_kinematic_path", 120.0)
@@ -127,6 +139,40 @@ def test_a_plan_starts_where_its_request_puts_the_base(arm: MoveGroupCommander) 
     success, motion, _, _ = arm.plan()
     arm.set_start_state_to_current_state()
     assert success and motion.joint_trajectory.points and not motion.multi_dof_joint_trajectory.points
+
+
+def test_a_group_with_the_base_is_planned_for_within_the_workspace(arm: MoveGroupCommander) -> None:
+    request = MotionPlanRequest(group_name="mobile", start_state=placed(0.0, 0.0, 0.0, 0.0), allowed_planning_time=10.0)
+    request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = 1.0
+    request.workspace_parameters.header.frame_id = "world"
+    request.workspace_parameters.min_corner = Vector3(-1.0, -1.0, 0.0)
+    request.workspace_parameters.max_corner = Vector3(3.0, 3.0, 1.0)
+    goal = {"trans_x": 2.0, "trans_y": 1.0, "trans_z": 0.5, "rot_x": 0.0, "rot_y": 0.0, "rot_z": 0.6, "rot_w": 0.8}
+    joints = [JointConstraint(f"virtual_joint/{name}", value, 0.001, 0.001, 1.0) for name, value in goal.items()]
+    joints.append(JointConstraint("panda_joint1", 0.5, 0.001, 0.001, 1.0))
+    request.goal_constraints = [Constraints(joint_constraints=joints)]
+    plan = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
+    answer = plan(request).motion_plan_response
+    assert answer.error_code.val == MoveItErrorCodes.SUCCESS
+    assert base_of(answer.trajectory_start) == pytest.approx([0.0, 0.0, 0.0, 0.0])
+    base = answer.trajectory.multi_dof_joint_trajectory
+    assert (base.header.frame_id, base.joint_names) == ("world", ["virtual_joint"])
+    end = base.points[-1].transforms[0]
+    assert [end.translation.x, end.translation.y, end.translation.z] == pytest.approx([2.0, 1.0, 0.5])
+    assert [end.rotation.z, end.rotation.w] == pytest.approx([0.6, 0.8])
+    assert answer.trajectory.joint_trajectory.points[-1].positions[0] == pytest.approx(0.5)
+    assert base.points[-1].time_from_start == answer.trajectory.joint_trajectory.points[-1].time_from_start
+    request.workspace_parameters.max_corner = Vector3(1.5, 3.0, 1.0)
+    assert plan(request).motion_plan_response.error_code.val == MoveItErrorCodes.GOAL_STATE_INVALID
+
+
+def test_a_motion_of_the_base_is_not_executed_here(arm: MoveGroupCommander) -> None:
+    motion = RobotTrajectory()
+    motion.multi_dof_joint_trajectory.joint_names = ["virtual_joint"]
+    motion.multi_dof_joint_trajectory.points = [
+        MultiDOFJointTrajectoryPoint(transforms=[transform(1.0, 0.0, 0.0, 0.0)])
+    ]
+    assert not arm.execute(motion)
 
 
 def test_the_base_follows_tf_and_the_arm_reaches_poses_in_the_world(arm: MoveGroupCommander) -> None:

@@ -37,7 +37,8 @@ REACHING = [0.6, 0.3, 0.0, -1.7, 0.0, 2.0, 0.785]
 
 @pytest.fixture(scope="module")
 def demo(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[Any]:
-    session = ros_launch(user_packages / "panda_moveit_config" / "launch" / "demo.launch", use_rviz="false")
+    demo_launch = user_packages / "panda_moveit_config" / "launch" / "demo.launch"
+    session = ros_launch(demo_launch, use_rviz="false", db="true")
     session.wait_for_service("plan_kinematic_path", 120.0)
     yield session
     assert session.alive(), session.log()
@@ -60,6 +61,11 @@ def test_the_package_knows_nothing_of_this_project(user_packages: Path) -> None:
     texts = [path.read_text() for path in (*folder.glob("launch/*"), *folder.glob("config/*"))]
     assert len(texts) > 25
     assert not [text for text in texts if "modular_framework" in text]
+
+
+def test_a_database_that_is_asked_for_is_refused_by_name_and_the_rest_starts(demo: Any) -> None:
+    until(lambda: "mongo_wrapper_ros.py, asked for by db:=true, is refused" in demo.log(), "the refusal")
+    assert "ConstraintsStorage" in demo.log() and demo.alive()
 
 
 def test_the_robot_starts_where_fake_controllers_put_it(arm: MoveGroupCommander) -> None:

@@ -45,6 +45,7 @@ from modular_framework_planning.move_group.planning_report import Reporter
 from modular_framework_planning.move_group.reconfiguration import given_settings, reconfigurations
 from modular_framework_planning.move_group.robot_parameters import (
     collision_detector_name,
+    ignored_parameters,
     load_kinematics_settings,
     load_robot_model,
 )
@@ -80,6 +81,8 @@ def build_context() -> MoveGroupContext:
     model = load_robot_model()
     kinematics = KinematicsPool(model, load_kinematics_settings())
     monitor = SceneMonitor(model, load_padding(model), given_settings("planning_scene_monitor", SceneMonitorSettings()))
+    for sentence in ignored_parameters():
+        rospy.logwarn("%s", sentence)
     execution = load_execution(monitor)
     detector = collision_detector_name()
     new_checker = collision_detector(detector)

@@ -20,6 +20,12 @@ from modular_framework_ros.parameter_search import nearest_parameter
 
 DESCRIPTION = "robot_description"
 COLLISION_DETECTOR = "collision_detector"
+_NO_COSTS = "the scene has no costs, space is either free or not"
+IGNORED = (  # parameter, its value in MoveIt's launch files, why another one changes nothing
+    ("max_safe_path_cost", 1, _NO_COSTS),
+    ("sense_for_plan/max_safe_path_cost", 1, _NO_COSTS),
+    ("monitor_dynamics", False, "velocities and efforts of the robot's state are not used"),
+)
 
 
 def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
@@ -53,6 +59,19 @@ def load_planning_limits() -> dict[str, Any]:
 def load_kinematics_settings() -> dict[str, KinematicsSettings]:
     """Returns the settings of groups in robot_description_kinematics (kinematics.yaml); raises PlanningError."""
     return settings_from(rospy.get_param(nearest_parameter(f"{DESCRIPTION}_kinematics"), {}) or {})
+
+
+def ignored_parameters() -> list[str]:
+    """Returns one sentence for each parameter of MoveIt's launch files that asks for something that is not here."""
+    sentences = []
+    for name, default, why in IGNORED:
+        value = rospy.get_param(f"~{name}", default)
+        if value != default:
+            sentences.append(
+                f"parameter {rospy.resolve_name(f'~{name}')} is {value!r} and has no effect: {why}; leave it at "
+                f"{default}"
+            )
+    return sentences
 
 
 def collision_detector_name() -> str:

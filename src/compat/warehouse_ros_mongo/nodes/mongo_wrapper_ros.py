@@ -1,0 +1,17 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Stands in for the MongoDB server that `db:=true` of MoveIt's launch files starts: it says what to use instead."""
+
+import sys
+
+from modular_framework_ros.ros_missing_program import refuse
+
+if __name__ == "__main__":
+    sys.exit(
+        refuse(
+            "warehouse_ros_mongo/mongo_wrapper_ros.py",
+            "db:=true",
+            "leave db at false; scenes are kept in .scene files (moveit_export_scene_to_text), constraints in an "
+            "SQLite file (ConstraintsStorage of moveit_commander)",
+        )
+    )
