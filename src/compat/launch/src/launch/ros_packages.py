@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from pathlib import Path
 
@@ -12,13 +13,24 @@ import rospkg
 from launch.core.errors import LaunchError, PackageNotFoundError, hint, listed
 
 
+@functools.lru_cache(maxsize=4)
+def _finder(search_path: str) -> rospkg.RosPack:
+    """Returns the look-up for a value of ROS_PACKAGE_PATH; made once, because it crawls all folders."""
+    del search_path
+    return rospkg.RosPack()
+
+
+def _current_finder() -> rospkg.RosPack:
+    return _finder(os.environ.get("ROS_PACKAGE_PATH", ""))
+
+
 def package_share_directory(package: str) -> str:
     """Returns the folder of a package's files.
 
     Raises:
         PackageNotFoundError: There is no such package.
     """
-    finder = rospkg.RosPack()
+    finder = _current_finder()
     try:
         return str(finder.get_path(package))
     except rospkg.ResourceNotFound:
@@ -36,7 +48,7 @@ def program_of_package(package: str, program: str) -> str:
         LaunchError: It has no such program.
     """
     package_share_directory(package)
-    found = roslib.packages.find_node(package, program)
+    found = roslib.packages.find_node(package, program, rospack=_current_finder())
     if found:
         return str(found[0])
     there = programs_of_package(package)

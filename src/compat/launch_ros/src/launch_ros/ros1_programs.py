@@ -13,6 +13,7 @@ from launch.core.parameter_plan import Lookup
 
 from launch_ros import ros2_control
 from launch_ros.node_parameters import ParameterSource
+from launch_ros.ros2_control_hardware import hardware_parameters
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def _control_node(plan: NodePlan) -> NodePlan:
     controllers = ros2_control.controller_parameters(plan.sources)
 
     def late_parameters(lookup: Lookup) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-        return ros2_control.hardware_parameters(lookup, plan.namespace, private, controllers)
+        return hardware_parameters(lookup, plan.namespace, private, controllers)
 
     return replace(
         plan,

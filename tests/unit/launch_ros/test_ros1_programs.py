@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Programs, controller files and hardware tags of ROS 2 become those of ROS 1."""
+
+from pathlib import Path
+
+import pytest
+from launch import LaunchContext
+from launch_ros.actions import Node
+
+TRAJECTORY = "joint_trajectory_controller/JointTrajectoryController"
+CONTROLLERS = f"""
+controller_manager:
+  ros__parameters:
+    update_rate: 100
+    joint_state_broadcaster: {{type: joint_state_broadcaster/JointStateBroadcaster}}
+    arm: {{type: {TRAJECTORY}}}
+    base: {{type: {TRAJECTORY}}}
+    own: {{type: my_package/MyController}}
+arm:
+  ros__parameters: {{joints: [a, b], command_interfaces: [position], constraints: {{goal_time: 0.5}}}}
+base:
+  ros__parameters: {{joints: [c], command_interfaces: [velocity, position]}}
+"""
+MOCK = "mock_components/GenericSystem"
+
+
+def tag(name: str, plugin: str, *joints: str, parameters: str = "") -> str:
+    hardware = f"<hardware><plugin>{plugin}</plugin>{parameters}</hardware>"
+    return f"<ros2_control name='{name}' type='system'>{hardware}{''.join(joints)}</ros2_control>"
+
+
+def joint(name: str, interface: str = "position", initial: str = "0") -> str:
+    state = f"<state_interface name='position'><param name='initial_value'>{initial}</param></state_interface>"
+    return f"<joint name='{name}'><command_interface name='{interface}'/>{state}</joint>"
+
+
+def visited(*nodes: Node) -> LaunchContext:
+    context = LaunchContext()
+    for node in nodes:
+        node.visit(context)
+    return context
+
+
+def hardware(urdf: str, srdf: str = "", *, controllers: dict | None = None) -> dict:
+    """What a control node is told of its hardware: all parameters but those of controllers and descriptions."""
+    description = {"robot_description": urdf, **({"robot_description_semantic": srdf} if srdf else {})}
+    control = Node(package="controller_manager", executable="ros2_control_node", parameters=[controllers or {}])
+    other = Node(package="tf2_ros", executable="buffer_server", name="o", parameters=[description] if urdf else [])
+    context = visited(control, other)
+    prepare = context.requests[0].prepare
+    assert prepare is not None
+    prepare(context.parameters.get)
+    names = {name: value for name, value in context.parameters.values().items() if "robot_description" not in name}
+    return {name: value for name, value in names.items() if not name.startswith("/arm/")}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "positional"),
+    [
+        ("--frame-id world --child-frame-id base", "0 0 0 0 0 0 world base"),
+        ("--x -1e-3 --z 2 --yaw 1.5 --frame-id world --child-frame-id base", "-1e-3 0 2 1.5 0 0 world base"),
+        ("--qz 0.7 --qw 0.7 --frame-id world --child-frame-id base", "0 0 0 0 0 0.7 0.7 world base"),
+        ("1 2 3 0 0 0 world base", "1 2 3 0 0 0 world base"),
+    ],
+)
+def test_a_static_transform_is_written_without_names(arguments: str, positional: str) -> None:
+    node = Node(package="tf2_ros", executable="static_transform_publisher", arguments=arguments.split())
+    assert visited(node).requests[0].command[1:] == positional.split()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "command"),
+    [
+        ("arm -c /controller_manager", "controller_manager --namespace / --no-timeout spawn arm"),
+        ("a b --controller-manager /l/controller_manager", "controller_manager --namespace /l --no-timeout spawn a b"),
+        ("arm --inactive --controller-manager-timeout 5", "controller_manager --namespace / --timeout 5 load arm"),
+        ("arm --unload-on-kill", "spawner --namespace / --no-timeout arm"),
+    ],
+)  # fmt: skip
+def test_a_spawner_ends_when_its_controllers_run(arguments: str, command: str) -> None:
+    node = Node(package="controller_manager", executable="spawner", arguments=arguments.split())
+    path, *words = visited(node).requests[0].command
+    assert [Path(path).name, *words] == command.split()
+
+
+def test_a_spawner_takes_type_and_parameters_of_its_controllers(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text("arm: {ros__parameters: {joints: [a]}, type: x/y}")
+    arguments = ["arm", "-t", "joint_state_broadcaster/JointStateBroadcaster"]
+    context = visited(Node(package="controller_manager", executable="spawner", arguments=arguments))
+    assert context.parameters.values() == {"/arm/type": "joint_state_controller/JointStateController"}
+
+
+def test_rviz_brings_the_marker_for_goals_only_with_moveit() -> None:
+    moveit = {"robot_description_semantic": "<robot name='a'/>"}
+    rviz = visited(
+        Node(package="rviz2", executable="rviz2", name="rviz2", arguments=["-d", "a.rviz"], parameters=[moveit])
+    )
+    assert [Path(request.command[0]).name for request in rviz.requests] == ["rviz", "interactive_goal"]
+    assert rviz.requests[0].command[1:] == ["-d", "a.rviz", "__name:=rviz2"]
+    assert len(visited(Node(package="rviz2", executable="rviz2")).requests) == 1
+
+
+def test_controllers_of_a_file_of_ros_2_are_those_of_ros_1(tmp_path: Path) -> None:
+    (tmp_path / "ros2_controllers.yaml").write_text(CONTROLLERS)
+    path = str(tmp_path / "ros2_controllers.yaml")
+    context = visited(Node(package="controller_manager", executable="ros2_control_node", parameters=[path]))
+    values = context.parameters.values()
+    assert values["/controller_manager/rate"] == 100.0
+    assert values["/joint_state_broadcaster/type"] == "joint_state_controller/JointStateController"
+    assert values["/arm/type"] == "position_controllers/JointTrajectoryController"
+    assert values["/base/type"] == "pos_vel_controllers/JointTrajectoryController"
+    assert values["/own/type"] == "my_package/MyController"
+    assert (values["/arm/joints"], values["/arm/constraints/goal_time"]) == (["a", "b"], 0.5)
+    assert not any(name.startswith("/controller_manager/arm") for name in values)
+
+
+def test_controllers_of_a_file_of_ros_1_stay_as_they_are(tmp_path: Path) -> None:
+    (tmp_path / "controllers.yaml").write_text(
+        "arm: {type: position_controllers/JointTrajectoryController, joints: [a]}"
+    )
+    path = str(tmp_path / "controllers.yaml")
+    context = visited(Node(package="controller_manager", executable="ros2_control_node", parameters=[path]))
+    assert context.parameters.values() == {
+        "/arm/type": "position_controllers/JointTrajectoryController",
+        "/arm/joints": ["a"],
+    }
+
+
+def test_the_hardware_is_what_the_description_names() -> None:
+    arm = tag("arm-1", MOCK, joint("a", initial="0.5"), joint("b"))
+    assert hardware(f"<robot name='r'>{arm}</robot>") == {
+        "/controller_manager/type": "modular_framework_control/MockRobotHW",
+        "/controller_manager/joints": ["a", "b"],
+        "/controller_manager/initial_positions/a": 0.5,
+        "/controller_manager/initial_positions/b": 0.0,
+        "/controller_manager/command_interface": "PositionJointInterface",
+    }
+    real = tag(
+        "hand", "drivers/Hand", joint("c"), parameters="<param name='port'>/dev/x</param><param name='id'>3</param>"
+    )
+    both = hardware(f"<robot name='r'>{arm}{real}</robot>")
+    assert both["/robot_hardware"] == ["arm_1", "hand"]
+    assert (both["/hand/type"], both["/hand/port"], both["/hand/id"]) == ("drivers/Hand", "/dev/x", 3)
+    assert both["/arm_1/joints"] == ["a", "b"]
+
+
+def test_mock_hardware_is_one_for_each_kind_of_command() -> None:
+    mixed = tag("arm", MOCK, joint("a"), joint("wheel", "velocity"))
+    told = hardware(f"<robot name='r'>{mixed}</robot>")
+    assert told["/robot_hardware"] == ["arm_position", "arm_velocity"]
+    assert told["/arm_velocity/command_interface"] == "VelocityJointInterface"
+
+
+def test_without_a_tag_all_joints_are_mock_and_begin_in_a_named_state() -> None:
+    links = "".join(f"<link name='{name}'/>" for name in "wxyz")
+    limit = "<limit lower='{}' upper='3' effort='1' velocity='1'/>"
+    joints = "".join(
+        f"<joint name='{name}' type='revolute'><parent link='{parent}'/><child link='{child}'/>"
+        f"<axis xyz='0 0 1'/>{limit.format(lower)}{mimic}</joint>"
+        for name, parent, child, lower, mimic in (
+            ("a", "w", "x", "-3", ""),
+            ("b", "x", "y", "1.5", ""),
+            ("c", "y", "z", "-3", "<mimic joint='a'/>"),
+        )
+    )
+    srdf = (
+        "<robot name='r'><group name='g'><joint name='a'/></group>"
+        "<group_state name='home' group='g'><joint name='a' value='0.7'/></group_state></robot>"
+    )
+    told = hardware(f"<robot name='r'>{links}{joints}</robot>", srdf)
+    assert told["/controller_manager/joints"] == ["a", "b"]
+    assert told["/controller_manager/initial_positions/a"] == 0.7
+    assert told["/controller_manager/initial_positions/b"] == 1.5  # 0 is outside of its limits
+
+
+def test_without_a_description_the_joints_are_those_of_the_controllers() -> None:
+    arm = {"type": "position_controllers/JointTrajectoryController", "joints": ["a", "b"]}
+    assert hardware("", controllers={"arm": arm})["/controller_manager/joints"] == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("urdf", "message"),
+    [
+        ("<robot", "no XML"),
+        (f"<robot>{tag('arm', '')}</robot>", "name='arm'> has no <hardware><plugin>"),
+        (f"<robot>{tag('arm', MOCK, joint('a', 'torque'))}</robot>", r"'a' has the command interfaces \['torque'\]"),
+        (f"<robot>{tag('arm', MOCK, joint('a', initial='x'))}</robot>", "initial value of joint 'a' is 'x'"),
+        ("", "the hardware is not known"),
+    ],
+)
+def test_hardware_that_cannot_be_understood_is_refused(urdf: str, message: str) -> None:
+    with pytest.raises(RuntimeError, match=message):
+        hardware(urdf)
+
+
+@pytest.mark.parametrize(
+    ("node", "message"),
+    [
+        ({"executable": "spawner", "arguments": ["-c", "/controller_manager"]}, "spawner: .*controller_names"),
+        ({"executable": "spawner", "arguments": ["arm", "--wrong"]}, "unrecognized arguments: --wrong"),
+        ({"package": "tf2_ros", "executable": "static_transform_publisher", "arguments": ["--x", "1"]}, "--frame-id"),
+        (
+            {
+                "package": "tf2_ros",
+                "executable": "static_transform_publisher",
+                "arguments": "--yaw 1 --qx 1 --frame-id a --child-frame-id b".split(),
+            },
+            "angles and a quaternion",
+        ),
+    ],
+)
+def test_arguments_that_the_program_of_ros_2_has_not_are_refused(node: dict, message: str) -> None:
+    with pytest.raises(RuntimeError, match=message):
+        visited(Node(**{"package": "controller_manager", **node}))
