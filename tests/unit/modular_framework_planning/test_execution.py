@@ -262,3 +262,26 @@ def test_settings_that_make_no_sense_keep_their_defaults_and_are_named() -> None
         "allowed_goal_duration_margin",
         "execution_velocity_scaling",
     ]
+
+
+def test_motions_of_different_joints_run_at_the_same_time_and_those_of_the_same_do_not() -> None:
+    controllers = RecordedControllers(ARM, GRIPPER, WHEEL)
+    controllers.answers = {ARM.name: False}
+    execution, cancelled = executor(controllers), threading.Event()
+    moving = motion("elbow", (0.0, [0.3]), (1.0, [0.5]))
+    first = threading.Thread(target=lambda: stopped(execution, moving, cancelled), daemon=True)
+    first.start()
+    while not controllers.sent:  # the time limit of the suite bounds this
+        time.sleep(0.01)
+    execution.execute(motion("wheel", (0.0, [0.3]), (1.0, [0.5])), threading.Event())
+    assert [part.controller.name for part in controllers.sent] == [ARM.name, WHEEL.name]
+    with pytest.raises(PlanningError, match="another motion of .*elbow.* is under way"):
+        execution.execute(moving, threading.Event())
+    execution.close()
+    first.join(5.0)
+    assert not first.is_alive() and controllers.cancelled == [ARM.name]
+
+
+def stopped(execution: TrajectoryExecution, trajectory: RobotTrajectory, cancelled: threading.Event) -> None:
+    with pytest.raises(PlanningError, match="stopped on request"):
+        execution.execute(trajectory, cancelled)

@@ -126,3 +126,23 @@ def test_a_goal_that_comes_while_the_one_before_is_cleared_away_does_not_lock_th
     thread.start()
     thread.join(20.0)
     assert not thread.is_alive() and second.ended.wait(20.0)
+
+
+def test_goals_that_use_different_things_run_at_the_same_time() -> None:
+    both_run, release = threading.Barrier(2), threading.Event()
+
+    def work(_goal: Any, _cancelled: threading.Event, _feedback: Any) -> tuple[Any, bool, str]:
+        both_run.wait(5.0)
+        release.wait(5.0)
+        return None, True, ""
+
+    GoalRunner("some_action", ExecuteTrajectoryAction, work, lambda goal: frozenset(goal.split("+")))
+    left, right, both = Handle("left"), Handle("right"), Handle("left+right")
+    Server.made.on_goal(left)
+    Server.made.on_goal(right)
+    release.set()
+    assert left.ended.wait(5.0) and right.ended.wait(5.0)
+    assert (left.outcome, right.outcome) == ("succeeded", "succeeded")
+    both_run = threading.Barrier(1)
+    Server.made.on_goal(both)
+    assert both.ended.wait(5.0) and both.outcome == "succeeded"

@@ -21,7 +21,7 @@ from xacro_rospkg import expand
 from modular_framework_core.commander.robot_groups import read_group
 from top_down_grasps.gripper_geometry import measure_gripper
 
-ROBOTS = ("panda_hand_robot", "iiwa_wsg50_robot")
+ROBOTS = ("panda_hand_robot", "iiwa_wsg50_robot", "dual_panda_robot")
 POSES = ("initial_pose", "stability_pose")
 
 

@@ -12,7 +12,7 @@ import rospy
 from modular_framework_planning.errors import ErrorCode
 from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_ros.publishing import going_down
-from modular_framework_ros.running_goals import RunningGoals
+from modular_framework_ros.running_goals import RunningGoals, overlap
 
 PREVIOUS_GOAL_TIMEOUT_S = 10.0
 
@@ -23,17 +23,23 @@ def error_code_of(result: Any) -> Any:
 
 
 class GoalRunner:
-    """Runs one goal at a time; a new goal cancels the one before and starts when that has ended.
+    """Runs goals; a new goal cancels those before that use something it uses, and starts when they have ended.
 
-    `work(goal, cancelled, feedback)` returns the result and whether it succeeded; `cancelled` is an Event.
+    `work(goal, cancelled, feedback)` returns the result and whether it succeeded; `cancelled` is an Event. `uses(goal)`
+    returns the names of what a goal uses; None: everything, so that one goal runs at a time.
     """
 
     def __init__(
-        self, name: str, kind: Any, work: Callable[[Any, threading.Event, Callable[[Any], None]], tuple[Any, bool, str]]
+        self,
+        name: str,
+        kind: Any,
+        work: Callable[[Any, threading.Event, Callable[[Any], None]], tuple[Any, bool, str]],
+        uses: Callable[[Any], frozenset[str] | None] = lambda goal: None,
     ) -> None:
-        self._work = work
+        self._work, self._uses = work, uses
         self._result_type = type(kind().action_result.result)
-        self._turn = threading.Lock()
+        self._used: list[frozenset[str] | None] = []
+        self._ended = threading.Condition()
         self._goals = RunningGoals()
         self._server = SteadyActionServer(name, kind, self._on_goal, self._goals.cancel, auto_start=False)
 
@@ -42,11 +48,27 @@ class GoalRunner:
         self._server.start()
 
     def _on_goal(self, handle: Any) -> None:
-        cancelled = self._goals.add(handle)
-        threading.Thread(target=self._run, args=(handle, cancelled), daemon=True).start()
+        uses = self._uses(handle.get_goal())
+        cancelled = self._goals.add(handle, uses)
+        threading.Thread(target=self._run, args=(handle, cancelled, uses), daemon=True).start()
 
-    def _run(self, handle: Any, cancelled: threading.Event) -> None:
-        if not self._turn.acquire(timeout=PREVIOUS_GOAL_TIMEOUT_S):
+    def _begin(self, uses: frozenset[str] | None) -> bool:
+        """Waits until no goal before uses the same; returns whether that came in time."""
+        with self._ended:
+            free = self._ended.wait_for(
+                lambda: not any(overlap(used, uses) for used in self._used), PREVIOUS_GOAL_TIMEOUT_S
+            )
+            if free:
+                self._used.append(uses)
+            return free
+
+    def _end(self, uses: frozenset[str] | None) -> None:
+        with self._ended:
+            self._used.remove(uses)
+            self._ended.notify_all()
+
+    def _run(self, handle: Any, cancelled: threading.Event, uses: frozenset[str] | None) -> None:
+        if not self._begin(uses):
             self._goals.remove(handle)
             handle.set_rejected(
                 self._result(ErrorCode.PREEMPTED), f"the goal before did not end within {PREVIOUS_GOAL_TIMEOUT_S:.0f} s"
@@ -67,7 +89,7 @@ class GoalRunner:
         except Exception as error:  # noqa: BLE001 - the client must get an answer whatever happens; it is logged here
             self._on_fault(handle, error)
         finally:
-            self._turn.release()
+            self._end(uses)
             self._goals.remove(handle)
 
     def _on_fault(self, handle: Any, error: Exception) -> None:

@@ -55,13 +55,17 @@ class ActionCapability(MoveGroupCapability):
 
     def connect(self) -> None:
         """Starts the action server."""
-        self._runner = GoalRunner(self.name, self.kind, self._work)
+        self._runner = GoalRunner(self.name, self.kind, self._work, self._uses)
         self._runner.connect()
 
     def _work(self, goal: Any, cancelled: Event, feedback: Callable[[Any], None]) -> tuple[Any, bool, str]:
         feedback_type = type(self.kind().action_feedback.feedback)
         result, text = self._perform(goal, cancelled, lambda state: feedback(feedback_type(state)))
         return result, error_code_of(result).val == ErrorCode.SUCCESS, text
+
+    def _uses(self, goal: Any) -> frozenset[str] | None:
+        """Returns the joints a goal moves; None: any, so that a new goal cancels it."""
+        return None
 
     @abstractmethod
     def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:

@@ -14,9 +14,12 @@ from modular_framework_planning.move_group.capabilities.capability import Action
 
 
 class ExecuteTrajectory(ActionCapability):
-    """Offers execute_trajectory (moveit_msgs/ExecuteTrajectory)."""
+    """Offers execute_trajectory (moveit_msgs/ExecuteTrajectory): a new motion cancels those of the same joints."""
 
     name, kind = names.EXECUTE_ACTION, ExecuteTrajectoryAction
+
+    def _uses(self, goal: Any) -> frozenset[str] | None:
+        return frozenset(goal.trajectory.joint_trajectory.joint_names) or None
 
     def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[ExecuteTrajectoryResult, str]:
         result = ExecuteTrajectoryResult()

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -41,8 +44,21 @@ ROS_CONTROL_MANAGER = "moveit_ros_control_interface/MoveItControllerManager"
 ALL_ROS_CONTROL_MANAGERS = "moveit_ros_control_interface/MoveItMultiControllerManager"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Motion:
+    """A motion under way.
+
+    Attributes:
+        joints: All joints of its controllers.
+        stop: Set to stop it.
+    """
+
+    joints: frozenset[str]
+    stop: threading.Event
+
+
 class TrajectoryExecution:
-    """Executes one motion at a time.
+    """Executes motions; several at the same time where their controllers share no joints.
 
     Subscribes: trajectory_execution_event (std_msgs/String "stop").
 
@@ -54,8 +70,8 @@ class TrajectoryExecution:
         self.manager = manager
         self.settings = settings
         self._monitor = monitor
-        self._stop = threading.Event()
-        self._busy = threading.Lock()
+        self._motions: list[_Motion] = []
+        self._ended = threading.Condition()
 
     def connect(self) -> None:
         """Subscribes to stop events and starts to connect to the controllers."""
@@ -64,15 +80,20 @@ class TrajectoryExecution:
             self.manager.connect()
 
     def close(self) -> None:
-        """Stops the present motion and waits until it has stopped; to be called while topics are still open."""
-        self._stop.set()
-        if self._busy.acquire(timeout=STOP_TIMEOUT_S):
-            self._busy.release()
+        """Stops all motions and waits until they have stopped; to be called while topics are still open."""
+        self._stop_all()
+        with self._ended:
+            self._ended.wait_for(lambda: not self._motions, timeout=STOP_TIMEOUT_S)
+
+    def _stop_all(self) -> None:
+        with self._ended:
+            for motion in self._motions:
+                motion.stop.set()
 
     def _on_event(self, message: String) -> None:
         if message.data == "stop":
-            rospy.loginfo("trajectory_execution_event: stopping the motion")
-            self._stop.set()
+            rospy.loginfo("trajectory_execution_event: stopping what moves")
+            self._stop_all()
         else:
             rospy.logwarn(
                 "%s: event '%s' is not known; known: stop",
@@ -105,21 +126,39 @@ class TrajectoryExecution:
         check_trajectory(trajectory.joint_trajectory)
         if not trajectory.joint_trajectory.points:
             return
-        if not self._busy.acquire(blocking=False):
-            raise PlanningError(ErrorCode.CONTROL_FAILED, "another motion is under way; wait for its end or stop it")
-        try:
-            self._stop.clear()
-            motion = at_speed(trajectory.joint_trajectory, self.settings.execution_velocity_scaling)
-            parts = self._parts(motion, self.manager)
+        motion = at_speed(trajectory.joint_trajectory, self.settings.execution_velocity_scaling)
+        parts = self._parts(motion, self.manager)
+        with self._only_motion_of({joint for part in parts for joint in part.controller.joints}) as stop:
             self._check_start(motion)
             if self._is_there_already(motion, parts):
                 return
             self.manager.prepare(parts)
-            self._run(parts, self.manager, _delay_s(motion), cancelled)
+            self._run(parts, self.manager, _delay_s(motion), cancelled, stop)
             if self.settings.wait_for_trajectory_completion:
                 self._settle(motion.joint_names)
+
+    @contextmanager
+    def _only_motion_of(self, joints: set[str]) -> Iterator[threading.Event]:
+        """Enters a motion of these joints; yields the event that stops it.
+
+        Raises:
+            PlanningError: another motion moves one of them.
+        """
+        entered = _Motion(frozenset(joints), threading.Event())
+        with self._ended:
+            busy = sorted({joint for motion in self._motions for joint in motion.joints & joints})
+            if busy:
+                raise PlanningError(
+                    ErrorCode.CONTROL_FAILED,
+                    f"another motion of {', '.join(busy)} is under way; wait for its end or stop it",
+                )
+            self._motions.append(entered)
+        try:
+            yield entered.stop
         finally:
-            self._busy.release()
+            with self._ended:
+                self._motions.remove(entered)
+                self._ended.notify_all()
 
     def _parts(self, motion: JointTrajectory, manager: ControllerManager) -> list[MotionPart]:
         followers = self._monitor.model.follower_joints
@@ -168,7 +207,12 @@ class TrajectoryExecution:
         )
 
     def _run(
-        self, parts: list[MotionPart], manager: ControllerManager, delay_s: float, cancelled: threading.Event
+        self,
+        parts: list[MotionPart],
+        manager: ControllerManager,
+        delay_s: float,
+        cancelled: threading.Event,
+        stop: threading.Event,
     ) -> None:
         begun = rospy.Time.now()
         running: list[tuple[MotionPart, RunningMotion]] = []
@@ -176,7 +220,7 @@ class TrajectoryExecution:
             for part in parts:
                 running.append((part, manager.begin(part)))
             while running:
-                if cancelled.is_set() or self._stop.is_set() or rospy.is_shutdown():
+                if cancelled.is_set() or stop.is_set() or rospy.is_shutdown():
                     raise PlanningError(ErrorCode.PREEMPTED, "the motion was stopped on request")
                 running = [item for item in running if not item[1].is_done()]
                 self._check_time([part for part, _ in running], (rospy.Time.now() - begun).to_sec() - delay_s)
