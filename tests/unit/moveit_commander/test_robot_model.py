@@ -65,6 +65,19 @@ def test_groups_are_chains_links_and_other_groups(model: RobotModel) -> None:
     assert arm.states["up"] == {"a_shoulder": 1.0, "b_elbow": 0.0}
 
 
+def test_a_group_of_two_branches_below_a_root_that_is_named_as_its_frame_is_no_chain() -> None:
+    urdf = """<robot name="two"><link name="world"/><link name="l"/><link name="r"/>
+    <joint name="left" type="revolute"><parent link="world"/><child link="l"/><limit lower="-1" upper="1"/></joint>
+    <joint name="right" type="revolute"><parent link="world"/><child link="r"/><limit lower="-1" upper="1"/></joint>
+    </robot>"""
+    srdf = """<robot name="two"><virtual_joint name="base" type="fixed" parent_frame="world" child_link="world"/>
+    <group name="both"><joint name="left"/><joint name="right"/></group></robot>"""
+    model = RobotModel(urdf, srdf)
+    assert not model.group("both").is_chain
+    with pytest.raises(RobotModelError, match="'l' is not below link 'r'"):
+        model.chain("r", "l")
+
+
 def test_limits_come_from_urdf_and_joint_limits(model: RobotModel) -> None:
     shoulder, elbow = model.joints["a_shoulder"], model.joints["b_elbow"]
     assert (shoulder.lower, shoulder.upper, shoulder.velocity, shoulder.default) == (0.5, 1.5, 2.0, 1.0)

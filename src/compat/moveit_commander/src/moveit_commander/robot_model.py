@@ -159,7 +159,7 @@ class RobotModel:
         link = tip
         while link != base:
             joint = self._parent_joint.get(link)
-            if joint is None:
+            if joint is None or joint.parent == link:  # a virtual joint may hang a link on a frame of its name
                 raise RobotModelError(f"link '{tip}' is not below link '{base}' in robot '{self.name}'")
             joints.append(joint)
             link = joint.parent
@@ -226,7 +226,7 @@ class RobotModel:
     def _follows(self, sooner: Joint, later: Joint) -> bool:
         """Returns whether only fixed joints lie between two joints."""
         link = later.parent
-        while link != sooner.child and link in self._parent_joint and self._parent_joint[link].kind == "fixed":
+        while link not in (sooner.child, self.root_link) and self._parent_joint[link].kind == "fixed":
             link = self._parent_joint[link].parent
         return link == sooner.child
 
