@@ -148,6 +148,10 @@ class RosSession:
         command = ["roslaunch", "-p", str(self.port), package, launch_file, *_launch_arguments(args)]
         return self._start(command)
 
+    def launch_python(self, package: str, launch_file: str, **args: object) -> Launch:
+        """Starts a Python launch file as a user would, master included: `launch_py PACKAGE FILE name:=value ...`."""
+        return self._start(["rosrun", "launch", "launch_py", package, launch_file, *_launch_arguments(args)])
+
     def run_framework(self, package: str = "modular_framework_api", **args: object) -> Launch:
         """Starts the framework with a package's robot so that it ends with the task, as `run_framework PACKAGE ...`."""
         return self._start(["rosrun", "modular_framework_api", "run_framework", package, *_launch_arguments(args)])

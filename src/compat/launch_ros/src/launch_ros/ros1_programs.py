@@ -57,11 +57,15 @@ def ros1_plan(plan: NodePlan) -> NodePlan:
 def _rviz(plan: NodePlan) -> NodePlan:
     """RViz; with MoveIt's parameters also the marker that drags the goal, which is in RViz's window in ROS 2."""
     given = {name for source in plan.sources for name in source.content}
-    marker = NodePlan("modular_framework_planning", "interactive_goal", plan.namespace, "interactive_goal")
+    patience = ParameterSource({"connection_timeout": MARKER_TIMEOUT_S})
+    program = "interactive_goal"
+    marker = NodePlan("modular_framework_planning", program, plan.namespace, program, sources=(patience,))
     companions = (marker,) if "robot_description_semantic" in given else ()
     return replace(plan, package="rviz", executable="rviz", companions=companions)
 
 
+MARKER_TIMEOUT_S = 300.0
+"""How long the marker for goals waits for move_group [s], whose first start compiles what it runs."""
 _TRANSFORM_DEFAULTS = {"--x": "0", "--y": "0", "--z": "0", "--yaw": "0", "--pitch": "0", "--roll": "0"}
 _QUATERNION = ("--qx", "--qy", "--qz", "--qw")
 

@@ -159,7 +159,7 @@ def generate_move_group_launch(moveit_config: MoveItConfigs) -> LaunchDescriptio
             DeclareBooleanLaunchArg("publish_monitored_planning_scene", default_value=True),
             DeclareLaunchArgument("capabilities", default_value=str(capabilities["capabilities"])),
             DeclareLaunchArgument("disable_capabilities", default_value=str(capabilities["disable_capabilities"])),
-            DeclareRefusedLaunchArg("monitor_dynamics", reason="move_group has no such option"),
+            DeclareRefusedLaunchArg("monitor_dynamics", reason="states have no efforts"),
         ]
     )
     publish = LaunchConfiguration("publish_monitored_planning_scene")

@@ -22,6 +22,8 @@ from launch.substitutions.text import LaunchConfiguration, described
 
 OUTPUTS = {"screen": True, "both": True, "full": True, "log": False, "own_log": False}
 """Values of `output`, and whether standard output goes to the screen."""
+DEFAULT_TIMEOUTS_S = {"sigterm_timeout": 15.0, "sigkill_timeout": 5.0}
+"""Time after SIGINT until SIGTERM, as in roslaunch, and then until SIGKILL [s]."""
 NOT_OFFERED = ("emulate_tty", "output_format", "cached_output", "log_cmd")
 """Options of ROS 2 about how the launch shows output; accepted, because processes write their output themselves."""
 
@@ -143,7 +145,7 @@ _OPTION_DEFAULTS: dict[str, Any] = {
 
 
 def _timeout(context: LaunchContext, given: Mapping[str, Any], name: str) -> float:
-    value = given[name] if given[name] is not None else LaunchConfiguration(name, default="5")
+    value = given[name] if given[name] is not None else LaunchConfiguration(name, default=DEFAULT_TIMEOUTS_S[name])
     timeout_s = perform_number(context, value, name)
     if timeout_s <= 0.0:
         raise LaunchError(f"{name} is {timeout_s} s; allowed: more than 0")

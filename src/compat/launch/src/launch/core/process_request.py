@@ -41,7 +41,7 @@ class ProcessRequest:
     respawn: bool = False
     respawn_delay_s: float = 0.0
     respawn_max_retries: int = -1
-    sigterm_timeout_s: float = 5.0
+    sigterm_timeout_s: float = 15.0
     sigkill_timeout_s: float = 5.0
     node_name: str = ""
     is_node: bool = False
