@@ -18,7 +18,7 @@ from moveit_commander.group_joint_targets import link_and_approximate
 from moveit_commander.group_motion import cartesian_options
 from moveit_commander.object_region import Region, inside
 from moveit_commander.robot_model import Joint
-from moveit_commander.trajectory_timing import distinct, retime
+from moveit_commander.trajectory_timing import distinct, retime, unwound
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, CollisionObject, Constraints
 from scipy.spatial.transform import Rotation
 
@@ -89,6 +89,16 @@ def test_a_retimed_path_keeps_its_points_and_the_velocity_limits(seed: int) -> N
 
 def test_repeated_points_are_left_out() -> None:
     assert list(distinct([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1e-9], [0.0, 0.0]])) == [0, 2, 4]
+
+
+def test_a_joint_without_ends_that_jumps_by_a_turn_goes_on_turning() -> None:
+    angles = np.linspace(2.0, 12.0, 21)  # beyond pi three times
+    wrapped = np.arctan2(np.sin(angles), np.cos(angles))
+    rows = unwound(np.stack([wrapped, wrapped], axis=1), [True, False])
+    np.testing.assert_allclose(rows[:, 0], angles)
+    np.testing.assert_allclose(rows[:, 1], wrapped)
+    times = retime(unwound([[3.0], [-3.0]], [True]), np.full(1, 1.0), np.full(1, 1.0))[0]
+    assert times[-1] == pytest.approx(2.0 * math.sqrt(2.0 * math.pi - 6.0), rel=1e-2)  # a triangle of velocity
 
 
 def test_a_region_holds_objects_by_all_their_shapes() -> None:

@@ -44,6 +44,14 @@ def test_joints_come_depth_first_from_the_root(model: RobotModel) -> None:
     assert model.planning_frame == model.root_link == "base"
 
 
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_the_planning_frame_of_a_robot_that_moves_is_the_one_it_moves_in(kind: str) -> None:
+    virtual = f'<virtual_joint name="drive" type="{kind}" parent_frame="odom" child_link="base"/>'
+    model = RobotModel(URDF, SRDF.replace("VIRTUAL", virtual))
+    assert (model.planning_frame, model.root_link) == ("odom", "base")
+    assert model.base is not None and model.base.name == "drive"
+
+
 def test_the_root_link_is_the_planning_frame_below_a_virtual_joint_too() -> None:
     virtual = '<virtual_joint name="floor" type="fixed" parent_frame="map" child_link="base"/>'
     model = RobotModel(URDF, SRDF.replace("VIRTUAL", virtual))

@@ -14,7 +14,7 @@ from moveit_commander.chain_jacobian import jacobian
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_objects import GroupObjects
 from moveit_commander.robot_model import group_values
-from moveit_commander.trajectory_timing import ALGORITHMS, distinct, retime
+from moveit_commander.trajectory_timing import ALGORITHMS, distinct, retime, unwound
 
 
 class MoveGroupCommander(GroupObjects):
@@ -91,6 +91,8 @@ class MoveGroupCommander(GroupObjects):
             )
         joints = [self._model.joints[name] for name in names]
         points = [point.positions for point in traj_in.joint_trajectory.points]
+        if points:
+            points = unwound(points, [joint.kind == "continuous" for joint in joints]).tolist()
         timed = RobotTrajectory(multi_dof_joint_trajectory=traj_in.multi_dof_joint_trajectory)
         timed.joint_trajectory.header, timed.joint_trajectory.joint_names = traj_in.joint_trajectory.header, list(names)
         kept = [points[index] for index in distinct(points)] if len(points) > 1 else points

@@ -18,6 +18,19 @@ GRID_POINTS = 20  # between two waypoints
 SAME_POINT = 1e-6  # [rad or m] waypoints nearer to each other than this are one
 
 
+def unwound(points: Any, continuous: Any) -> Any:
+    """Returns waypoints in which joints without ends never jump by a turn, as in MoveIt; the first one stays.
+
+    Args:
+        points: shape (n, joints) [rad or m].
+        continuous: which joints have no ends, shape (joints,).
+    """
+    array = np.asarray(points, dtype=float)
+    steps = np.diff(array, axis=0)
+    turns = np.where(np.asarray(continuous), np.round(steps / (2.0 * np.pi)), 0.0)
+    return array - 2.0 * np.pi * np.concatenate([np.zeros_like(array[:1]), np.cumsum(turns, axis=0)])
+
+
 def distinct(points: Any) -> Any:
     """Returns the indices of the waypoints that differ from the one before."""
     array = np.asarray(points, dtype=float)
