@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from modular_framework_planning.geometry.shapes import Mesh
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.robot_model.robot_model import LinkGeometry, RobotModel
-from modular_framework_setup.creation.named_states import with_gripper
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_setup.creation.finger_shapes import finger_points, with_gripper
 from modular_framework_setup.creation.robot_parts import Gripper
 
 BEHIND_TIPS = 0.25
@@ -20,7 +19,7 @@ def grasp_pose(model: RobotModel, gripper: Gripper, open_position: float, closed
 
     Its z axis is the approach, from the palm to the finger tips; its x axis is that along which the fingers close.
     """
-    opened, closed = (_finger_points(model, gripper, position) for position in (open_position, closed_position))
+    opened, closed = (finger_points(model, gripper, position) for position in (open_position, closed_position))
     fingers = sorted(opened)
     motion = np.array([opened[name].mean(axis=0) - closed[name].mean(axis=0) for name in fingers])
     closing = _unit(motion[0] - motion[1:].mean(axis=0) if len(motion) > 1 else motion[0])
@@ -41,7 +40,7 @@ def approach_axis(model: RobotModel, gripper: Gripper, tip: str, open_position: 
     """Returns the axis of a tip's frame that is nearest to the way from the palm to the finger tips, shape (3,)."""
     state = with_gripper(model, model.default_positions(), gripper, open_position)
     poses = model.link_transforms(state)
-    points = np.concatenate(list(_finger_points(model, gripper, open_position).values()))
+    points = np.concatenate(list(finger_points(model, gripper, open_position).values()))
     way = poses[gripper.palm].rotation @ points.mean(axis=0)
     local = poses[tip].rotation.T @ way
     axis = np.zeros(3)
@@ -68,30 +67,3 @@ def _pads(points: Array, approach: Array, held: float) -> Array | None:
 def _unit(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     return np.asarray(vector / length) if length > 1e-9 else np.array([1.0, 0.0, 0.0])
-
-
-def _finger_points(model: RobotModel, gripper: Gripper, position: float) -> dict[str, Array]:
-    """Returns points on the shapes of each finger in the palm's frame, shape (n, 3) [m]."""
-    poses = model.link_transforms(with_gripper(model, model.default_positions(), gripper, position))
-    found: dict[str, list[Array]] = {}
-    above = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
-    for item in model.link_geometries:
-        if item.link in gripper.links:
-            finger = item.link
-            while above.get(finger, gripper.palm) != gripper.palm:
-                finger = above[finger]
-            frame = model.pin_model.frames[item.frame_id]
-            in_link = frame.placement.inverse() * item.placement
-            pose = poses[gripper.palm].inverse() * poses[item.link] * in_link
-            found.setdefault(finger, []).append(_points(item) @ pose.rotation.T + pose.translation)
-    return {name: np.concatenate(items) for name, items in found.items()}
-
-
-def _points(item: LinkGeometry) -> Array:
-    """Returns the vertices of a mesh, or the corners of the box around another shape."""
-    if isinstance(item.shape, Mesh):
-        return np.asarray(item.shape.vertices)
-    item.geometry.computeLocalAABB()
-    box = item.geometry.aabb_local
-    corners = np.array([box.min_, box.max_])
-    return np.array([[corners[i, 0], corners[j, 1], corners[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])

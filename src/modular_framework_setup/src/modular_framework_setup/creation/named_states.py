@@ -11,10 +11,13 @@ import pinocchio as pin
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_setup.creation.collision_sampling import CollisionSampling, Pair, pair_of
+from modular_framework_setup.creation.finger_shapes import finger_of, link_points, with_gripper
 from modular_framework_setup.creation.robot_parts import Arm, Gripper
 
 TOUCHING_M = 5.0e-4
 """Fingers this close hold nothing between them."""
+TIP_SHARE = 0.9
+"""A link that reaches this share of the furthest one's way out of the palm belongs to the tips."""
 STATES, STEPS, POSES = 2000, 600, 21
 REACH_SHARE, HEIGHT_SHARE = 0.55, 0.35
 """Where the tip is held, in front of the base and above it, as shares of how far the arm reaches."""
@@ -25,7 +28,7 @@ def gripper_states(sampling: CollisionSampling, gripper: Gripper) -> tuple[float
     model = sampling.model
     number = model.joint_index(gripper.driver)
     lower, upper = (bound[number] for bound in sampling.bounds())
-    pairs = _finger_pairs(sampling, gripper)
+    pairs = _tip_pairs(sampling, gripper, 0.5 * (lower + upper))
     if not pairs:
         return float(upper), float(lower)
 
@@ -41,27 +44,16 @@ def gripper_states(sampling: CollisionSampling, gripper: Gripper) -> tuple[float
     return float(positions[-1]), float(positions[max(apart[0] - 1, 0)] if len(apart) else positions[0])
 
 
-def with_gripper(model: RobotModel, state: Array, gripper: Gripper, position: float) -> Array:
-    """Returns a state with a gripper at a position of its driver."""
-    result = np.array(state, dtype=float)
-    result[model.joint_index(gripper.driver)] = position
-    return model.with_mimics(result)
-
-
-def _finger_pairs(sampling: CollisionSampling, gripper: Gripper) -> list[Pair]:
-    """Returns the pairs of links of different fingers."""
-    document = sampling.model.document
-    above = {child: document.joint_parents[joint] for joint, child in document.joint_children.items()}
-
-    def finger(link: str) -> str:
-        while above.get(link, gripper.palm) != gripper.palm:
-            link = above[link]
-        return link
-
+def _tip_pairs(sampling: CollisionSampling, gripper: Gripper, position: float) -> list[Pair]:
+    """Returns the pairs of links of different fingers that reach furthest from the palm, where objects are held."""
+    points = link_points(sampling.model, gripper, position)
+    reach = {link: float(np.linalg.norm(items, axis=1).max()) for link, items in points.items()}
+    furthest = max(reach.values(), default=0.0)
+    fingers = {link: finger_of(sampling.model, gripper, link) for link in reach if reach[link] >= TIP_SHARE * furthest}
     return [
         pair
         for pair in sampling.pairs
-        if all(link in gripper.links for link in pair) and finger(pair[0]) != finger(pair[1])
+        if all(link in fingers for link in pair) and fingers[pair[0]] != fingers[pair[1]]
     ]
 
 

@@ -17,8 +17,9 @@ from modular_framework_setup.config_files.config_package import find_package
 from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.creation.collision_sampling import CollisionSampling, Pair
 from modular_framework_setup.creation.errors import CreationError
+from modular_framework_setup.creation.finger_shapes import with_gripper
 from modular_framework_setup.creation.grasp_frame import approach_axis, grasp_pose
-from modular_framework_setup.creation.named_states import gripper_states, ready_state, with_gripper
+from modular_framework_setup.creation.named_states import gripper_states, ready_state
 from modular_framework_setup.creation.robot_parts import Arm, Gripper, RobotParts, find_parts
 from modular_framework_setup.creation.self_collisions import Hand, PairVerdict, Progress, find_verdicts
 from modular_framework_setup.creation.source_urdf import SourceUrdf
