@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -318,3 +319,43 @@ def test_a_joint_that_fell_behind_catches_up_no_faster_than_its_limit(lifter: Li
     lifter.run(1.0, hold_up_then_let_go)
     assert behind > 0.1 and lift.position == pytest.approx(0.5, abs=1e-3)
     assert 0.9 < fastest < 1.05
+
+
+def two_hands_urdf() -> str:
+    """The robot of the samples twice in one description, a metre apart along x: names end with _a and _b."""
+    text = lift_robot_urdf()
+    body = text[text.index('<link name="palm">') : text.index("</robot>")]
+    copies = [
+        re.sub(r"\b(palm|lift|finger_\d|slide_\d|t1|t2|a1|a2)(?=\")", rf"\1_{name}", body).replace(
+            "0 0 0.3", f"{x} 0 0.3"
+        )
+        for name, x in (("a", 0), ("b", 1))
+    ]
+    return '<robot name="two"><link name="world"/>' + "".join(copies) + "</robot>"
+
+
+def test_each_gripper_of_a_robot_holds_an_object_of_its_own(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+    description = read_robot(two_hands_urdf(), no_packages, convex_parts, False)
+    robot = RobotBody(world, description, "two", Pose(), {"lift_a": -0.235, "lift_b": -0.235})
+    assert [(gripper.palm_link, len(gripper.fingers)) for gripper in robot.grippers] == [("palm_a", 2), ("palm_b", 2)]
+    assert set(robot.grippers[1].links) == {"palm_b", "finger_1_b", "finger_2_b"}
+    hardware = PyBulletRobotHW(robot)
+    hardware.init(MappingNodeHandle(), MappingNodeHandle())
+    loop = SimulationLoop(world, Pacer(0.0), RequestQueue(), Actors(robot, hardware, Commander()))
+    commands = {each.name: each for each in hardware.get(PositionJointInterface).handles}
+    for name, x in (("one", 0.0), ("other", 1.0)):
+        world.spawn(solid(name, specs.Box((0.06, 0.03, 0.06)), Pose((x, 0, 0.03))))
+
+    def close(*names: str) -> None:
+        for number in range(400):
+            for name in ("a", "b"):
+                commands[f"slide_1_{name}"].command = 0.05 if name in names else 0.0
+            loop.step()
+            if number % 10 == 0:
+                loop.watch_grasps()
+
+    close("a", "b")
+    held = {each.model: each.carrier_link for each in loop.held_objects()}
+    assert held == {"one": "palm_a", "other": "palm_b"}
+    close("b")
+    assert {each.model: each.touch_links[0] for each in loop.held_objects()} == {"other": "palm_b"}
