@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The UR5 with EZGripper on mock hardware, with move_group and RViz; written as MoveIt 2's launch tutorial."""
+"""The UR5 with EZGripper, mock hardware or the robot, with move_group and RViz; written as MoveIt 2's tutorial."""
 
 import os
 
@@ -14,13 +14,24 @@ from moveit_configs_utils import MoveItConfigsBuilder
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Returns the description; arguments: rviz_config, use_rviz."""
+    """Returns the description; `launch_py --show-args` lists its arguments."""
     # What the robot's xacro file is given.
     launch_arguments = {
-        "robot_ip": "xxx.yyy.zzz.www",
-        "use_fake_hardware": "true",
+        "robot_ip": LaunchConfiguration("robot_ip"),
+        "gripper_port": LaunchConfiguration("gripper_port"),
+        "use_fake_hardware": LaunchConfiguration("use_fake_hardware"),
         "initial_z": "0.86",
     }
+    hardware_args = [
+        DeclareLaunchArgument(
+            "use_fake_hardware",
+            default_value="true",
+            choices=["true", "false"],
+            description="mock hardware that follows its commands exactly; false: the robot",
+        ),
+        DeclareLaunchArgument("robot_ip", default_value="192.168.56.101", description="address of the arm"),
+        DeclareLaunchArgument("gripper_port", default_value="/dev/ttyUSB0", description="serial device of the gripper"),
+    ]
 
     # Everything move_group needs of the robot.
     moveit_config = (
@@ -126,6 +137,7 @@ def generate_launch_description() -> LaunchDescription:
 
     return LaunchDescription(
         [
+            *hardware_args,
             rviz_config_arg,
             use_rviz_arg,
             rviz_node,
