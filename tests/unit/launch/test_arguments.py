@@ -137,6 +137,18 @@ def test_a_function_makes_entities_of_the_configuration(run: Run) -> None:
     assert (code, "hello you at left" in said) == (0, True)
 
 
+def test_a_function_that_fails_is_named_with_its_own_line(run: Run) -> None:
+    def broken(context):
+        return {}["arm"]
+
+    code, said = run([OpaqueFunction(function=broken)])
+    line = broken.__code__.co_firstlineno + 1
+    assert code == 2
+    assert f"test_arguments.py:{line}: OpaqueFunction(broken): KeyError: 'arm'" in said
+    code, said = run([OpaqueFunction(function=lambda context: ["a text"])])
+    assert code == 2 and "got 'a text' of type str; allowed: actions and launch descriptions" in said
+
+
 def test_what_a_launch_does_not_offer_is_refused_with_what_to_do() -> None:
     with pytest.raises(
         RuntimeError, match=r"test_arguments.py:\d+: .*OpaqueCoroutine is not offered: .*OpaqueFunction"

@@ -109,7 +109,7 @@ def test_an_xml_file_runs_with_arguments_and_namespace(launch_file, launch_py, t
     (tmp_path / "inner.launch").write_text(
         '<launch><arg name="greeting" default="none" doc="what to say"/><arg name="must"/>'
         '<param name="said" value="$(arg greeting) $(arg must)"/>'
-        '<node pkg="rosbash" type="rosrun" name="one_run" required="true" if="false"/></launch>'
+        '<node pkg="tf2_ros" type="static_transform_publisher" name="still" args="0 0 0 0 0 0 a b"/></launch>'
     )
     show = 'ExecuteProcess(cmd=["rosparam", "get", "/left/said"], output="screen", on_exit=Shutdown())'
     path = launch_file(
@@ -125,12 +125,22 @@ def test_an_xml_file_runs_with_arguments_and_namespace(launch_file, launch_py, t
     result = launch_py(path)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "hello & <you> do" in result.stdout
+    assert "process[left/still-" in result.stdout
     listing = launch_py("--show-args", tmp_path / "inner.launch").stdout
     assert "'greeting':\n        what to say\n        (default: 'none')" in listing
     refused = launch_py(tmp_path / "inner.launch", "greetin:=x", "must:=y")
     assert refused.returncode == 2
     assert "has no argument 'greetin'; did you mean 'greeting'" in refused.stdout
     assert "needs the argument 'must'" in launch_py(tmp_path / "inner.launch").stdout
+
+
+def test_a_required_node_of_an_xml_file_ends_the_launch(launch_py, tmp_path: Path) -> None:
+    path = tmp_path / "required.launch"
+    wrong = '<node pkg="tf2_ros" type="static_transform_publisher" name="wrong" args="1 2" required="true"/>'
+    path.write_text(f"<launch>{wrong}</launch>")
+    result = launch_py(path)
+    assert result.returncode == 3, result.stdout + result.stderr
+    assert "required node wrong ended" in result.stdout
 
 
 def test_the_command_names_what_is_wrong_with_its_words(launch_file, launch_py, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from launch.actions.events import EXIT_NODE_DIED, TimerAction
 from launch.actions.launch_description import LaunchDescription
-from launch.core.errors import LaunchError
+from launch.core.errors import LaunchError, located_error
 from launch.core.launch_context import LaunchContext
 from launch.core.launch_description_entity import LaunchDescriptionEntity
 from launch.core.process_request import ProcessRequest
@@ -216,7 +216,7 @@ class LaunchService:
             if handler.handle_once:
                 self.context.unregister_event_handler(handler)
             with self.context.scope(configurations), self.context.local_scope():
-                self._visit(normalize_to_list_of_entities(handler.handle(event, self.context)))
+                self._visit(self._reaction(handler, event))
         match event:
             case Shutdown():
                 self._shut_down(event)
@@ -224,6 +224,14 @@ class LaunchService:
                 self._reach_processes(event)
             case _:
                 self._start_requested()
+
+    def _reaction(self, handler: Any, event: Event) -> list[LaunchDescriptionEntity]:
+        try:
+            return normalize_to_list_of_entities(handler.handle(event, self.context))
+        except LaunchError:
+            raise
+        except Exception as error:  # a launch file is a program, whose functions may raise anything
+            raise located_error(f"{type(handler).__name__}", error, "") from error
 
     def _handle_timer(self, timer: TimerAction) -> None:
         if not timer.cancelled:

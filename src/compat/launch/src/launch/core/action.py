@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from launch.core.condition import Condition
-from launch.core.errors import LaunchError, line_of_launch_file
+from launch.core.errors import LaunchError, line_of_launch_file, located_error
 from launch.core.launch_context import LaunchContext
 from launch.core.launch_description_entity import LaunchDescriptionEntity
 
@@ -44,8 +44,8 @@ class Action(LaunchDescriptionEntity):
         except LaunchError as error:
             error.where = error.where or self.where
             raise
-        except TypeError as error:
-            raise _located(LaunchError(f"{self.describe()}: {error}"), self.where) from error
+        except Exception as error:  # a launch file is a program, whose functions may raise anything
+            raise located_error(self.describe(), error, self.where) from error
 
     def execute(self, context: LaunchContext) -> Iterable[LaunchDescriptionEntity] | None:
         """Does it; returns entities to visit next."""
@@ -63,8 +63,3 @@ class Action(LaunchDescriptionEntity):
         if self._condition is None:
             return []
         return [(self._condition.describe(), self.get_sub_entities())]
-
-
-def _located(error: LaunchError, where: str) -> LaunchError:
-    error.where = where
-    return error

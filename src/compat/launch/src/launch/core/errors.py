@@ -67,3 +67,22 @@ def line_of_launch_file() -> str:
             break
         frame = frame.f_back
     return f"{frame.f_code.co_filename}:{frame.f_lineno}"
+
+
+def located_error(what: str, error: Exception, where: str) -> LaunchError:
+    """Returns the error of a launch file's own code, with the line of that code.
+
+    Args:
+        what: What was being done.
+        error: What the code raised.
+        where: File and line, when the error itself comes from this package.
+    """
+    traceback = error.__traceback__
+    while traceback is not None:
+        code, name = traceback.tb_frame.f_code, traceback.tb_frame.f_globals.get("__name__", "")
+        if name.partition(".")[0] not in PACKAGES_OF_LAUNCH:
+            where = f"{code.co_filename}:{traceback.tb_lineno}"
+        traceback = traceback.tb_next
+    found = LaunchError(f"{what}: {type(error).__name__}: {error}")
+    found.where = where
+    return found
