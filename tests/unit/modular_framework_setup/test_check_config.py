@@ -237,3 +237,11 @@ def test_the_page_of_a_broken_package_lists_its_faults(small: SmallPackage, tmp_
     assert main([str(small.folder), "--html", str(page)]) == 1
     assert "not an XML document" in page.read_text()
     assert main([str(small.folder), "--html", str(tmp_path / "none" / "robot.html")]) == 1
+
+
+def test_a_link_that_is_missing_in_many_pairs_is_told_once(small: SmallPackage) -> None:
+    pairs = "".join(f'<disable_collisions link1="camera" link2="{name}"/>\n' for name in ("base", "turret", "boom"))
+    line = small.edit(SRDF, '  <disable_collisions link1="base"', pairs + '  <disable_collisions link1="base"')
+    (fault,) = small.faults()
+    assert fault.location.line == line
+    assert "(and in 2 more pairs): link1 'camera' is unknown" in fault.message

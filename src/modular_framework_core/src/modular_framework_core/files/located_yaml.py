@@ -175,7 +175,7 @@ class _Reader:
                         [
                             Fault(
                                 self._location(event),
-                                "the file has a second document; a task is one document, remove the '---'",
+                                "the file has a second document; one is allowed, remove the '---'",
                             )
                         ]
                     )

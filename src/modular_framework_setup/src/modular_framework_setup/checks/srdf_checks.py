@@ -179,11 +179,20 @@ class _SrdfChecker:
                 )
 
     def _check_pairs(self) -> None:
+        """Notes each link that the robot lacks once, however many pairs it is in."""
         links = self._tree.links
+        unknown: dict[str, list[tuple[Element, str]]] = {}
         for tag in ("disable_collisions", "enable_collisions"):
             for element in self._root.findall(tag):
                 for key in ("link1", "link2"):
-                    self._check_name(element, key, key, links)
+                    name = (element.get(key) or "").strip()
+                    if name not in links:
+                        unknown.setdefault(name, []).append((element, key))
+        for name, places in unknown.items():
+            element, key = places[0]
+            more = f" (and in {len(places) - 1} more pairs)" if len(places) > 1 else ""
+            what = f"<{element.tag}>{more}: {key}" if name else f"<{element.tag}>{more} has no attribute '{key}':"
+            self._faults.add_unknown(self._at(element), what, name, links)
         for tag in ("disable_default_collisions", "link_sphere_approximation"):
             for element in self._root.findall(tag):
                 self._check_name(element, "link", "link", links)
