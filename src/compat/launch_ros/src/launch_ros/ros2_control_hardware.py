@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from launch.core.screen_log import get_logger
 
 from launch_ros.namespaces import full_name
 from launch_ros.node_parameters import DESCRIPTION
+from modular_framework_urdf import xml_text
 from modular_framework_urdf.robot import Joint
 from modular_framework_urdf.srdf_reader import read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
@@ -72,13 +72,13 @@ def read_ros2_control(urdf: str) -> list[Ros2ControlHardware]:
         LaunchError: The description is no XML, or a tag names no hardware.
     """
     try:
-        root = ElementTree.fromstring(urdf)
-    except ElementTree.ParseError as error:
-        raise LaunchError(f"{DESCRIPTION} is no XML: {error}") from None
+        root = xml_text.parse(urdf, DESCRIPTION)
+    except xml_text.XmlError as error:
+        raise LaunchError(str(error)) from None
     return [_hardware(tag) for tag in root.iter("ros2_control")]
 
 
-def _hardware(tag: ElementTree.Element) -> Ros2ControlHardware:
+def _hardware(tag: xml_text.Element) -> Ros2ControlHardware:
     name = tag.get("name", "")
     plugin = (tag.findtext("hardware/plugin") or "").strip()
     if not plugin:
@@ -93,7 +93,7 @@ def _hardware(tag: ElementTree.Element) -> Ros2ControlHardware:
     return Ros2ControlHardware(name, plugin, parameters, tuple(joints))
 
 
-def _joint(tag: ElementTree.Element) -> Ros2ControlJoint:
+def _joint(tag: xml_text.Element) -> Ros2ControlJoint:
     name = tag.get("name", "")
     interfaces = tuple(sorted(each.get("name", "") for each in tag.findall("command_interface")))
     text = tag.findtext("state_interface[@name='position']/param[@name='initial_value']")

@@ -6,7 +6,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
-from xml.etree import ElementTree
 
 import roslaunch.arg_dump
 import roslaunch.config
@@ -14,6 +13,8 @@ import roslaunch.core
 import roslaunch.substitution_args
 import roslaunch.xmlloader
 import rospkg
+
+from modular_framework_urdf import xml_text
 
 BOOLEANS = ("true", "false", "1", "0")
 """Texts that roslaunch accepts as a bool, in upper or lower case."""
@@ -51,9 +52,13 @@ def known_arguments(path: str) -> dict[str, tuple[str, str | None]]:
 
 def _files_with_all_arguments(path: str) -> list[str]:
     """Returns the launch files that a launch file includes with all its arguments."""
+    try:
+        launch = xml_text.read(Path(path))
+    except xml_text.XmlError as error:
+        raise roslaunch.core.RLException(str(error)) from error
     return [
         roslaunch.substitution_args.resolve_args(include.get("file", ""))
-        for include in ElementTree.parse(path).getroot().findall("include")
+        for include in launch.findall("include")
         if include.get("pass_all_args", "").lower() in ("true", "1")
     ]
 

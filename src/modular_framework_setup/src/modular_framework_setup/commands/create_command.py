@@ -9,8 +9,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from lxml import etree
-
 from modular_framework_setup.checks.package_check import check_package
 from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.creation.errors import CreationError
@@ -20,6 +18,7 @@ from modular_framework_setup.creation.questions import ask_name, confirm_parts
 from modular_framework_setup.creation.robot_parts import RobotParts
 from modular_framework_setup.creation.robot_plan import Choices, RobotPlan, make_plan
 from modular_framework_setup.creation.source_urdf import read_source
+from modular_framework_urdf import xml_text
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -110,8 +109,8 @@ def _name(given: argparse.Namespace, is_asking: bool) -> str:
 def _name_in(path: Path) -> str:
     """Returns the name the URDF gives the robot, as a package may be called."""
     try:
-        name = etree.parse(str(path)).getroot().get("name", "")
-    except (OSError, etree.XMLSyntaxError):
+        name = xml_text.read(path).get("name", "")
+    except (OSError, xml_text.XmlError):
         name = ""
     return (
         re.sub(r"^[^a-z]+|_+$", "", re.sub(r"[^a-z0-9]+", "_", (name or path.name.partition(".")[0]).lower()))

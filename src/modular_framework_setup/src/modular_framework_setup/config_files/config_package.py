@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import rospkg
-from lxml import etree
 
 from modular_framework_core.files.faults import FaultList, SourceLocation, closest, nearest
 from modular_framework_core.files.located_yaml import Mapping as YamlMapping
 from modular_framework_core.files.located_yaml import Scalar
 from modular_framework_setup.config_files.yaml_files import load_yaml
+from modular_framework_urdf import xml_text
 
 SETTINGS = ".setup_assistant"
 SETTINGS_KEY = "moveit_setup_assistant_config"
@@ -79,10 +79,10 @@ class ConfigPackage:
                 found |= {key: value for key, value in _XACRO_ARGUMENT.findall(given) if "$(" not in value}
         return found
 
-    def _launch_elements(self, tag: str) -> Iterator[etree._Element]:
+    def _launch_elements(self, tag: str) -> Iterator[xml_text.Element]:
         for path in self.launch_files():
-            with suppress(OSError, etree.XMLSyntaxError):  # the check of launch files says so
-                yield from etree.parse(str(path)).getroot().iter(tag)
+            with suppress(OSError, xml_text.XmlError):  # the check of launch files says so
+                yield from xml_text.read(path).iter(tag)
 
 
 def _yaml_files(folder: Path) -> list[Path]:
@@ -148,8 +148,8 @@ def find_package(name: str) -> str:
 def package_name(folder: Path) -> str:
     """Returns the name in a folder's package.xml, else the folder's."""
     try:
-        name = etree.parse(str(folder / "package.xml")).getroot().findtext("name")
-    except (OSError, etree.XMLSyntaxError):
+        name = xml_text.read(folder / "package.xml").findtext("name")
+    except (OSError, xml_text.XmlError):
         name = None
     return (name or "").strip() or folder.resolve().name
 
