@@ -181,7 +181,7 @@ def test_without_a_description_the_joints_are_those_of_the_controllers() -> None
 @pytest.mark.parametrize(
     ("urdf", "message"),
     [
-        ("<robot", "no XML"),
+        ("<robot", "not an XML document"),
         (f"<robot>{tag('arm', '')}</robot>", "name='arm'> has no <hardware><plugin>"),
         (f"<robot>{tag('arm', MOCK, joint('a', 'torque'))}</robot>", r"'a' has the command interfaces \['torque'\]"),
         (f"<robot>{tag('arm', MOCK, joint('a', initial='x'))}</robot>", "initial value of joint 'a' is 'x'"),
