@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from top_down_grasps.gripper_geometry import GripperGeometryError, measure_gripper
 from top_down_grasps.hand_axes import hand_axes
 
 FINGERS = np.array([[0.04, 0.0, -0.02], [-0.04, 0.0, -0.02]])
@@ -33,3 +34,29 @@ def test_the_axes_turn_with_the_frame(approach: tuple[float, float], yaw: float)
 def test_a_hand_without_two_fingers_is_refused(fingers: np.ndarray, fault: str) -> None:
     with pytest.raises(ValueError, match=fault):
         hand_axes(fingers, PALM)
+
+
+def slides(palm: str, finger: str) -> str:
+    """A hand of two fingers along x, 40 mm ahead of a palm."""
+    return f"""<robot name="r"><link name="palm">{palm}</link><link name="tip"/>
+<joint name="mount" type="fixed"><parent link="palm"/><child link="tip"/><origin xyz="0 0 0.05"/></joint>
+<link name="left">{FINGER}</link><link name="right">{finger}</link>
+<joint name="f" type="prismatic"><parent link="palm"/><child link="left"/><axis xyz="1 0 0"/><origin xyz="-0.06 0 0"/>
+  <limit lower="0" upper="0.055" effort="1" velocity="1"/></joint>
+<joint name="g" type="prismatic"><parent link="palm"/><child link="right"/><axis xyz="-1 0 0"/><origin xyz="0.06 0 0"/>
+  <limit lower="0" upper="0.055" effort="1" velocity="1"/><mimic joint="f"/></joint></robot>"""
+
+
+FINGER = '<collision><origin xyz="0 0 0.04"/><geometry><box size="0.01 0.03 0.05"/></geometry></collision>'
+
+
+@pytest.mark.parametrize("palm", ["", '<collision><geometry><sphere radius="0.01"/></geometry></collision>'])
+def test_a_palm_may_have_no_shape(palm: str) -> None:
+    gripper = measure_gripper(slides(palm, FINGER), "tip", "f")
+    assert gripper.axes == pytest.approx(np.eye(3))
+    assert gripper.max_opening == pytest.approx(0.11)
+
+
+def test_a_finger_without_a_shape_is_named() -> None:
+    with pytest.raises(GripperGeometryError, match=r"last finger links \['left', 'right'\]"):
+        measure_gripper(slides("", ""), "tip", "f")

@@ -157,7 +157,7 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     positions = np.linspace(limit.lower, limit.upper, SAMPLES)
     parts = list(_parts(model, grasp_link, joint, positions))
     fingers = model.finger_links(joint)
-    axes = _hand_axes(parts, fingers, set(model.moving_links(joint)))
+    axes = _hand_axes(parts, fingers, set(model.moving_links(joint)), model.origin_of_fingers(grasp_link, joint))
     parts = [part.turned(axes) for part in parts]
     measured = [_measure(parts, fingers, grasp_link, sample) for sample in range(SAMPLES)]
     openings = np.array([each.opening for each in measured])
@@ -178,23 +178,26 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
     )
 
 
-def _hand_axes(parts: list[HandPart], fingers: list[str], moving: set[str]) -> Array:
-    """Finds the hand's axes (3, 3) in the grasp frame, with the fingers where they are farthest from each other."""
+def _hand_axes(parts: list[HandPart], fingers: list[str], moving: set[str], origin: Array) -> Array:
+    """Finds the hand's axes (3, 3) in the grasp frame, with the fingers where they are farthest from each other.
+
+    The palm is where its collision shapes are, or else at the origin (3,) of the link that the fingers hang on.
+    """
     centres = {
         link: np.concatenate([part.corners for part in parts if part.link == link], axis=1).mean(axis=1)
         for link in {part.link for part in parts}
     }  # link -> (samples, 3)
     ends = np.array([centres[link] for link in fingers if link in centres])
     palm = [part.corners for part in parts if part.link not in moving]
-    if len(ends) < 2 or not palm:
+    if len(ends) < 2:
         raise GripperGeometryError(
-            f"the last finger links {fingers}, or the link they hang on, have no collision shapes; give at least two "
-            "finger links and the palm a collision element"
+            f"fewer than two of the last finger links {fingers} have collision shapes; give each a collision element"
         )
     spread = np.linalg.norm(ends[:, None] - ends[None, :], axis=3).max(axis=(0, 1))
     sample = int(np.argmax(spread))
     try:
-        return hand_axes(ends[:, sample], np.concatenate([each[sample] for each in palm]).mean(axis=0))
+        centre = np.concatenate([each[sample] for each in palm]).mean(axis=0) if palm else origin
+        return hand_axes(ends[:, sample], centre)
     except ValueError as error:
         raise GripperGeometryError(f"the hand has no closing direction: {error}") from error
 
@@ -292,6 +295,10 @@ class _Model:
             if not more:
                 return [link for link in self.links if link in links]
             links |= more
+
+    def origin_of_fingers(self, frame: str, joint: str) -> Array:
+        """Origin (3,) of the link that the fingers of a joint hang on, in the frame of another link."""
+        return (np.linalg.inv(self.pose(frame, {})) @ self.pose(self.joints[joint].parent, {}))[:3, 3]
 
     def bodies_of(self, link: str) -> Iterator[ConvexBody]:
         """Collision shapes of a link in its own frame."""
