@@ -30,7 +30,7 @@ Makes the container NAME and starts the framework in it; one that exists is star
   usb=true|false             hand over all USB devices, also those plugged in later (default: false)
   real_time=true|false       allow real-time priority and locked memory, for hardware (default: false)
   headless=true|false        true: no window, end with the task (default: false if there is a display)
-  reinstall=true|false       build (or pull) the image again and make the container anew; what was written in the old
+  reinstall=true|false       build (or pull) the image again and replace the container; what was written in the old
                              one, and not in a workspace, is lost (default: false)
   install_engine=ask|yes|no  install Docker Engine where it is missing (default: ask, which is no without a terminal)
   ARG:=VALUE                 arguments of start_framework.launch. A container keeps them; for one that exists, new ones
@@ -297,13 +297,13 @@ make_container() {
   docker create "${options[@]}" "$image" run >/dev/null
 }
 
-# Makes the container anew from a new image; the old one of each goes when the new one is there.
+# Replaces the container by one of a new image; the old container and image go when the new ones are there.
 replace_container() {
   local old
   old=$(image_id)
   if container_exists; then
     check_made_here
-    check_not_running "it cannot be made anew"
+    check_not_running "it cannot be replaced"
   fi
   prepare_image
   [ -z "$workspace" ] || check_user_of_image
@@ -312,7 +312,7 @@ replace_container() {
   remove_old_image "$old"
 }
 
-# Devices, folders and the like cannot be changed in a container: whoever asks for other ones must be told.
+# Devices, folders and the like cannot be changed in a container: asking for other ones is an error.
 check_same_options() {
   local name made
   check_made_here
@@ -320,7 +320,7 @@ check_same_options() {
     is_given "$name" || continue
     made=$(option_of_container "$name")
     [ "$made" = "${!name}" ] || fail "container '$container_name' exists already, with $name='$made'" \
-      "start it with what it has, choose another container_name, or make it anew with reinstall=true"
+      "start it with what it has, choose another container_name, or replace it with reinstall=true"
   done
 }
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import rospy
 import tf2_ros
+from fake_panda import FAKE_PANDA, fast_panda_arm
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, TransformStamped, Vector3
 from moveit_commander import MoveGroupCommander, PlanningSceneInterface, RobotCommander
 from moveit_msgs.msg import (
@@ -33,16 +34,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectoryPoint
 
 MOBILE = '<group name="mobile"><joint name="virtual_joint"/><group name="panda_arm"/></group>'
 ROOT, TIP, UPRIGHT = "panda_link0", "panda_link8", Quaternion(0.0, 0.0, 0.0, 1.0)
-LAUNCH = """<launch>
-  <node name="joint_state_publisher" pkg="joint_state_publisher" type="joint_state_publisher">
-    <rosparam param="source_list">[move_group/fake_controller_joint_states]</rosparam>
-  </node>
-  <node name="robot_state_publisher" pkg="robot_state_publisher" type="robot_state_publisher"/>
-  <include file="$(find panda_moveit_config)/launch/move_group.launch">
-    <arg name="moveit_controller_manager" value="fake"/>
-    <arg name="load_robot_description" value="true"/>
-  </include>
-  <param name="robot_description_semantic" value={srdf}/>
+LAUNCH = f"""<launch>
+{FAKE_PANDA}  <param name="robot_description_semantic" value={{srdf}}/>
 </launch>"""
 
 
@@ -53,10 +46,7 @@ def arm(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[MoveGro
     floating = floating.replace("<end_effector", f"{MOBILE}<end_effector", 1)
     assert floating != text
     session = ros_launch(LAUNCH.format(srdf=quoteattr(floating)))
-    session.wait_for_service("plan_kinematic_path", 120.0)
-    commander = MoveGroupCommander("panda_arm", wait_for_servers=30.0)
-    commander.set_max_velocity_scaling_factor(1.0)
-    commander.set_max_acceleration_scaling_factor(1.0)
+    commander = fast_panda_arm(session)
     yield commander
     assert session.alive(), session.log()
     moveit_commander.roscpp_shutdown()

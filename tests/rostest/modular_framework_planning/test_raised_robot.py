@@ -10,6 +10,7 @@ from typing import Any
 import moveit_commander
 import pytest
 import rospy
+from fake_panda import FAKE_PANDA, fast_panda_arm
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_commander import MoveGroupCommander, PlanningSceneInterface, RobotCommander
 from moveit_msgs.msg import MoveItErrorCodes, PlanningSceneComponents, RobotState
@@ -21,24 +22,13 @@ ROOT, HEIGHT, UPRIGHT = "panda_link0", 0.5, Quaternion(0.0, 0.0, 0.0, 1.0)
 LAUNCH = f"""<launch>
   <node pkg="tf2_ros" type="static_transform_publisher" name="table" args="0 0 {HEIGHT} 0 0 0 world {ROOT}"/>
   <node pkg="tf2_ros" type="static_transform_publisher" name="mast" args="0.3 0.2 2.0 0 0 0 world camera"/>
-  <node name="joint_state_publisher" pkg="joint_state_publisher" type="joint_state_publisher">
-    <rosparam param="source_list">[move_group/fake_controller_joint_states]</rosparam>
-  </node>
-  <node name="robot_state_publisher" pkg="robot_state_publisher" type="robot_state_publisher"/>
-  <include file="$(find panda_moveit_config)/launch/move_group.launch">
-    <arg name="moveit_controller_manager" value="fake"/>
-    <arg name="load_robot_description" value="true"/>
-  </include>
-</launch>"""
+{FAKE_PANDA}</launch>"""
 
 
 @pytest.fixture(scope="module")
 def arm(user_packages: Path, ros_launch: Callable[..., Any]) -> Iterator[MoveGroupCommander]:
     session = ros_launch(LAUNCH)
-    session.wait_for_service("plan_kinematic_path", 120.0)
-    commander = MoveGroupCommander("panda_arm", wait_for_servers=30.0)
-    commander.set_max_velocity_scaling_factor(1.0)
-    commander.set_max_acceleration_scaling_factor(1.0)
+    commander = fast_panda_arm(session)
     until(lambda: {"world", "camera"} <= {item.child_frame_id for item in scene().fixed_frame_transforms}, "tf")
     yield commander
     assert session.alive(), session.log()

@@ -20,7 +20,7 @@ class Deployer:
     """Runs the deployer with the recording docker first in PATH.
 
     Attributes:
-        folder: State of the stand-in; `bin` in it is first in PATH.
+        folder: State of the recording `docker` command; `bin` in it is first in PATH.
         env: Environment variables that a test adds.
         path: The rest of PATH.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one-line deployer makes the right calls, recorded by a stand-in for the docker command."""
+"""The one-line deployer makes the right calls, recorded by a fake `docker` command."""
 
 from __future__ import annotations
 

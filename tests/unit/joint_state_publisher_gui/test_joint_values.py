@@ -89,7 +89,7 @@ def test_a_position_set_by_hand_keeps_the_limits(robot: Robot) -> None:
     values.set_position("turn", 5.0)
     values.set_position("wheel", 4.0)
     assert values.positions()["turn"] == 2.0
-    assert values.positions()["wheel"] == pytest.approx(4.0 - 2 * math.pi), "a continuous joint goes round"
+    assert values.positions()["wheel"] == pytest.approx(4.0 - 2 * math.pi), "a continuous joint wraps"
 
 
 def test_random_positions_keep_the_limits_and_differ(robot: Robot) -> None:

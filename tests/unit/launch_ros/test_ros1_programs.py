@@ -42,7 +42,7 @@ def visited(*nodes: Node) -> LaunchContext:
 
 
 def hardware(urdf: str, srdf: str = "", *, controllers: dict | None = None) -> dict:
-    """What a control node is told of its hardware: all parameters but those of controllers and descriptions."""
+    """The parameters of a control node's hardware: all but those of controllers and descriptions."""
     description = {"robot_description": urdf, **({"robot_description_semantic": srdf} if srdf else {})}
     control = Node(package="controller_manager", executable="ros2_control_node", parameters=[controllers or {}])
     other = Node(package="tf2_ros", executable="buffer_server", name="o", parameters=[description] if urdf else [])
@@ -146,9 +146,9 @@ def test_the_hardware_is_what_the_description_names() -> None:
 
 def test_mock_hardware_is_one_for_each_kind_of_command() -> None:
     mixed = tag("arm", MOCK, joint("a"), joint("wheel", "velocity"))
-    told = hardware(f"<robot name='r'>{mixed}</robot>")
-    assert told["/robot_hardware"] == ["arm_position", "arm_velocity"]
-    assert told["/arm_velocity/command_interface"] == "VelocityJointInterface"
+    parameters = hardware(f"<robot name='r'>{mixed}</robot>")
+    assert parameters["/robot_hardware"] == ["arm_position", "arm_velocity"]
+    assert parameters["/arm_velocity/command_interface"] == "VelocityJointInterface"
 
 
 def test_without_a_tag_all_joints_are_mock_and_begin_in_a_named_state() -> None:
@@ -167,10 +167,10 @@ def test_without_a_tag_all_joints_are_mock_and_begin_in_a_named_state() -> None:
         "<robot name='r'><group name='g'><joint name='a'/></group>"
         "<group_state name='home' group='g'><joint name='a' value='0.7'/></group_state></robot>"
     )
-    told = hardware(f"<robot name='r'>{links}{joints}</robot>", srdf)
-    assert told["/controller_manager/joints"] == ["a", "b"]
-    assert told["/controller_manager/initial_positions/a"] == 0.7
-    assert told["/controller_manager/initial_positions/b"] == 1.5  # 0 is outside of its limits
+    parameters = hardware(f"<robot name='r'>{links}{joints}</robot>", srdf)
+    assert parameters["/controller_manager/joints"] == ["a", "b"]
+    assert parameters["/controller_manager/initial_positions/a"] == 0.7
+    assert parameters["/controller_manager/initial_positions/b"] == 1.5  # 0 is outside of its limits
 
 
 def test_without_a_description_the_joints_are_those_of_the_controllers() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A cart with an arm of three joints on it, joined to the world by a virtual joint, and its forward kinematics anew."""
+"""A cart with an arm of three joints, joined to the world by a virtual joint, and its forward kinematics on its own."""
 
 from __future__ import annotations
 

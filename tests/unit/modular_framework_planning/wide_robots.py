@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A body with a lift, two arms with grippers and a head, and its forward kinematics anew."""
+"""A body with a lift, two arms with grippers and a head, and its forward kinematics, computed independently."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Positions, velocities and efforts of all joints: set by hand or by a source, read by whoever publishes them."""
+"""Positions, velocities and efforts of all joints: set by hand or by a source, read for publishing."""
 
 from __future__ import annotations
 

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
-
 from launch.actions.process_handlers import OnProcessExit, OnProcessStart, OnShutdown
-from launch.core.errors import LaunchError, line_of_launch_file
+from launch.core.errors import refusal_of
 
 __all__ = [
     "OnProcessExit",
@@ -21,8 +19,4 @@ NOT_OFFERED = {
 }
 """Event handlers of ROS 2 that are refused, with what to do."""
 
-
-def __getattr__(name: str) -> NoReturn:
-    if name in NOT_OFFERED:
-        raise LaunchError(f"{line_of_launch_file()}: launch.event_handlers.{name} is not offered: {NOT_OFFERED[name]}")
-    raise AttributeError(f"module 'launch.event_handlers' has no attribute '{name}'")
+__getattr__ = refusal_of("launch.event_handlers", NOT_OFFERED)

@@ -118,7 +118,7 @@ def _number_or_text(text: str) -> Any:
 def hardware_parameters(
     lookup: Lookup, namespace: str, private: Mapping[str, Any], controllers: Mapping[str, Mapping[str, Any]]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Returns the parameters that tell the control node its hardware.
+    """Returns the parameters of the control node that describe its hardware.
 
     It is what `<ros2_control>` in the robot's description names. Without such a tag it is mock hardware with all joints
     of the robot that can be moved, in the first state of each group that the SRDF names. Where `type` or

@@ -131,8 +131,9 @@ class RobotModel:
         if len(roots) != 1:
             raise RobotModelError(f"URDF '{self.name}': {len(roots)} links have no parent joint; exactly one may")
         self.root_link = roots[0]
-        root_joint = _root_joint(semantics, self.root_link)
-        self.base = _moving_base(semantics, self.root_link)
+        virtual = _virtual_joint(semantics, self.root_link)
+        root_joint = _root_joint(virtual, self.root_link)
+        self.base = virtual if virtual and virtual.kind in ("planar", "floating") else None
         # As in MoveIt: the frame that a planar or floating base moves in; the root link below a fixed virtual joint.
         self.planning_frame = self.base.parent_frame if self.base else self.root_link
         ordered = [root_joint, *_depth_first(tree.values(), self.root_link)]
@@ -253,17 +254,14 @@ def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
     ]
 
 
-def _root_joint(semantics: SemanticDescription, root_link: str) -> Joint:
-    for item in semantics.virtual_joints:
-        if item.child_link == root_link:
-            return Joint(item.name, "fixed", item.parent_frame, root_link)
-    return Joint(ASSUMED_ROOT_JOINT, "fixed", "", root_link)
+def _virtual_joint(semantics: SemanticDescription, root_link: str) -> VirtualJoint | None:
+    """Returns the virtual joint above the root link, if there is one."""
+    return next((item for item in semantics.virtual_joints if item.child_link == root_link), None)
 
 
-def _moving_base(semantics: SemanticDescription, root_link: str) -> VirtualJoint | None:
-    """Returns the planar or floating virtual joint above the root link, if there is one."""
-    joints = [item for item in semantics.virtual_joints if item.child_link == root_link]
-    return joints[0] if joints and joints[0].kind in ("planar", "floating") else None
+def _root_joint(virtual: VirtualJoint | None, root_link: str) -> Joint:
+    name, frame = (virtual.name, virtual.parent_frame) if virtual else (ASSUMED_ROOT_JOINT, "")
+    return Joint(name, "fixed", frame, root_link)
 
 
 def _depth_first(joints: Iterable[Joint], root_link: str) -> list[Joint]:

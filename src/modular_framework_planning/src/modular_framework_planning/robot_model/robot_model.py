@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from modular_framework_planning.errors import ErrorCode, ModelError, UnknownNameError
+from modular_framework_planning.geometry.angles import short_way
 from modular_framework_planning.geometry.shapes import Shape
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.joint_limits import (
@@ -292,7 +293,7 @@ class RobotModel:
         """
         gap = np.asarray(end, dtype=float) - start
         endless = self.endless if indices is None else self.endless[np.asarray(indices, dtype=np.int64)]
-        return gap - np.where(endless, 2.0 * np.pi * np.round(gap / (2.0 * np.pi)), 0.0)
+        return short_way(gap, endless)
 
     def with_base(self, positions: Array, transform: Transform) -> Array:
         """Returns a copy with the root link elsewhere in the planning frame; angles are given near the present ones.

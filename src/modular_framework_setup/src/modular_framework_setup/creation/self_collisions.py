@@ -64,7 +64,7 @@ def find_verdicts(
         hands: its grippers.
         samples: random states.
         seed: of the random generator.
-        progress: told what share is done.
+        progress: called with the share that is done.
 
     Returns:
         One verdict a pair of links that have shapes, in alphabetical order.

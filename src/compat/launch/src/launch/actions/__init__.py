@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
-
 from launch.actions.configurations import (
     DeclareLaunchArgument,
     PopLaunchConfigurations,
@@ -25,7 +23,7 @@ from launch.actions.events import EmitEvent, RegisterEventHandler, Shutdown, Tim
 from launch.actions.execute_process import ExecuteLocal, ExecuteProcess
 from launch.actions.functions import LogInfo, OpaqueFunction
 from launch.actions.grouping import GroupAction, IncludeLaunchDescription
-from launch.core.errors import LaunchError, line_of_launch_file
+from launch.core.errors import refusal_of
 
 __all__ = [
     "AppendEnvironmentVariable",
@@ -56,8 +54,4 @@ __all__ = [
 NOT_OFFERED = {"OpaqueCoroutine": "the launch has no asyncio loop; use OpaqueFunction, or a process of its own"}
 """Actions of ROS 2 that are refused, with what to do."""
 
-
-def __getattr__(name: str) -> NoReturn:
-    if name in NOT_OFFERED:
-        raise LaunchError(f"{line_of_launch_file()}: launch.actions.{name} is not offered: {NOT_OFFERED[name]}")
-    raise AttributeError(f"module 'launch.actions' has no attribute '{name}'")
+__getattr__ = refusal_of("launch.actions", NOT_OFFERED)

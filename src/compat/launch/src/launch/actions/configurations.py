@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, MutableMapping
 from typing import Any
 
+from launch.actions.named_values import SetNamedValue, UnsetNamedValue
 from launch.core.action import Action
 from launch.core.errors import LaunchError, hint
 from launch.core.launch_context import LaunchContext
@@ -94,7 +95,7 @@ class DeclareLaunchArgument(Action):
         return error
 
 
-class SetLaunchConfiguration(Action):
+class SetLaunchConfiguration(SetNamedValue):
     """Sets a launch configuration.
 
     Args:
@@ -102,39 +103,19 @@ class SetLaunchConfiguration(Action):
         value: Its value.
     """
 
-    def __init__(self, name: SomeSubstitutionsType, value: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self._name = normalize_to_list_of_substitutions(name)
-        self._value = normalize_to_list_of_substitutions(value)
-
-    @property
-    def name(self) -> list[Substitution]:
-        """Its name."""
-        return self._name
-
-    @property
-    def value(self) -> list[Substitution]:
-        """Its value."""
-        return self._value
-
-    def execute(self, context: LaunchContext) -> None:
-        name = perform_substitutions(context, self._name)
-        context.launch_configurations[name] = perform_substitutions(context, self._value)
+    def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
+        return context.launch_configurations
 
 
-class UnsetLaunchConfiguration(Action):
+class UnsetLaunchConfiguration(UnsetNamedValue):
     """Forgets a launch configuration.
 
     Args:
         name: Its name.
     """
 
-    def __init__(self, name: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self._name = normalize_to_list_of_substitutions(name)
-
-    def execute(self, context: LaunchContext) -> None:
-        context.launch_configurations.pop(perform_substitutions(context, self._name), None)
+    def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
+        return context.launch_configurations
 
 
 class PushLaunchConfigurations(Action):

@@ -4,20 +4,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import MutableMapping
 from typing import Any
 
+from launch.actions.named_values import SetNamedValue, UnsetNamedValue
 from launch.core.action import Action
 from launch.core.launch_context import LaunchContext
 from launch.core.some_substitutions_type import SomeSubstitutionsType
 from launch.core.utilities import (
-    normalize_to_list_of_substitutions,
     perform_boolean,
-    perform_substitutions,
     perform_text,
 )
 
 
-class SetEnvironmentVariable(Action):
+class SetEnvironmentVariable(SetNamedValue):
     """Sets an environment variable.
 
     Args:
@@ -25,14 +25,8 @@ class SetEnvironmentVariable(Action):
         value: Its value.
     """
 
-    def __init__(self, name: SomeSubstitutionsType, value: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self._name = normalize_to_list_of_substitutions(name)
-        self._value = normalize_to_list_of_substitutions(value)
-
-    def execute(self, context: LaunchContext) -> None:
-        name = perform_substitutions(context, self._name)
-        context.environment[name] = perform_substitutions(context, self._value)
+    def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
+        return context.environment
 
 
 class AppendEnvironmentVariable(Action):
@@ -64,19 +58,15 @@ class AppendEnvironmentVariable(Action):
         context.environment[name] = perform_text(context, self._separator).join(parts)
 
 
-class UnsetEnvironmentVariable(Action):
+class UnsetEnvironmentVariable(UnsetNamedValue):
     """Removes an environment variable.
 
     Args:
         name: Its name.
     """
 
-    def __init__(self, name: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self._name = normalize_to_list_of_substitutions(name)
-
-    def execute(self, context: LaunchContext) -> None:
-        context.environment.pop(perform_substitutions(context, self._name), None)
+    def _values(self, context: LaunchContext) -> MutableMapping[str, Any]:
+        return context.environment
 
 
 class PushEnvironment(Action):

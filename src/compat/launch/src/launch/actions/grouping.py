@@ -15,7 +15,8 @@ from launch.actions.configurations import (
 )
 from launch.actions.environment import PopEnvironment, PushEnvironment, ResetEnvironment
 from launch.actions.launch_description import LaunchDescription
-from launch.actions.launch_file_sources import AnyLaunchDescriptionSource, LaunchDescriptionSource
+from launch.actions.launch_description_source import LaunchDescriptionSource
+from launch.actions.launch_file_sources import AnyLaunchDescriptionSource
 from launch.core.action import Action
 from launch.core.errors import LaunchError, hint, listed
 from launch.core.launch_context import LaunchContext

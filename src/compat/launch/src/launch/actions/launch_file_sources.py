@@ -14,18 +14,6 @@ from launch.actions.launch_description import LaunchDescription
 from launch.actions.launch_description_source import LaunchDescriptionSource
 from launch.core.errors import InvalidLaunchFileError, LaunchError, hint
 
-__all__ = [
-    "AnyLaunchDescriptionSource",
-    "FrontendLaunchDescriptionSource",
-    "InvalidLaunchFileError",
-    "LaunchDescriptionSource",
-    "PythonLaunchDescriptionSource",
-    "XMLLaunchDescriptionSource",
-    "get_launch_description_from_any_launch_file",
-    "get_launch_description_from_python_launch_file",
-    "load_python_launch_file_as_module",
-]
-
 PYTHON_ENDINGS = (".py",)
 XML_ENDINGS = (".launch", ".xml", ".test")
 FUNCTION = "generate_launch_description"
@@ -106,29 +94,34 @@ def _failed(path: Path, error: Exception) -> InvalidLaunchFileError:
     return failed
 
 
-class PythonLaunchDescriptionSource(LaunchDescriptionSource):
+class _LaunchFile(LaunchDescriptionSource):
+    """Base of launch files.
+
+    Args:
+        launch_file_path: Its path.
+    """
+
+    def __init__(self, launch_file_path: Any) -> None:
+        super().__init__(None, str(launch_file_path) if isinstance(launch_file_path, Path) else launch_file_path)
+
+
+class PythonLaunchDescriptionSource(_LaunchFile):
     """A Python launch file.
 
     Args:
         launch_file_path: Its path.
     """
 
-    def __init__(self, launch_file_path: Any) -> None:
-        super().__init__(None, _as_text(launch_file_path))
-
     def load(self, path: str) -> LaunchDescription:
         return get_launch_description_from_python_launch_file(path)
 
 
-class XMLLaunchDescriptionSource(LaunchDescriptionSource):
+class XMLLaunchDescriptionSource(_LaunchFile):
     """An XML launch file of roslaunch.
 
     Args:
         launch_file_path: Its path.
     """
-
-    def __init__(self, launch_file_path: Any) -> None:
-        super().__init__(None, _as_text(launch_file_path))
 
     def load(self, path: str) -> LaunchDescription:
         from launch.actions.ros_xml_files import describe_xml_file
@@ -136,15 +129,12 @@ class XMLLaunchDescriptionSource(LaunchDescriptionSource):
         return describe_xml_file(str(_existing(path)))
 
 
-class AnyLaunchDescriptionSource(LaunchDescriptionSource):
+class AnyLaunchDescriptionSource(_LaunchFile):
     """A launch file; the end of its name says of which kind.
 
     Args:
         launch_file_path: Its path.
     """
-
-    def __init__(self, launch_file_path: Any) -> None:
-        super().__init__(None, _as_text(launch_file_path))
 
     def load(self, path: str) -> LaunchDescription:
         return get_launch_description_from_any_launch_file(path)
@@ -166,7 +156,3 @@ def get_launch_description_from_any_launch_file(launch_file_path: str) -> Launch
     _existing(launch_file_path)
     allowed = ", ".join((*PYTHON_ENDINGS, *XML_ENDINGS))
     raise InvalidLaunchFileError(f"{launch_file_path}: is of no known kind; allowed: names that end in {allowed}")
-
-
-def _as_text(path: Any) -> Any:
-    return str(path) if isinstance(path, Path) else path

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import NoReturn
 
 PACKAGES_OF_LAUNCH = ("launch", "launch_ros", "importlib")
 """Frames of these are skipped when the line of a launch file is looked for."""
@@ -67,6 +68,22 @@ def line_of_launch_file() -> str:
             break
         frame = frame.f_back
     return f"{frame.f_code.co_filename}:{frame.f_lineno}"
+
+
+def refusal_of(module: str, not_offered: Mapping[str, str]) -> Callable[[str], NoReturn]:
+    """Returns the `__getattr__` of a module that refuses public names of ROS 2 which it does not offer.
+
+    Args:
+        module: Its name.
+        not_offered: What to do instead, by name.
+    """
+
+    def refuse(name: str) -> NoReturn:
+        if name in not_offered:
+            raise LaunchError(f"{line_of_launch_file()}: {module}.{name} is not offered: {not_offered[name]}")
+        raise AttributeError(f"module '{module}' has no attribute '{name}'")
+
+    return refuse
 
 
 def located_error(what: str, error: Exception, where: str) -> LaunchError:

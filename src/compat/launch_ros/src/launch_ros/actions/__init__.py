@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
-
 from launch.actions import TimerAction as RosTimer
-from launch.core.errors import LaunchError, line_of_launch_file
+from launch.core.errors import refusal_of
 
 from launch_ros.actions.node import Node
 from launch_ros.actions.scopes import (
@@ -38,8 +36,4 @@ NOT_OFFERED = {
 }
 """Actions of ROS 2 that are refused, with what to do."""
 
-
-def __getattr__(name: str) -> NoReturn:
-    if name in NOT_OFFERED:
-        raise LaunchError(f"{line_of_launch_file()}: launch_ros.actions.{name} is not offered: {NOT_OFFERED[name]}")
-    raise AttributeError(f"module 'launch_ros.actions' has no attribute '{name}'")
+__getattr__ = refusal_of("launch_ros.actions", NOT_OFFERED)

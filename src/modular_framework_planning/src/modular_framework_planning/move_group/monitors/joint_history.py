@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.angles import short_way
 from modular_framework_planning.geometry.spatial import Array
 
 KEPT = 2000
@@ -62,6 +63,5 @@ class JointHistory:
             return self._positions[after]
         first, last = self._times[after - 1], self._times[after]
         share = (stamp_s - first) / (last - first)
-        begin, way = self._positions[after - 1], self._positions[after] - self._positions[after - 1]
-        turns = np.where(self._endless, 2.0 * np.pi * np.round(way / (2.0 * np.pi)), 0.0)
-        return begin + share * (way - turns)
+        begin = self._positions[after - 1]
+        return begin + share * short_way(self._positions[after] - begin, self._endless)
