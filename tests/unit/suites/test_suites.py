@@ -48,6 +48,17 @@ def runner() -> Iterator[ModuleType]:
         yield module
 
 
+def test_every_suite_is_run_once_in_its_lane(runner: ModuleType) -> None:
+    assert sorted(runner.LANES) == sorted(lane for phase in runner.PHASES for lane in phase)
+    folders = [suite.path for suite in runner.suites_of("unit")]
+    assert not [folder for folder in folders if set(folder.parents) & set(folders)]  # pytest runs a folder's folders
+    lanes = {suite.name: suite.lane for kind in runner.KINDS for suite in runner.suites_of(kind)}
+    assert lanes["rostest/modular_framework_drivers/ur_arm_fault_times"] == "alone"
+    assert lanes["unit/modular_framework_drivers/ur"] == lanes["system/test_hardware_pick"] == "emulated hardware"
+    assert lanes["system/test_simulated_pick"] == "whole launches"
+    assert lanes["lint/ruff"] == "others"
+
+
 def report(results: Path, tests: int, failures: int = 0, skipped: int = 0) -> Path:
     """A folder with the results of pytest."""
     (results / "rosunit-pytest.xml").write_text(
