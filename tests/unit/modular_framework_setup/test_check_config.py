@@ -185,6 +185,15 @@ def test_files_of_moveit_2_are_understood(small: SmallPackage) -> None:
     ]
 
 
+def test_the_srdf_is_expanded_with_the_arguments_of_the_setup_assistant(small: SmallPackage) -> None:
+    opening = '<robot name="crane" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="tip" default="lost"/>'
+    small.edit("config/crane.srdf", '<robot name="crane">', opening)
+    small.edit("config/crane.srdf", 'tip_link="palm"', 'tip_link="$(arg tip)"')
+    assert any("lost" in fault.message for fault in small.faults())
+    small.edit(".setup_assistant", "crane.urdf\n", "crane.urdf\n    xacro_args: tip:=palm\n")
+    assert small.faults() == ()
+
+
 def test_a_xacro_file_that_fails_is_named_with_its_line(small: SmallPackage) -> None:
     folder = small.path("urdf").parent
     text = small.path("urdf").read_text().replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')

@@ -184,6 +184,56 @@ def test_the_srdf_may_be_a_xacro_file_with_mappings(make_package: PackageMaker) 
     assert groups(configs.to_moveit_configs().robot_description_semantic) == ["leg"]
 
 
+PLANNING_CONTEXT = """<launch>
+  <arg name="load_gripper" default="true"/>
+  <param name="semantic" command="xacro $(find r)/config/other.srdf tool:=$(arg load_gripper) side:=l"/>
+</launch>"""
+XACRO_SRDF = (
+    '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="tool" default="none"/>'
+    '<xacro:arg name="side" default="none"/><group name="$(arg tool)"/><group name="$(arg side)"/></robot>'
+)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "launch", "mappings", "expected"),
+    [
+        ("", False, None, ["none", "none"]),
+        ("", True, None, ["true", "l"]),
+        ("tool:=hand", True, None, ["hand", "l"]),
+        ("tool:=hand", True, {"side": "right"}, ["none", "right"]),
+    ],
+)
+def test_the_srdf_is_expanded_as_the_urdf_and_as_the_launch_files_of_its_package_do(
+    make_package: PackageMaker,
+    described: Path,
+    arguments: str,
+    launch: bool,
+    mappings: dict[str, str] | None,
+    expected: list[str],
+) -> None:
+    files = {**setup(arguments=arguments), "config/other.srdf": XACRO_SRDF}
+    make_package({**files, **({"launch/planning_context.launch": PLANNING_CONTEXT} if launch else {})})
+    builder = MoveItConfigsBuilder("r")
+    configs = (builder.robot_description(mappings=mappings) if mappings else builder).to_moveit_configs()
+    assert groups(configs.robot_description_semantic) == expected
+
+
+def test_mappings_of_the_srdf_alone_count_for_it(make_package: PackageMaker, described: Path) -> None:
+    launch = {"launch/planning_context.launch": PLANNING_CONTEXT}
+    make_package({**setup(arguments="tool:=hand"), **launch, "config/other.srdf": XACRO_SRDF})
+    builder = MoveItConfigsBuilder("r").robot_description(mappings={"tool": "vacuum"})
+    configs = builder.robot_description_semantic(mappings={"side": "right"}).to_moveit_configs()
+    assert groups(configs.robot_description_semantic) == ["none", "right"]
+
+
+def test_where_only_the_xacro_file_of_the_srdf_exists_it_is_taken_with_a_warning(
+    make_package: PackageMaker, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = make_package({"config/r.srdf.xacro": OTHER_SRDF}, without=["config/r.srdf"])
+    assert groups(MoveItConfigsBuilder("r").to_moveit_configs().robot_description_semantic) == ["other"]
+    assert f"File {folder}/config/r.srdf doesn't exist; using {folder}/config/r.srdf.xacro" in caplog.text
+
+
 def test_another_name_of_the_description_is_that_of_all_four_parameters(make_package: PackageMaker) -> None:
     make_package()
     parameters = MoveItConfigsBuilder("r", robot_description="left").to_moveit_configs().to_dict()

@@ -174,8 +174,11 @@ def test_a_launch_file_that_roslaunch_refuses_is_a_warning_and_the_packaged_plan
     assert f"{folder}/launch/ompl_planning_pipeline.launch.xml: its parameters are left out" in caplog.text
 
 
-def test_an_argument_that_a_launch_file_requires_has_the_value_of_the_package(make_package: PackageMaker) -> None:
-    required = '<launch><arg name="side"/><param name="planning_plugin" value="$(arg side)/Planner"/></launch>'
+@pytest.mark.parametrize("declaration", ['<arg name="side"/>', ""])
+def test_an_argument_that_a_launch_file_requires_has_the_value_of_the_package(
+    make_package: PackageMaker, declaration: str
+) -> None:
+    required = f'<launch>{declaration}<param name="planning_plugin" value="$(arg side)/Planner"/></launch>'
     make_package({"launch/own_planning_pipeline.launch.xml": required, "config/r.urdf": "<robot/>"})
     builder = (
         MoveItConfigsBuilder("r").robot_description(mappings={"side": "left"}).planning_pipelines(pipelines=["own"])

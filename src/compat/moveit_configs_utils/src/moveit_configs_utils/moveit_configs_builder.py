@@ -70,6 +70,7 @@ class MoveItConfigsBuilder(ParameterBuilder):
         if self._own_urdf is None and not self._setup.urdf_path:
             self._own_urdf = self._guessed(f"{robot_name}.urdf", "URDF", own)
         self._srdf = Path(self._setup.srdf_path or self._guessed(f"{robot_name}.srdf", "SRDF"))
+        self._urdf_mappings: dict[Any, Any] = {}
 
     def _guessed(self, name: str, kind: str, looked_for: Path | None = None) -> Path:
         """Returns where a file is expected that nothing names, and warns where its name was looked for."""
@@ -99,10 +100,9 @@ class MoveItConfigsBuilder(ParameterBuilder):
         else:
             package = self._setup.urdf_package
             path = (package_folder(package) if package else self._package_path) / self._setup.urdf_path
-        arguments = _texts(mappings or self._setup.xacro_arguments)
-        self._yaml.arguments.update(
-            {name: value for name, value in arguments.items() if isinstance(name, str) and isinstance(value, str)}
-        )
+        self._urdf_mappings = _texts(mappings or {})
+        arguments = self._urdf_mappings or dict(self._setup.xacro_arguments)
+        self._yaml.arguments.update(_known_texts(arguments))
         try:
             text = _expanded(path, arguments)
         except ParameterBuilderFileNotFoundError as error:
@@ -116,14 +116,22 @@ class MoveItConfigsBuilder(ParameterBuilder):
         return self
 
     def robot_description_semantic(self, file_path: Path | str | None = None, mappings: Mappings | None = None) -> Self:
-        """Loads the SRDF; another one than `.setup_assistant` names, and with xacro arguments, if they are given.
+        """Loads the SRDF.
+
+        Args:
+            file_path: another one than `.setup_assistant` names.
+            mappings: values of the xacro arguments; without any, those that `robot_description` was given before, or
+                else those of the package's launch files and `xacro_args` of `.setup_assistant`.
 
         Raises:
             ParameterBuilderFileNotFoundError: there is no such file.
             ParameterFileError: xacro cannot expand it.
         """
-        text = _expanded(self._package_path / (file_path or self._srdf), _texts(mappings or {}))
-        self._configs.robot_description_semantic = {f"{self._description}_semantic": text}
+        path = self._package_path / file_path if file_path else _or_its_xacro(self._package_path / self._srdf)
+        arguments = _texts(mappings or {}) or _known_texts(self._urdf_mappings)
+        if not mappings and not self._urdf_mappings:
+            arguments = {**self._yaml.xacro_arguments(path.name), **self._setup.xacro_arguments}
+        self._configs.robot_description_semantic = {f"{self._description}_semantic": _expanded(path, arguments)}
         return self
 
     def robot_description_kinematics(self, file_path: Path | str | None = None) -> Self:
@@ -302,8 +310,22 @@ def _expanded(path: Path, mappings: Mappings) -> Any:
     return ParameterValue(Xacro(str(path), mappings=mappings), value_type=str)
 
 
+def _or_its_xacro(path: Path) -> Path:
+    """Returns a file; where it does not exist the xacro file it is made from, with a warning, if that one does."""
+    xacro_file = path.with_name(f"{path.name}.xacro")
+    if path.is_file() or not xacro_file.is_file():
+        return path
+    LOGGER.warning("File %s doesn't exist; using %s", path, xacro_file)
+    return xacro_file
+
+
 def _texts(mappings: Mappings) -> dict[Any, Any]:
     return {_text(name): _text(value) for name, value in mappings.items()}
+
+
+def _known_texts(mappings: Mappings) -> dict[str, str]:
+    """Returns the entries that are known before the launch file runs."""
+    return {name: value for name, value in mappings.items() if isinstance(name, str) and isinstance(value, str)}
 
 
 def _text(value: Any) -> Any:

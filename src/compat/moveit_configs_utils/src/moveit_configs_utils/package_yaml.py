@@ -8,18 +8,17 @@ Packages of MoveIt 1 may write `$(arg arm_id)_joint1` in their YAML files: their
 from __future__ import annotations
 
 import logging
-import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from launch_param_builder import load_file, parse_parameters
 
-from modular_framework_urdf.xml_text import XmlError, parse
+from modular_framework_urdf.launch_arguments import ARGUMENT, launch_files, xacro_arguments
+from modular_framework_urdf.xml_text import Element, XmlError, parse
 
 LOGGER = logging.getLogger(__name__)
-ARGUMENT = re.compile(r"\$\(arg +([^)\s]+) *\)")
-FIRST = ("planning_context.launch", "move_group.launch")  # of launch files that give an argument different defaults
 
 
 @dataclass(slots=True)
@@ -59,18 +58,21 @@ class PackageYaml:
 
     def values(self) -> dict[str, str]:
         """Returns the values of arguments: those given, then plain defaults in the package's launch files."""
-        files = sorted(self.package.glob("launch/*.launch*"), key=lambda path: (path.name not in FIRST, path.name))
         result = dict(self.arguments)
-        for path in files:
-            if path.suffix not in (".launch", ".xml"):
-                continue
-            try:
-                root = parse(path.read_bytes(), str(path))
-            except (XmlError, OSError) as error:
-                LOGGER.warning("%s: defaults of its arguments are not known: %s", path, error)
-                continue
+        for root in self._roots_of_launch_files():
             for argument in root.findall("arg"):
                 name, default = argument.get("name"), argument.get("default")
                 if name and default is not None and "$(" not in default:
                     result.setdefault(name, default)
         return {"fake_execution_type": "interpolate", **result}
+
+    def xacro_arguments(self, file_name: str) -> dict[str, str]:
+        """Returns the arguments with which the package's launch files expand a xacro file."""
+        return xacro_arguments(self._roots_of_launch_files(), file_name, self.values())
+
+    def _roots_of_launch_files(self) -> Iterator[Element]:
+        for path in launch_files(self.package):
+            try:
+                yield parse(path.read_bytes(), str(path))
+            except (XmlError, OSError) as error:
+                LOGGER.warning("%s: defaults of its arguments are not known: %s", path, error)

@@ -14,6 +14,8 @@ import roslaunch.core
 import roslaunch.xmlloader
 import rospkg
 
+from modular_framework_urdf.launch_arguments import ARGUMENT
+
 LOGGER = logging.getLogger(__name__)
 
 
@@ -24,7 +26,7 @@ def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, A
 
     Args:
         path: the launch file.
-        values: of arguments that have no default there.
+        values: of arguments that have no default there; an including file may pass some it does not declare.
 
     Returns:
         The parameters; none, with a warning, where roslaunch refuses the file.
@@ -33,8 +35,7 @@ def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, A
     try:
         loader = roslaunch.xmlloader.XmlLoader()
         loader.ignore_unset_args = False
-        required = [name for name, (_, default) in roslaunch.arg_dump.get_args([str(path)]).items() if default is None]
-        given = [f"{name}:={values[name]}" for name in required if name in values]
+        given = [f"{name}:={values[name]}" for name in _arguments_without_value(path) if name in values]
         loader.load(str(path), config, argv=given, verbose=False)
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError, OSError) as error:
         reason = str(error).partition("\nROS path")[0]  # rospkg lists the whole search path behind it
@@ -48,3 +49,9 @@ def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, A
             inner = inner.setdefault(namespace, {})
         inner[last] = parameter.value
     return result
+
+
+def _arguments_without_value(path: Path) -> list[str]:
+    declared = roslaunch.arg_dump.get_args([str(path)])
+    undeclared = set(ARGUMENT.findall(path.read_text(encoding="utf-8"))) - set(declared)
+    return sorted(undeclared | {name for name, (_, default) in declared.items() if default is None})

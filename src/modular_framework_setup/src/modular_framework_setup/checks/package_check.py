@@ -82,7 +82,8 @@ def _read_robot(package: ConfigPackage, faults: FaultList) -> RobotTree | None:
 def _read_srdf(package: ConfigPackage, faults: FaultList) -> XmlDocument | None:
     if package.srdf is None:
         return None
-    return read_document(package.srdf, package.launch_mappings(package.srdf.name), faults)
+    arguments = {**package.launch_mappings(package.srdf.name), **package.xacro_arguments}
+    return read_document(package.srdf, arguments, faults)
 
 
 def _contents(document: XmlDocument | None) -> SemanticDescription | None:

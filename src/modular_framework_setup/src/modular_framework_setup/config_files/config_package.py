@@ -17,11 +17,11 @@ from modular_framework_core.files.located_yaml import Mapping as YamlMapping
 from modular_framework_core.files.located_yaml import Scalar
 from modular_framework_setup.config_files.yaml_files import load_yaml
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.launch_arguments import launch_files, xacro_arguments
 
 SETTINGS = ".setup_assistant"
 SETTINGS_KEY = "moveit_setup_assistant_config"
 _XACRO_ARGUMENT = re.compile(r"(\w+):=['\"]?([^\s'\"]+)")
-_LAUNCH_ARGUMENT = re.compile(r"\$\(arg (\w+)\)")
 
 
 class NoConfigPackageError(Exception):
@@ -56,14 +56,13 @@ class ConfigPackage:
         return files
 
     def launch_files(self) -> list[Path]:
-        """Returns its launch files of ROS 1, in order of their names."""
-        folder = self.folder / "launch"
-        return sorted(path for path in folder.glob("*") if path.name.endswith((".launch", ".launch.xml")))
+        """Returns its launch files of ROS 1, those that load the robot first."""
+        return launch_files(self.folder)
 
     def launch_arguments(self) -> dict[str, str]:
         """Returns the defaults of the launch files' arguments, as far as they are plain text."""
         found: dict[str, str] = {}
-        for item in self._launch_elements("arg"):
+        for item in (argument for root in self._launch_roots() for argument in root.iter("arg")):
             value = item.get("default") or item.get("value") or ""
             if value and "$(" not in value:
                 found.setdefault(item.get("name", ""), value)
@@ -71,18 +70,12 @@ class ConfigPackage:
 
     def launch_mappings(self, file_name: str) -> dict[str, str]:
         """Returns the xacro arguments that the launch files give a description, those whose values are known here."""
-        known, found = self.launch_arguments(), dict[str, str]()
-        for item in self._launch_elements("param"):
-            command = item.get("command", "")
-            if file_name in command:
-                given = _LAUNCH_ARGUMENT.sub(lambda match: known.get(match[1], match[0]), command)
-                found |= {key: value for key, value in _XACRO_ARGUMENT.findall(given) if "$(" not in value}
-        return found
+        return xacro_arguments(self._launch_roots(), file_name, self.launch_arguments())
 
-    def _launch_elements(self, tag: str) -> Iterator[xml_text.Element]:
+    def _launch_roots(self) -> Iterator[xml_text.Element]:
         for path in self.launch_files():
             with suppress(OSError, xml_text.XmlError):  # the check of launch files says so
-                yield from xml_text.read(path).iter(tag)
+                yield xml_text.read(path)
 
 
 def _yaml_files(folder: Path) -> list[Path]:
