@@ -174,7 +174,7 @@ def test_a_launch_file_that_roslaunch_refuses_is_a_warning_and_the_packaged_plan
     assert f"{folder}/launch/ompl_planning_pipeline.launch.xml: its parameters are left out" in caplog.text
 
 
-@pytest.mark.parametrize("declaration", ['<arg name="side"/>', ""])
+@pytest.mark.parametrize("declaration", ['<arg name="side"/>', "", '<arg name="side" value="left"/>'])
 def test_an_argument_that_a_launch_file_requires_has_the_value_of_the_package(
     make_package: PackageMaker, declaration: str
 ) -> None:

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import roslaunch.arg_dump
 import roslaunch.config
 import roslaunch.core
 import roslaunch.xmlloader
 import rospkg
 
 from modular_framework_urdf.launch_arguments import ARGUMENT
+from modular_framework_urdf.xml_text import read, to_text
 
 LOGGER = logging.getLogger(__name__)
 
@@ -52,6 +52,9 @@ def launch_file_parameters(path: Path, values: Mapping[str, str]) -> dict[str, A
 
 
 def _arguments_without_value(path: Path) -> list[str]:
-    declared = roslaunch.arg_dump.get_args([str(path)])
-    undeclared = set(ARGUMENT.findall(path.read_text(encoding="utf-8"))) - set(declared)
-    return sorted(undeclared | {name for name, (_, default) in declared.items() if default is None})
+    """Returns the arguments that a launch file declares or uses, and gives neither a value nor a default."""
+    root = read(path)
+    declared = [item for item in root.iter("arg") if item.getparent().tag != "include"]
+    used = ARGUMENT.findall(to_text(root))
+    with_value = {item.get("name") for item in declared if {"value", "default"} & set(item.keys())}
+    return sorted({str(item.get("name")) for item in declared}.union(used) - with_value)
