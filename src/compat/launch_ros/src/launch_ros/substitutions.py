@@ -13,12 +13,12 @@ from launch.core.substitution import Substitution
 from launch.core.utilities import normalize_to_list_of_substitutions, perform_substitutions, perform_text
 from launch.ros_packages import package_share_directory, program_of_package
 from launch.substitutions import PathJoinSubstitution
-from launch.substitutions.text import described
+from launch.substitutions.text import SubstitutionOfText, described
 
 __all__ = ["ExecutableInPackage", "FindPackage", "FindPackagePrefix", "FindPackageShare", "Parameter"]
 
 
-class FindPackage(Substitution):
+class FindPackage(SubstitutionOfText):
     """Base: a folder of a ROS package.
 
     Args:
@@ -26,15 +26,12 @@ class FindPackage(Substitution):
     """
 
     def __init__(self, package: SomeSubstitutionsType) -> None:
-        self._package = normalize_to_list_of_substitutions(package)
+        super().__init__(package)
 
     @property
     def package(self) -> list[Substitution]:
         """Its name."""
-        return self._package
-
-    def describe(self) -> str:
-        return f"{type(self).__name__}({described(self._package)})"
+        return self._text
 
     def find(self, package_name: str) -> str:
         """Returns the folder.
@@ -45,7 +42,7 @@ class FindPackage(Substitution):
         raise NotImplementedError(f"{type(self).__name__} does not say which folder: define find(package_name)")
 
     def perform(self, context: LaunchContext) -> str:
-        return self.find(perform_substitutions(context, self._package))
+        return self.find(perform_substitutions(context, self._text))
 
     def __truediv__(self, part: SomeSubstitutionsType) -> PathJoinSubstitution:
         """Returns a path in the folder, as `FindPackageShare("robot") / "config"`."""
@@ -80,15 +77,15 @@ class ExecutableInPackage(FindPackage):
         self._executable = normalize_to_list_of_substitutions(executable)
 
     def describe(self) -> str:
-        return f"ExecInPkg({described(self._package)}, {described(self._executable)})"
+        return f"ExecInPkg({described(self._text)}, {described(self._executable)})"
 
     def perform(self, context: LaunchContext) -> str:
         return program_of_package(
-            perform_substitutions(context, self._package), perform_substitutions(context, self._executable)
+            perform_substitutions(context, self._text), perform_substitutions(context, self._executable)
         )
 
 
-class Parameter(Substitution):
+class Parameter(SubstitutionOfText):
     """The value of a parameter that SetParameter set.
 
     Args:
@@ -97,14 +94,11 @@ class Parameter(Substitution):
     """
 
     def __init__(self, name: SomeSubstitutionsType, *, default: Any = None) -> None:
-        self._name = normalize_to_list_of_substitutions(name)
+        super().__init__(name)
         self._default = default
 
-    def describe(self) -> str:
-        return f"Parameter({described(self._name)})"
-
     def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._name)
+        name = perform_substitutions(context, self._text)
         known: dict[str, Any] = {}
         for entry in context.launch_configurations.get("global_params", ()):
             known |= entry if isinstance(entry, dict) else {}

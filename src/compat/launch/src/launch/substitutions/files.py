@@ -17,7 +17,7 @@ from launch.core.screen_log import get_logger
 from launch.core.some_substitutions_type import SomeSubstitutionsType
 from launch.core.substitution import Substitution
 from launch.core.utilities import normalize_to_list_of_substitutions, perform_substitutions, perform_text
-from launch.substitutions.text import described
+from launch.substitutions.text import SubstitutionOfText, described
 
 ON_STDERR = ("fail", "ignore", "warn", "capture")
 
@@ -49,7 +49,7 @@ class PathJoinSubstitution(Substitution):
         return PathJoinSubstitution([*self._parts, normalize_to_list_of_substitutions(part)])
 
 
-class FileContent(Substitution):
+class FileContent(SubstitutionOfText):
     """What a text file holds.
 
     Args:
@@ -57,13 +57,10 @@ class FileContent(Substitution):
     """
 
     def __init__(self, path: SomeSubstitutionsType) -> None:
-        self._path = normalize_to_list_of_substitutions(path)
-
-    def describe(self) -> str:
-        return f"FileContent({described(self._path)})"
+        super().__init__(path)
 
     def perform(self, context: LaunchContext) -> str:
-        path = Path(perform_substitutions(context, self._path))
+        path = Path(perform_substitutions(context, self._text))
         try:
             return path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
@@ -71,21 +68,20 @@ class FileContent(Substitution):
             raise SubstitutionFailure(f"FileContent: {path} cannot be read: {error}{hint(str(path), beside)}") from None
 
 
-class FindExecutable(Substitution):
+class FindExecutable(SubstitutionOfText):
     """Path of a program.
 
     Args:
         name: Its name, looked for in PATH.
     """
 
-    def __init__(self, name: SomeSubstitutionsType) -> None:
-        self._name = normalize_to_list_of_substitutions(name)
+    label = "FindExec"
 
-    def describe(self) -> str:
-        return f"FindExec({described(self._name)})"
+    def __init__(self, name: SomeSubstitutionsType) -> None:
+        super().__init__(name)
 
     def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._name)
+        name = perform_substitutions(context, self._text)
         path = context.environment.get("PATH", os.defpath)
         found = shutil.which(name, path=path)
         if found is None:
@@ -96,7 +92,7 @@ class FindExecutable(Substitution):
         return found
 
 
-class Command(Substitution):
+class Command(SubstitutionOfText):
     """What a program prints.
 
     Args:
@@ -105,19 +101,16 @@ class Command(Substitution):
     """
 
     def __init__(self, command: SomeSubstitutionsType, *, on_stderr: SomeSubstitutionsType = "fail") -> None:
-        self._command = normalize_to_list_of_substitutions(command)
+        super().__init__(command)
         self._on_stderr = normalize_to_list_of_substitutions(on_stderr)
 
     @property
     def command(self) -> list[Substitution]:
         """Program and arguments."""
-        return self._command
-
-    def describe(self) -> str:
-        return f"Command({described(self._command)})"
+        return self._text
 
     def perform(self, context: LaunchContext) -> str:
-        command = perform_substitutions(context, self._command)
+        command = perform_substitutions(context, self._text)
         on_stderr = perform_substitutions(context, self._on_stderr)
         if on_stderr not in ON_STDERR:
             raise SubstitutionFailure(
@@ -148,7 +141,7 @@ class Command(Substitution):
         return result.stdout
 
 
-class PythonExpression(Substitution):
+class PythonExpression(SubstitutionOfText):
     """The value of a Python expression, as a text.
 
     Args:
@@ -156,20 +149,19 @@ class PythonExpression(Substitution):
         python_modules: Modules that it may use; the names of `math` need no prefix.
     """
 
+    label = "PythonExpr"
+
     def __init__(self, expression: SomeSubstitutionsType, python_modules: SomeSubstitutionsType = ("math",)) -> None:
-        self._expression = normalize_to_list_of_substitutions(expression)
+        super().__init__(expression)
         self._modules = normalize_to_list_of_substitutions(python_modules)
 
     @property
     def expression(self) -> list[Substitution]:
         """The expression."""
-        return self._expression
-
-    def describe(self) -> str:
-        return f"PythonExpr({described(self._expression)})"
+        return self._text
 
     def perform(self, context: LaunchContext) -> str:
-        expression = perform_text(context, self._expression)
+        expression = perform_text(context, self._text)
         names: dict[str, Any] = {}
         try:
             for substitution in self._modules:

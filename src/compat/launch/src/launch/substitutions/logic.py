@@ -105,8 +105,8 @@ class AnySubstitution(_OfTexts):
         return any(self._truths(context))
 
 
-class AndSubstitution(AllSubstitution):
-    """Whether both texts say true.
+class _OfTwoTexts(_OfTexts):
+    """Base: a truth about two texts.
 
     Args:
         left: One text.
@@ -117,16 +117,12 @@ class AndSubstitution(AllSubstitution):
         super().__init__(left, right)
 
 
-class OrSubstitution(AnySubstitution):
-    """Whether one of two texts says true.
+class AndSubstitution(_OfTwoTexts, AllSubstitution):
+    """Whether both texts say true."""
 
-    Args:
-        left: One text.
-        right: The other.
-    """
 
-    def __init__(self, left: SomeSubstitutionsType, right: SomeSubstitutionsType) -> None:
-        super().__init__(left, right)
+class OrSubstitution(_OfTwoTexts, AnySubstitution):
+    """Whether one of two texts says true."""
 
 
 class IfElseSubstitution(Substitution):

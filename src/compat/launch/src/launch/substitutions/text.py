@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Iterable
+from typing import ClassVar
 
 from launch.core.errors import SubstitutionFailure, hint, listed
 from launch.core.launch_context import LaunchContext
@@ -18,6 +19,7 @@ __all__ = [
     "EnvironmentVariable",
     "LaunchConfiguration",
     "LocalSubstitution",
+    "SubstitutionOfText",
     "TextSubstitution",
     "ThisLaunchFile",
     "ThisLaunchFileDir",
@@ -30,7 +32,26 @@ def described(subs: Iterable[Substitution]) -> str:
     return " + ".join(each.describe() for each in subs)
 
 
-class LaunchConfiguration(Substitution):
+class SubstitutionOfText(Substitution):
+    """Base of substitutions whose value follows from one text.
+
+    Attributes:
+        label: What `describe` calls the substitution; its class where empty.
+
+    Args:
+        text: The text, which may be substitutions itself.
+    """
+
+    label: ClassVar[str] = ""
+
+    def __init__(self, text: SomeSubstitutionsType) -> None:
+        self._text = normalize_to_list_of_substitutions(text)
+
+    def describe(self) -> str:
+        return f"{self.label or type(self).__name__}({described(self._text)})"
+
+
+class LaunchConfiguration(SubstitutionOfText):
     """The value of a launch configuration, which a launch argument is too.
 
     Args:
@@ -38,8 +59,10 @@ class LaunchConfiguration(Substitution):
         default: Value when it is not set.
     """
 
+    label = "LaunchConfig"
+
     def __init__(self, variable_name: SomeSubstitutionsType, *, default: object = None) -> None:
-        self._name = normalize_to_list_of_substitutions(variable_name)
+        super().__init__(variable_name)
         self._default: list[Substitution] | None = None
         if default is not None:
             several = isinstance(default, Iterable) and not isinstance(default, str)
@@ -51,13 +74,10 @@ class LaunchConfiguration(Substitution):
     @property
     def variable_name(self) -> list[Substitution]:
         """Its name."""
-        return self._name
-
-    def describe(self) -> str:
-        return f"LaunchConfig({described(self._name)})"
+        return self._text
 
     def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._name)
+        name = perform_substitutions(context, self._text)
         value = context.read_configuration(name)
         if value is not None:
             return str(value)
@@ -70,7 +90,7 @@ class LaunchConfiguration(Substitution):
         )
 
 
-class EnvironmentVariable(Substitution):
+class EnvironmentVariable(SubstitutionOfText):
     """The value of an environment variable.
 
     Args:
@@ -78,15 +98,14 @@ class EnvironmentVariable(Substitution):
         default_value: Value when it is not set.
     """
 
+    label = "EnvVar"
+
     def __init__(self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None) -> None:
-        self._name = normalize_to_list_of_substitutions(name)
+        super().__init__(name)
         self._default = default_value
 
-    def describe(self) -> str:
-        return f"EnvVar({described(self._name)})"
-
     def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._name)
+        name = perform_substitutions(context, self._text)
         if name in context.environment:
             return context.environment[name]
         if self._default is not None:
@@ -139,7 +158,7 @@ class ThisLaunchFileDir(ThisLaunchFile):
         return os.path.dirname(super().perform(context))
 
 
-class AnonName(Substitution):
+class AnonName(SubstitutionOfText):
     """A name that no other process has; the same for the same base name within a launch.
 
     Args:
@@ -147,13 +166,10 @@ class AnonName(Substitution):
     """
 
     def __init__(self, name: SomeSubstitutionsType) -> None:
-        self._name = normalize_to_list_of_substitutions(name)
-
-    def describe(self) -> str:
-        return f"AnonName({described(self._name)})"
+        super().__init__(name)
 
     def perform(self, context: LaunchContext) -> str:
-        key = f"anon{perform_substitutions(context, self._name)}"
+        key = f"anon{perform_substitutions(context, self._text)}"
         if key not in context.launch_configurations:
             host = "".join(each if each.isalnum() else "_" for each in socket.gethostname())
             name = f"{key.removeprefix('anon')}_{host}_{os.getpid()}_{os.urandom(4).hex()}"
