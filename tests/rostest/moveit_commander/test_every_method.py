@@ -163,7 +163,7 @@ def test_a_joint_and_a_link(robot: RobotCommander) -> None:
 # ---------------------------------------------------------------- a group: its state and its settings
 def test_what_a_group_knows(arm: MoveGroupCommander) -> None:
     assert arm.get_name() == "panda_arm" and arm.get_planning_frame() == "panda_link0"
-    assert arm.get_variable_count() == 7
+    assert arm.get_variable_count() == 7 and arm.get_variable_names()[0] == "panda_joint1"
     assert arm.get_active_joints() == [f"panda_joint{number}" for number in range(1, 8)]
     assert set(arm.get_active_joints()) <= set(arm.get_joints())
     assert arm.has_end_effector_link() and arm.get_end_effector_link() == "panda_link8"

@@ -19,8 +19,9 @@ from modular_framework_planning.messages.execution_messages import MotionPart
 from modular_framework_planning.move_group.controllers.fake_controllers import FakeMotion, initial_positions
 from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, ControllerSpec
 
-SPEC = SimpleNamespace(group_states={"arm": {"ready": {"a": 1.0, "b": 2.0, "gone": 3.0}}, "hand": {}})
-MODEL = SimpleNamespace(index={"a": 0, "b": 1}, semantics=SPEC)
+SPEC = SimpleNamespace(group_states={"arm": {"ready": {"a": 1.0, "b": 2.0, "gone": 3.0, "drive/x": 4.0}}, "hand": {}})
+BASE = SimpleNamespace(variables=("drive/x", "drive/y", "drive/theta"))
+MODEL = SimpleNamespace(index={"a": 0, "b": 1, "drive/x": 2}, semantics=SPEC, base=BASE)
 
 
 class Echo:
@@ -119,5 +120,5 @@ def test_the_robot_starts_in_named_poses_of_its_groups() -> None:
             "text",
         ],
     )
-    assert positions == {"a": 1.0, "b": 2.0}
+    assert positions == {"a": 1.0, "b": 2.0}, "the base that moves is no part of joint_states"
     assert len(faults) == 2 and "group 'hand' has no pose 'open' in the SRDF; it has none" in faults[0]

@@ -17,7 +17,7 @@ from modular_framework_urdf.robot import (
     Sphere,
     UnknownShape,
 )
-from modular_framework_urdf.srdf_reader import EndEffector, VirtualJoint, read_srdf
+from modular_framework_urdf.srdf_reader import VARIABLES, EndEffector, VirtualJoint, read_srdf
 from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
 from modular_framework_urdf.xml_text import XmlError
 
@@ -102,6 +102,35 @@ def test_an_srdf_is_read_whole() -> None:
     assert (robot.passive_joints, robot.touching_links) == ({"p"}, ("cable",))
     assert robot.enabled_pairs == {frozenset({"cable", "x"})}
     assert robot.disabled_pairs == {frozenset({"x", "y"}): "Adjacent"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "expected"),
+    [
+        ("planar", "1 -2 0.5", {"v/x": 1.0, "v/y": -2.0, "v/theta": 0.5}),
+        (
+            "floating",
+            " 1 2 3  0 0 0.6 0.8",
+            {f"v/{name}": value for name, value in zip(VARIABLES["floating"], (1, 2, 3, 0, 0, 0.6, 0.8), strict=True)},
+        ),
+        ("fixed", "0", {}),
+    ],
+)
+def test_a_state_holds_the_variables_of_a_virtual_joint(kind: str, value: str, expected: dict[str, float]) -> None:
+    placed = SRDF.replace('value="0.5 "/>', f'value="0.5 "/><joint name="v" value="{value}"/>')
+    robot = read_srdf(placed.replace('type="fixed"', f'type="{kind}"'))
+    assert robot.group_states == {"arm": {"home": {"b": 0.5, **expected}}}
+    assert robot.virtual_joints[0].variables == tuple(expected)
+
+
+@pytest.mark.parametrize(("kind", "given", "needed"), [("planar", 7, 3), ("floating", 3, 7)])
+def test_a_virtual_joint_needs_one_number_for_each_variable(kind: str, given: int, needed: int) -> None:
+    placed = SRDF.replace('value="0.5 "/>', f'value="0.5 "/><joint name="v" value="{"0 " * given}"/>')
+    with pytest.raises(XmlError) as caught:
+        read_srdf(placed.replace('type="fixed"', f'type="{kind}"'))
+    said = str(caught.value)
+    assert said.startswith(f"SRDF:3: a group_state holds {given} numbers for the {kind} virtual joint 'v'")
+    assert f"give {needed}, separated by spaces: {' '.join(VARIABLES[kind])}" in said
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ import math
 import random
 
 import pytest
+from geometry_msgs.msg import Quaternion, Transform, Vector3
+from moveit_commander.base_joint import base_transform, base_values
 from moveit_commander.exception import MoveItCommanderException, RobotModelError
 from moveit_commander.robot import Joint, Link, RobotCommander
 from moveit_commander.robot_model import ASSUMED_ROOT_JOINT, RobotModel, group_values
@@ -176,3 +178,62 @@ def test_a_subclass_chooses_what_its_joints_and_links_are(model: RobotModel) -> 
 
     robot = MyCommander()
     assert isinstance(robot.get_joint("b_elbow"), MyJoint) and isinstance(robot.get_link("base"), MyLink)
+
+
+def with_base(kind: str, states: str = "") -> RobotModel:
+    """The robot on a base that moves, with a group of that base and its arm."""
+    virtual = f'<virtual_joint name="drive" type="{kind}" parent_frame="odom" child_link="base"/>'
+    group = f'<group name="mobile"><joint name="drive"/><group name="arm"/></group>{states}'
+    return RobotModel(URDF, SRDF.replace("VIRTUAL", virtual + group))
+
+
+@pytest.mark.parametrize(
+    "kind, names",
+    [
+        ("planar", ["drive/x", "drive/y", "drive/theta"]),
+        ("floating", [f"drive/{n}" for n in ("trans_x", "trans_y", "trans_z", "rot_x", "rot_y", "rot_z", "rot_w")]),
+    ],
+)
+def test_a_base_that_moves_is_one_active_joint_of_several_variables(kind: str, names: list[str]) -> None:
+    model = with_base(kind)
+    mobile = model.group("mobile")
+    assert [joint.name for joint in mobile.active_joints] == ["drive", "a_shoulder", "b_elbow"]
+    assert [variable.name for variable in mobile.variables] == [*names, "a_shoulder", "b_elbow"]
+    assert [variable.name for variable in model.group("arm").variables] == ["a_shoulder", "b_elbow"]
+    placed = [model.defaults()[name] for name in names]
+    assert placed == [0.0] * (len(names) - 1) + [1.0 if kind == "floating" else 0.0]
+    drawn = model.random_values(mobile, random.Random(1))
+    assert list(drawn) == [*names, "a_shoulder", "b_elbow"] and drawn[names[0]] == 0.0, "no bound, no draw"
+    turn = [drawn[name] for name in names if "/rot_" in name or "theta" in name]
+    assert any(turn) and (kind == "planar" or math.hypot(*turn) == pytest.approx(1.0))
+    assert mobile.is_chain and mobile.tip == "flange"
+
+
+def test_a_state_of_a_group_places_the_base_by_its_variables() -> None:
+    state = '<group_state name="dock" group="mobile"><joint name="drive" value="1 -2 0.5"/></group_state>'
+    expected = {"drive/x": 1.0, "drive/y": -2.0, "drive/theta": 0.5}
+    assert with_base("planar", state).group("mobile").states["dock"] == expected
+    with pytest.raises(RobotModelError, match="3 numbers for the floating virtual joint 'drive'.*give 7"):
+        with_base("floating", state)
+
+
+def test_limits_of_the_base_are_those_of_its_variables() -> None:
+    virtual = '<virtual_joint name="drive" type="planar" parent_frame="odom" child_link="base"/>'
+    entry = {"has_position_limits": True, "min_position": -3.0, "max_position": 4.0}
+    for limits in ({"drive/x": entry}, {"drive": {"x": entry}}):
+        x, y, theta = RobotModel(URDF, SRDF.replace("VIRTUAL", virtual), limits).joints["drive"].parts
+        assert (x.lower, x.upper, x.admits(4.5)) == (-3.0, 4.0, False)
+        assert y.admits(1e6) and theta.bounded(7.0) == pytest.approx(7.0 - 2.0 * math.pi)
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_a_transform_of_the_base_and_its_variables_say_the_same(kind: str) -> None:
+    model = with_base(kind)
+    turn = Quaternion(0.0, 0.0, math.sin(0.4), math.cos(0.4)) if kind == "planar" else Quaternion(0.5, -0.5, 0.1, 0.7)
+    length = math.hypot(turn.x, turn.y, turn.z, turn.w)
+    values = base_values(model, Transform(Vector3(1.0, -2.0, 0.0), turn))
+    back = base_transform(model, values)
+    assert [back.translation.x, back.translation.y, back.translation.z] == [1.0, -2.0, 0.0]
+    assert [back.rotation.x, back.rotation.y, back.rotation.z, back.rotation.w] == pytest.approx(
+        [turn.x / length, turn.y / length, turn.z / length, turn.w / length]
+    )

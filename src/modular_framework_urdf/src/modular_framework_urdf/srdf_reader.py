@@ -11,6 +11,10 @@ from modular_framework_urdf import xml_text
 from modular_framework_urdf.xml_text import Element, XmlError
 
 MemberKind = Literal["joint", "link", "chain", "group"]
+VARIABLES = {  # of virtual joints by their type, in MoveIt's order: m, rad, and the four numbers of a quaternion
+    "planar": ("x", "y", "theta"),
+    "floating": ("trans_x", "trans_y", "trans_z", "rot_x", "rot_y", "rot_z", "rot_w"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +77,19 @@ class VirtualJoint:
     parent_frame: str
     child_link: str
 
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of its variables as clients use them, "joint/variable"; none of a fixed joint."""
+        return tuple(f"{self.name}/{variable}" for variable in VARIABLES.get(self.kind, ()))
+
 
 @dataclass(frozen=True, slots=True)
 class SemanticDescription:
     """Everything of an SRDF that the framework uses.
 
     Attributes:
-        group_states: {group: {state: {joint: position}}} [rad or m].
+        group_states: {group: {state: {joint: position}}} [rad or m]; a planar or floating virtual joint stands there
+            as its variables, "joint/variable".
         touching_links: links that may touch anything by default (<disable_default_collisions>).
         enabled_pairs: pairs that are checked all the same (<enable_collisions>).
         disabled_pairs: pairs that may touch, and the reason the file gives (<disable_collisions>).
@@ -104,7 +114,8 @@ def read_srdf(text: str | bytes, where: str = "SRDF") -> SemanticDescription:
         where: file or parameter it comes from, for messages.
 
     Raises:
-        XmlError: the text is not XML, has a DOCTYPE, an element lacks an attribute, or a position is no number.
+        XmlError: the text is not XML, has a DOCTYPE, an element lacks an attribute, a position is no number, or a
+            virtual joint in a group_state has not one number for each of its variables.
     """
     return _Reader(where).read(xml_text.parse(text, where))
 
@@ -117,18 +128,19 @@ class _Reader:
 
     def read(self, root: Element) -> SemanticDescription:
         need = self._need
+        virtual_joints = tuple(
+            VirtualJoint(need(e, "name"), need(e, "type"), need(e, "parent_frame"), need(e, "child_link"))
+            for e in root.findall("virtual_joint")
+        )
         return SemanticDescription(
             robot_name=root.get("name", ""),
             groups={spec.name: spec for spec in map(self._group, root.findall("group"))},
-            group_states=self._group_states(root),
+            group_states=self._group_states(root, {joint.name: joint for joint in virtual_joints}),
             end_effectors=tuple(
                 EndEffector(need(e, "name"), need(e, "group"), need(e, "parent_link"), e.get("parent_group", ""))
                 for e in root.findall("end_effector")
             ),
-            virtual_joints=tuple(
-                VirtualJoint(need(e, "name"), need(e, "type"), need(e, "parent_frame"), need(e, "child_link"))
-                for e in root.findall("virtual_joint")
-            ),
+            virtual_joints=virtual_joints,
             passive_joints=frozenset(need(e, "name") for e in root.findall("passive_joint")),
             touching_links=tuple(
                 dict.fromkeys(need(e, "link").strip() for e in root.findall("disable_default_collisions"))
@@ -159,23 +171,44 @@ class _Reader:
             ),
         )
 
-    def _group_states(self, root: Element) -> dict[str, dict[str, dict[str, float]]]:
+    def _group_states(
+        self, root: Element, virtual_joints: Mapping[str, VirtualJoint]
+    ) -> dict[str, dict[str, dict[str, float]]]:
         states: dict[str, dict[str, dict[str, float]]] = {}
         for element in root.findall("group_state"):
-            values = {self._need(item, "name"): self._position(item) for item in element.findall("joint")}
+            values: dict[str, float] = {}
+            for item in element.findall("joint"):
+                name, numbers = self._need(item, "name"), self._positions(item)
+                joint = virtual_joints.get(name.strip())
+                values |= self._variables(item, joint, numbers) if joint else {name: numbers[0]}
             states.setdefault(self._need(element, "group"), {})[self._need(element, "name")] = values
         return states
 
-    def _position(self, element: Element) -> float:
+    def _positions(self, element: Element) -> list[float]:
         text = self._need(element, "value")
         try:
-            return float(text.split()[0])
+            numbers = [float(word) for word in text.split()]
+            numbers[0]
         except (ValueError, IndexError) as error:
             raise XmlError(
                 f"{self._where}:{element.sourceline}",
                 f"a group_state holds a value that is not a number ('{text}' for joint '{element.get('name')}')",
                 "give a position in rad or m",
             ) from error
+        return numbers
+
+    def _variables(self, element: Element, joint: VirtualJoint, numbers: list[float]) -> dict[str, float]:
+        """Returns the position of a virtual joint by its variables; none of a fixed one."""
+        names = VARIABLES.get(joint.kind)
+        if names is None:
+            return {}
+        if len(numbers) != len(names):
+            raise XmlError(
+                f"{self._where}:{element.sourceline}",
+                f"a group_state holds {len(numbers)} numbers for the {joint.kind} virtual joint '{joint.name}'",
+                f"give {len(names)}, separated by spaces: {' '.join(names)} [m, rad]",
+            )
+        return dict(zip(joint.variables, numbers, strict=True))
 
     def _pair(self, element: Element) -> frozenset[str]:
         return frozenset((self._need(element, "link1").strip(), self._need(element, "link2").strip()))

@@ -79,6 +79,10 @@ class GroupConnection:
         """Returns the names of the group's joints that move by themselves."""
         return [joint.name for joint in self._group.active_joints]
 
+    def get_variable_names(self) -> list[str]:
+        """Returns the names of the numbers that describe the group's state, "joint/variable" of a base that moves."""
+        return self._group_names()
+
     def get_variable_count(self) -> int:
         """Returns how many numbers describe the group's state, mimic joints included."""
         return len(self._group.variables)

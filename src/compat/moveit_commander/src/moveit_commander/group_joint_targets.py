@@ -9,7 +9,7 @@ from enum import Enum, auto
 from typing import Any
 
 from geometry_msgs.msg import Pose, PoseStamped
-from moveit_msgs.msg import MoveItErrorCodes, RobotState
+from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetPositionIK, GetPositionIKRequest
 from sensor_msgs.msg import JointState
 
@@ -53,9 +53,9 @@ class GroupJointTargets(GroupSettings):
 
         Args:
             arg1: a list with every variable of the group; a dict or JointState with some of them; the name of one
-                joint; or a Pose or PoseStamped, which compute_ik turns into joint values at once.
-            arg2: with a joint's name: its value, or a list of one. With a pose: the link it is for (str), or whether
-                a solution nearby will do (bool).
+                joint or variable; or a Pose or PoseStamped, which compute_ik turns into joint values at once.
+            arg2: with a joint's name: its value, or a list with one for each of its variables. With a pose: the link it
+                is for (str), or whether a solution nearby will do (bool).
             arg3: with a pose: the other one of these two.
 
         Raises:
@@ -75,7 +75,7 @@ class GroupJointTargets(GroupSettings):
                 )
             self._set_values(dict(zip(arg1.name, arg1.position, strict=True)))
         elif isinstance(arg1, str):
-            self._set_values({arg1: _single_value(arg1, arg2)})
+            self._set_values(self._values_of_joint(arg1, arg2))
         elif isinstance(arg1, Mapping):
             self._set_values(arg1)
         elif isinstance(arg1, Iterable):
@@ -154,6 +154,20 @@ class GroupJointTargets(GroupSettings):
         }
         self._active_target = Target.JOINT
 
+    def _values_of_joint(self, name: str, value: Any) -> dict[str, float]:
+        """Names the value of a joint, or one for each variable of a planar or floating one."""
+        if value is None:
+            raise MoveItCommanderException(f"Joint value expected when joint name specified ('{name}')")
+        values = list(value) if isinstance(value, Iterable) else [value]
+        parts = next((joint.parts for joint in self._group.joints if joint.name == name), ())
+        names = [part.name for part in parts] or [name]
+        if len(values) != len(names):
+            listed = f" ({', '.join(names)})" if parts else ""
+            raise MoveItCommanderException(
+                f"joint '{name}' has {len(names)} variable{'s' if parts else ''}{listed}; got {len(values)} values"
+            )
+        return {part: float(number) for part, number in zip(names, values, strict=True)}
+
     def _set_from_pose(self, pose: Pose | PoseStamped, link: str, approximate: bool) -> None:
         stamped = pose if isinstance(pose, PoseStamped) else PoseStamped(pose=pose)
         request = GetPositionIKRequest()
@@ -161,9 +175,8 @@ class GroupJointTargets(GroupSettings):
         asked.group_name, asked.ik_link_name = self._group.name, self._link(link, "set the pose for")
         asked.pose_stamped.pose = stamped.pose
         asked.pose_stamped.header.frame_id = stamped.header.frame_id or self.get_pose_reference_frame()
-        asked.robot_state = RobotState(is_diff=True)
-        asked.robot_state.joint_state.name = list(self._joint_target)
-        asked.robot_state.joint_state.position = list(self._joint_target.values())
+        asked.robot_state = self._state.message_of(self._joint_target)
+        asked.robot_state.is_diff = True
         answer = self._servers.call("compute_ik", GetPositionIK, request)
         if answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and approximate:
             self._set_values(self._nearest_to(asked.ik_link_name, asked.pose_stamped))
@@ -174,38 +187,26 @@ class GroupJointTargets(GroupSettings):
                 f" answers {code_text(answer.error_code)}. Is the pose within reach, and "
                 "the IK solver functional?"
             )
-        found = answer.solution.joint_state
-        wanted = set(self._group_names())
-        self._set_values(
-            {name: value for name, value in zip(found.name, found.position, strict=True) if name in wanted}
-        )
+        found, wanted = self._state.values_of(answer.solution), set(self._group_names())
+        self._set_values({name: value for name, value in found.items() if name in wanted})
 
     def _nearest_to(self, link: str, pose: PoseStamped) -> dict[str, float]:
         """Returns joint values near the current target that bring a link as near to a pose as they can."""
         start = {**self._state.positions(self._group_names()), **self._joint_target}
-        base = self._group.joints[0].parent
+        moved = [joint for joint in self._group.active_joints if joint.movable]
+        base = next(joint.parent for joint in self._group.joints if joint.movable)
         base_pose = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
         base_rotation, base_position = rotation_and_position(conversions.pose_to_list(base_pose))
         rotation, position = rotation_and_position(conversions.pose_to_list(pose.pose))
         frame_to_base = base_rotation.inv()
         return nearest_values(
             self._model.chain(base, link),
-            self._group.active_joints,
+            moved,
             start,
             self._model.complete,
             frame_to_base * rotation,
             frame_to_base.apply(position - base_position),
         )
-
-
-def _single_value(name: str, value: Any) -> float:
-    """Returns the one value of a one-variable joint, given as a number or as a list of one."""
-    if value is None:
-        raise MoveItCommanderException(f"Joint value expected when joint name specified ('{name}')")
-    values = list(value) if isinstance(value, Iterable) else [value]
-    if len(values) != 1:
-        raise MoveItCommanderException(f"joint '{name}' has 1 variable; got {len(values)} values")
-    return float(values[0])
 
 
 def link_and_approximate(*arguments: Any) -> tuple[str, bool]:

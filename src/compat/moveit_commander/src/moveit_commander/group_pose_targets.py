@@ -116,7 +116,7 @@ class GroupPoseTargets(GroupJointTargets):
     def _goals(self) -> list[Constraints]:
         """Returns the goals: the k-th holds the k-th pose of every link."""
         if self._active_target is Target.JOINT:
-            active = {joint.name: self._joint_target[joint.name] for joint in self._group.active_joints}
+            active = {item.name: self._joint_target[item.name] for item in self._group.active_variables}
             return [joint_goal(active, self._joint_tolerance)]
         goals = [Constraints() for _ in range(max((len(poses) for poses in self._pose_targets.values()), default=0))]
         for link, poses in self._pose_targets.items():

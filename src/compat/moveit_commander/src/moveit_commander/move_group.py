@@ -51,6 +51,11 @@ class MoveGroupCommander(GroupObjects):
         """
         if not self._group.is_chain:
             raise MoveItCommanderException(f"get_jacobian_matrix: group '{self._group.name}' is not a chain")
+        if any(joint.parts for joint in self._group.joints):
+            raise MoveItCommanderException(
+                f"get_jacobian_matrix: group '{self._group.name}' has a planar or floating joint; ask a group of "
+                "revolute and prismatic joints alone"
+            )
         chain = self._model.chain(self._group.joints[0].parent, self._group.tip)
         positions = self._model.complete(group_values(self._group, joint_values))
         matrix = jacobian(chain, positions, reference_point or (0.0, 0.0, 0.0))

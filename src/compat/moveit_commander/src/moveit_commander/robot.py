@@ -30,32 +30,41 @@ class _RobotPart:
 
 
 class Joint(_RobotPart):
-    """A joint with its bounds and its present value [rad or m]; a fixed joint has neither."""
+    """A joint with its bounds and its present value [rad or m], lists of these if it has several variables, or none."""
 
     def variable_count(self) -> int:
         """Returns how many numbers describe its position."""
-        return int(self._robot._model.joints[self._name].movable)
+        return len(self._robot._model.joints[self._name].variables)
 
-    def bounds(self) -> list[float]:
-        """Returns [lower, upper]; [] of a fixed joint."""
-        joint = self._robot._model.joints[self._name]
-        return [joint.lower, joint.upper] if joint.movable else []
+    def bounds(self) -> list[Any]:
+        """Returns [lower, upper], a list of these for several variables, [] of a fixed joint."""
+        limits = [[item.lower, item.upper] for item in self._robot._model.joints[self._name].variables]
+        return limits[0] if len(limits) == 1 else limits
 
     def min_bound(self) -> float | list[float]:
         """Returns the lower bound; [] of a fixed joint."""
-        return next(iter(self.bounds()), [])
+        return self._bound(0)
 
     def max_bound(self) -> float | list[float]:
         """Returns the upper bound; [] of a fixed joint."""
-        return next(iter(self.bounds()[1:]), [])
+        return self._bound(1)
+
+    def _bound(self, number: int) -> float | list[float]:
+        limits = self.bounds()
+        return [pair[number] for pair in limits] if self.variable_count() != 1 else float(limits[number])
 
     def value(self) -> float | list[float]:
         """Returns where it is now; [] of a fixed joint."""
-        if not self.variable_count():
+        names = [item.name for item in self._robot._model.joints[self._name].variables]
+        if not names:
             return []
-        return self._robot._state.positions([self._name])[self._name]
+        positions = self._robot._state.positions(names)
+        if any(name not in positions for name in names):
+            raise MoveItCommanderException(f"tf does not show where joint {self._name} is; publish its transform")
+        values = [positions[name] for name in names]
+        return values[0] if len(values) == 1 else values
 
-    def move(self, position: float, wait: bool = True) -> bool:
+    def move(self, position: float | list[float], wait: bool = True) -> bool:
         """Moves it, by the smallest group that has it; the group's other joints stay. Returns as go does.
 
         Raises:
@@ -140,7 +149,7 @@ class RobotCommander:
         return self._state.message()
 
     def get_current_variable_values(self) -> dict[str, float]:
-        """Returns the current joint positions by name [rad or m]."""
+        """Returns the current positions by variable [rad or m]; a base that moves is among them where tf has it."""
         return self._state.positions()
 
     def get_joint(self, name: str) -> Joint:
@@ -182,7 +191,7 @@ class RobotCommander:
             case ():
                 pass
             case (RobotState() as state,):
-                values = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
+                values = self._state.values_of(state)
             case (dict() as values,):
                 pass
             case (dict() as values, list() | tuple() as chosen):
@@ -196,8 +205,9 @@ class RobotCommander:
                     f"Unexpected type: {[type(item) for item in args]}; allowed: nothing, "
                     "RobotState, dict, (dict, list of links), group, (group, dict)"
                 )
+        variables = {variable.name for variable in self._model.variables}
         unknown = [
-            name for name in (*values, *links) if name not in self._model.joints and name not in self._model.links
+            name for name in (*values, *links) if name not in {*self._model.links, *self._model.joints, *variables}
         ]
         if unknown:
             raise MoveItCommanderException(f"get_robot_markers: robot '{self._model.name}' has no {unknown}")

@@ -20,11 +20,16 @@ from moveit_commander.exception import RobotModelError
 
 ASSUMED_ROOT_JOINT = "ASSUMED_FIXED_ROOT_JOINT"
 NO_MIMIC = Mimic("", 1.0, 0.0)
+QUATERNION_W = "rot_w"
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint; bounds [rad or m], origin [m, rad] in the parent link, axis in the joint's own frame."""
+    """One joint; bounds [rad or m], origin [m, rad] in the parent link, axis in the joint's own frame.
+
+    A planar or floating one has `parts`: one joint for each of its variables, called "joint/variable". `neutral` is
+    where a joint is that nobody has placed.
+    """
 
     name: str
     kind: str
@@ -40,6 +45,13 @@ class Joint:
     leader: str = ""
     multiplier: float = 1.0
     offset: float = 0.0
+    parts: tuple[Joint, ...] = ()
+    neutral: float = 0.0
+
+    @property
+    def variables(self) -> tuple[Joint, ...]:
+        """Returns what has a position of its own: itself, the parts of a planar or floating joint, or nothing."""
+        return self.parts or ((self,) if self.movable else ())
 
     @property
     def movable(self) -> bool:
@@ -48,12 +60,12 @@ class Joint:
     @property
     def active(self) -> bool:
         """Whether it moves by itself: neither fixed nor mimic."""
-        return self.movable and not self.leader
+        return bool(self.parts) or (self.movable and not self.leader)
 
     @property
     def default(self) -> float:
-        """0, or the middle of the bounds where 0 is out of them."""
-        return 0.0 if self.lower <= 0.0 <= self.upper else (self.lower + self.upper) / 2.0
+        """The neutral position, or the middle of the bounds where that is out of them."""
+        return self.neutral if self.lower <= self.neutral <= self.upper else (self.lower + self.upper) / 2.0
 
     def admits(self, value: float, tolerance: float = 0.0) -> bool:
         """Returns whether a position keeps the bounds; a continuous joint has none."""
@@ -85,8 +97,13 @@ class Group:
 
     @property
     def variables(self) -> tuple[Joint, ...]:
-        """Every joint with a position, those that mimic another included."""
-        return tuple(joint for joint in self.joints if joint.movable)
+        """Everything with a position, joints that mimic another included; of a planar or floating joint its parts."""
+        return tuple(variable for joint in self.joints for variable in joint.variables)
+
+    @property
+    def active_variables(self) -> tuple[Joint, ...]:
+        """The variables of the active joints."""
+        return tuple(variable for joint in self.active_joints for variable in joint.variables)
 
     @property
     def tip(self) -> str:
@@ -132,7 +149,7 @@ class RobotModel:
             raise RobotModelError(f"URDF '{self.name}': {len(roots)} links have no parent joint; exactly one may")
         self.root_link = roots[0]
         virtual = _virtual_joint(semantics, self.root_link)
-        root_joint = _root_joint(virtual, self.root_link)
+        root_joint = _root_joint(virtual, self.root_link, limits or {})
         self.base = virtual if virtual and virtual.kind in ("planar", "floating") else None
         # As in MoveIt: the frame that a planar or floating base moves in; the root link below a fixed virtual joint.
         self.planning_frame = self.base.parent_frame if self.base else self.root_link
@@ -169,20 +186,37 @@ class RobotModel:
     def complete(self, positions: Mapping[str, float]) -> dict[str, float]:
         """Returns the positions of the model's joints, in its order, mimic joints computed; unknown joints left out."""
         values: dict[str, float] = {}
-        for joint in self.joints.values():
-            if joint.leader and joint.leader in positions:
-                values[joint.name] = joint.multiplier * positions[joint.leader] + joint.offset
-            elif joint.movable and joint.name in positions:
-                values[joint.name] = positions[joint.name]
+        for variable in self.variables:
+            if variable.leader and variable.leader in positions:
+                values[variable.name] = variable.multiplier * positions[variable.leader] + variable.offset
+            elif variable.name in positions:
+                values[variable.name] = positions[variable.name]
         return values
 
+    @property
+    def variables(self) -> tuple[Joint, ...]:
+        """Everything with a position, in the order of the model."""
+        return tuple(variable for joint in self.joints.values() for variable in joint.variables)
+
+    @property
+    def base_variables(self) -> tuple[Joint, ...]:
+        """The variables of a planar or floating virtual joint; none where there is no such joint."""
+        return self.joints[self.base.name].parts if self.base else ()
+
     def defaults(self) -> dict[str, float]:
-        """Returns the default position of every movable joint."""
-        return self.complete({joint.name: joint.default for joint in self.joints.values() if joint.active})
+        """Returns the default position of every variable."""
+        return self.complete({variable.name: variable.default for variable in self.variables if not variable.leader})
 
     def random_values(self, group: Group, generator: random.Random) -> dict[str, float]:
-        """Returns positions of the group's joints, drawn evenly within the bounds."""
-        drawn = {joint.name: generator.uniform(joint.lower, joint.upper) for joint in group.active_joints}
+        """Returns positions of the group's joints, drawn evenly within the bounds; 0 where there is none."""
+        drawn = {
+            item.name: generator.uniform(item.lower, item.upper) if math.isfinite(item.upper - item.lower) else 0.0
+            for item in group.active_variables
+        }
+        turns = [item.name for item in self.base_variables if item.name in drawn and _is_quaternion(item)]
+        if turns:
+            quaternion = [generator.gauss(0.0, 1.0) for _ in turns]  # evenly over all rotations
+            drawn |= {name: value / math.hypot(*quaternion) for name, value in zip(turns, quaternion, strict=True)}
         completed = self.complete(drawn)
         return {joint.name: completed[joint.name] for joint in group.variables if joint.name in completed}
 
@@ -259,9 +293,36 @@ def _virtual_joint(semantics: SemanticDescription, root_link: str) -> VirtualJoi
     return next((item for item in semantics.virtual_joints if item.child_link == root_link), None)
 
 
-def _root_joint(virtual: VirtualJoint | None, root_link: str) -> Joint:
-    name, frame = (virtual.name, virtual.parent_frame) if virtual else (ASSUMED_ROOT_JOINT, "")
-    return Joint(name, "fixed", frame, root_link)
+def _root_joint(virtual: VirtualJoint | None, root_link: str, limits: Mapping[str, Any]) -> Joint:
+    if virtual is None:
+        return Joint(ASSUMED_ROOT_JOINT, "fixed", "", root_link)
+    parts = tuple(_part(virtual, name, limits) for name in virtual.variables)
+    return Joint(virtual.name, virtual.kind if parts else "fixed", virtual.parent_frame, root_link, parts=parts)
+
+
+def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
+    """Returns one variable of a virtual joint, with MoveIt's bounds or those of joint_limits.yaml."""
+    variable = name.rpartition("/")[2]
+    bound = math.pi if variable == "theta" else 1.0 if variable.startswith("rot_") else math.inf
+    part = Joint(
+        name,
+        "continuous" if variable == "theta" else "prismatic",
+        joint.parent_frame,
+        joint.child_link,
+        -bound,
+        bound,
+        neutral=1.0 if variable == QUATERNION_W else 0.0,
+    )
+    of_joint = limits.get(joint.name) or {}  # the parameter server splits "joint/variable" at the slash
+    entry = limits.get(name) or (of_joint.get(variable) if isinstance(of_joint, Mapping) else None) or {}
+    if not entry.get("has_position_limits", False):
+        return part
+    lower, upper = float(entry.get("min_position", -bound)), float(entry.get("max_position", bound))
+    return replace(part, kind="prismatic", lower=lower, upper=upper)
+
+
+def _is_quaternion(variable: Joint) -> bool:
+    return variable.name.rpartition("/")[2].startswith("rot_")
 
 
 def _depth_first(joints: Iterable[Joint], root_link: str) -> list[Joint]:
@@ -328,7 +389,7 @@ def group_values(group: Group, values: Sequence[float]) -> dict[str, float]:
         RobotModelError: the list has another length.
     """
     numbers = [float(value) for value in values]
-    for joints in (group.variables, group.active_joints):
+    for joints in (group.variables, group.active_variables):
         if len(numbers) == len(joints):
             return {joint.name: number for joint, number in zip(joints, numbers, strict=True)}
     raise RobotModelError(

@@ -14,6 +14,7 @@ from rosgraph.names import ns_join
 from sensor_msgs.msg import JointState
 
 from modular_framework_ros.parameter_search import nearest_parameter
+from moveit_commander.base_joint import base_transform, base_values
 from moveit_commander.exception import RobotModelError, ServerError
 from moveit_commander.robot_model import RobotModel
 from moveit_commander.roscpp_initializer import ensure_node, on_shutdown
@@ -94,16 +95,18 @@ class CurrentState:
     def positions(self, needed: Iterable[str] = (), timeout_s: float = STATE_TIMEOUT_S) -> dict[str, float]:
         """Returns positions that arrived after this call [rad or m], mimic joints included.
 
+        A planar or floating base is among them, by its variables, where tf has it.
+
         Args:
-            needed: active joints that must be heard of; none: every active joint that is not passive.
+            needed: variables that must be heard of; none: every active joint that is not passive.
             timeout_s: how long to wait [s].
 
         Raises:
             ServerError: a needed joint was not heard of in time.
         """
-        joints = [self.model.joints[name] for name in needed] or list(self.model.joints.values())
-        names = {joint.leader or joint.name for joint in joints if joint.movable}
-        names -= self.model.passive
+        names = set(needed) or {variable.name for variable in self.model.variables}
+        names = {self.model.mimics[name].leader if name in self.model.mimics else name for name in names}
+        names -= self.model.passive | {variable.name for variable in self.model.base_variables}
         begun = time.monotonic()
         with self._changed:
             if not self._changed.wait_for(lambda: self._fresh(names, begun), timeout_s):
@@ -112,34 +115,48 @@ class CurrentState:
                     f"topic {self._topic}: waited {timeout_s:g} s for joint states, nothing came for "
                     f"{', '.join(missing)}; does the joint state controller run?"
                 )
-            return self.model.complete(self._positions)
+            heard = dict(self._positions)
+        return self.model.complete(heard | self._base_values())
 
     def message(self, needed: Iterable[str] = ()) -> RobotState:
         """Returns the whole known state as a message, in the planning frame; `needed` as above.
 
         It has a planar or floating base where tf has it; without, move_group leaves the base where it knows it to be.
         """
-        state = self.message_of(self.positions(needed))
-        self._write_base(state)
-        return state
+        return self.message_of(self.positions(needed))
 
-    def _write_base(self, state: RobotState) -> None:
+    def _base_values(self) -> dict[str, float]:
+        """Returns the variables of a planar or floating base from tf; none where tf does not have it."""
         base = self.model.base
         if base is None or self._transforms is None:
-            return
-        if self._transforms.can_transform(base.parent_frame, base.child_link, rospy.Time(0)):
-            found = self._transforms.lookup_transform(base.parent_frame, base.child_link, rospy.Time(0))
-            state.multi_dof_joint_state.joint_names = [base.name]
-            state.multi_dof_joint_state.transforms = [found.transform]
+            return {}
+        if not self._transforms.can_transform(base.parent_frame, base.child_link, rospy.Time(0)):
+            return {}
+        found = self._transforms.lookup_transform(base.parent_frame, base.child_link, rospy.Time(0))
+        return base_values(self.model, found.transform)
 
     def message_of(self, positions: Mapping[str, float]) -> RobotState:
         """Returns a message of given positions; as in MoveIt, it has no time stamp."""
         state = RobotState()
+        base = {variable.name for variable in self.model.base_variables}
+        joints = {name: value for name, value in positions.items() if name not in base}
         state.joint_state.header.frame_id = self.model.planning_frame
-        state.joint_state.name = list(positions)
-        state.joint_state.position = list(positions.values())
+        state.joint_state.name = list(joints)
+        state.joint_state.position = list(joints.values())
         state.multi_dof_joint_state.header = state.joint_state.header
+        if self.model.base is not None and base <= positions.keys():
+            state.multi_dof_joint_state.joint_names = [self.model.base.name]
+            state.multi_dof_joint_state.transforms = [base_transform(self.model, positions)]
         return state
+
+    def values_of(self, state: RobotState) -> dict[str, float]:
+        """Returns the positions in a message, those of a planar or floating base by its variables."""
+        values = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
+        multi = state.multi_dof_joint_state
+        for name, transform in zip(multi.joint_names, multi.transforms, strict=True):
+            if self.model.base is not None and name == self.model.base.name:
+                values |= base_values(self.model, transform)
+        return values
 
     def _fresh(self, names: Iterable[str], begun: float) -> bool:
         return all(self._arrivals.get(name, 0.0) >= begun for name in names)

@@ -40,7 +40,9 @@ def initial_positions(model: RobotModel, entries: Any) -> tuple[dict[str, float]
         pose = str(entry.get("pose", "")) if isinstance(entry, Mapping) else ""
         poses = model.semantics.group_states.get(group, {})
         if pose in poses:
-            positions |= {joint: value for joint, value in poses[pose].items() if joint in model.index}
+            base = model.base.variables if model.base else ()  # as in MoveIt, not of joint_states
+            moved = {joint: value for joint, value in poses[pose].items() if joint in model.index}
+            positions |= {joint: value for joint, value in moved.items() if joint not in base}
         else:
             faults.append(
                 f"initial[{number}]: group '{group}' has no pose '{pose}' in the SRDF; it has "
