@@ -31,11 +31,15 @@ from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene,
 from ros_session import until
 from std_msgs.msg import Header
 from trajectory_msgs.msg import MultiDOFJointTrajectoryPoint
+from visualization_msgs.msg import InteractiveMarkerInit
 
 MOBILE = '<group name="mobile"><joint name="virtual_joint"/><group name="panda_arm"/></group>'
 ROOT, TIP, UPRIGHT = "panda_link0", "panda_link8", Quaternion(0.0, 0.0, 0.0, 1.0)
 LAUNCH = f"""<launch>
 {FAKE_PANDA}  <param name="robot_description_semantic" value={{srdf}}/>
+  <include file="$(find modular_framework_planning)/launch/interactive_goal.launch">
+    <arg name="group" value="mobile"/>
+  </include>
 </launch>"""
 
 
@@ -154,6 +158,12 @@ def test_a_group_with_the_base_is_planned_for_within_the_workspace(arm: MoveGrou
     assert base.points[-1].time_from_start == answer.trajectory.joint_trajectory.points[-1].time_from_start
     request.workspace_parameters.max_corner = Vector3(1.5, 3.0, 1.0)
     assert plan(request).motion_plan_response.error_code.val == MoveItErrorCodes.GOAL_STATE_INVALID
+
+
+def test_the_marker_of_a_floating_base_moves_and_turns_about_every_axis(arm: MoveGroupCommander) -> None:
+    shown = rospy.wait_for_message("/interactive_goal/marker/update_full", InteractiveMarkerInit, 60.0)
+    ways = {marker.name: {control.name for control in marker.controls} for marker in shown.markers}
+    assert ways["base"] == ways["goal"] == {"menu", *(f"{way}_{axis}" for way in ("move", "rotate") for axis in "xyz")}
 
 
 def test_a_motion_of_the_base_is_not_executed_here(arm: MoveGroupCommander) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interactive marker that sets the goal pose of the tip in RViz, and its menu."""
+"""The interactive markers that set the goal in RViz, one at the tip and one at a base that moves, and their menu."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from visualization_msgs.msg import (
     Marker,
 )
 
-NAME = "goal"
+GOAL, BASE = "goal", "base"  # names of the markers
 HALF = math.sqrt(0.5)
 AXES = {"x": Quaternion(HALF, 0, 0, HALF), "y": Quaternion(0, HALF, 0, HALF), "z": Quaternion(0, 0, HALF, HALF)}
 
@@ -33,13 +33,36 @@ class Choice:
     select: Callable[[str], None]
 
 
+SIX_WAYS = tuple(
+    (f"{name}_{axis}", mode, turn)
+    for axis, turn in AXES.items()
+    for name, mode in (
+        ("move", InteractiveMarkerControl.MOVE_AXIS),
+        ("rotate", InteractiveMarkerControl.ROTATE_AXIS),
+    )
+)
+ON_THE_GROUND = (  # RViz's plane and turn are about the x axis of a control
+    ("move_x", InteractiveMarkerControl.MOVE_AXIS, Quaternion(0, 0, 0, 1)),
+    ("move_y", InteractiveMarkerControl.MOVE_AXIS, AXES["z"]),
+    ("move_plane", InteractiveMarkerControl.MOVE_PLANE, AXES["y"]),
+    ("rotate_z", InteractiveMarkerControl.ROTATE_AXIS, AXES["y"]),
+)
+Ways = tuple[tuple[str, int, Quaternion], ...]
+
+
 class GoalMarker:
-    """An interactive marker with six degrees of freedom and a menu.
+    """Interactive markers, each with the ways in which it can be dragged and all with one menu.
 
     Publishes and subscribes: <topic>/update, <topic>/update_full, <topic>/feedback (interactive_markers).
     """
 
-    def __init__(self, topic: str, on_drag: Callable[[Pose], None]) -> None:
+    def __init__(self, topic: str, on_drag: Callable[[str, Pose], None]) -> None:
+        """Opens the topics.
+
+        Args:
+            topic: first part of the names of the topics.
+            on_drag: called with the marker's name and its pose in the frame it was shown in.
+        """
         self._server = InteractiveMarkerServer(topic)
         self._menu = MenuHandler()
         self._on_drag = on_drag
@@ -57,9 +80,12 @@ class GoalMarker:
                 handles[handle] = entry
                 self._menu.setCheckState(handle, MenuHandler.CHECKED if number == 0 else MenuHandler.UNCHECKED)
 
-        if self._server.get(NAME) is not None:
-            self._menu.apply(self._server, NAME)
-            self._server.applyChanges()
+        for name in self._shown():
+            self._menu.apply(self._server, name)
+        self._server.applyChanges()
+
+    def _shown(self) -> list[str]:
+        return [name for name in (GOAL, BASE) if self._server.get(name) is not None]
 
     def _ticker(self, choice: Choice, handles: dict[int, str]) -> Callable[[Any], None]:
         menu = self._menu
@@ -75,9 +101,9 @@ class GoalMarker:
 
         return tick
 
-    def show(self, frame: str, pose: Pose, scale_m: float) -> None:
-        """Shows the marker, or moves it to another pose and resets it."""
-        marker = InteractiveMarker(name=NAME, description="", pose=pose, scale=scale_m)
+    def show(self, name: str, frame: str, pose: Pose, scale_m: float, ways: Ways = SIX_WAYS) -> None:
+        """Shows a marker, or moves it to another pose and resets it."""
+        marker = InteractiveMarker(name=name, description="", pose=pose, scale=scale_m)
         marker.header.frame_id = frame
         ball = Marker(type=Marker.SPHERE)
         ball.scale.x = ball.scale.y = ball.scale.z = 0.25 * scale_m
@@ -87,22 +113,23 @@ class GoalMarker:
                 name="menu", interaction_mode=InteractiveMarkerControl.MENU, always_visible=True, markers=[ball]
             )
         )
-        for axis, turn in AXES.items():
-            for name, mode in (
-                ("move", InteractiveMarkerControl.MOVE_AXIS),
-                ("rotate", InteractiveMarkerControl.ROTATE_AXIS),
-            ):
-                marker.controls.append(
-                    InteractiveMarkerControl(name=f"{name}_{axis}", orientation=turn, interaction_mode=mode)
-                )
+        marker.controls += [
+            InteractiveMarkerControl(name=way, orientation=turn, interaction_mode=mode) for way, mode, turn in ways
+        ]
         self._server.insert(marker, self._on_feedback)
-        self._menu.apply(self._server, NAME)
+        self._menu.apply(self._server, name)
         self._server.applyChanges()
 
-    def move(self, pose: Pose) -> None:
-        """Puts the marker elsewhere."""
-        self._server.setPose(NAME, pose)
+    def hide(self, name: str) -> None:
+        """Takes a marker away; one that is not shown is no error."""
+        self._server.erase(name)
         self._server.applyChanges()
+
+    def move(self, name: str, pose: Pose) -> None:
+        """Puts a marker elsewhere; one that is not shown stays so."""
+        if name in self._shown():
+            self._server.setPose(name, pose)
+            self._server.applyChanges()
 
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
         if feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
@@ -113,4 +140,4 @@ class GoalMarker:
         if not all(math.isfinite(value) for value in (p.x, p.y, p.z, q.x, q.y, q.z, q.w)):
             rospy.logwarn_throttle(5.0, "interactive goal: a dragged pose with a number that is not finite is ignored")
             return
-        self._on_drag(feedback.pose)
+        self._on_drag(feedback.marker_name, feedback.pose)

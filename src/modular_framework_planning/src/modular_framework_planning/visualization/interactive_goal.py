@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import textwrap
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,12 +20,13 @@ from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.messages.conversions import joint_values, state_message
 from modular_framework_planning.messages.multi_dof import with_multi_dof
-from modular_framework_planning.messages.poses import pose_message
+from modular_framework_planning.messages.poses import pose_message, transform_from_pose
 from modular_framework_planning.move_group.markers.scene_markers import robot_markers
 from modular_framework_planning.move_group.robot_parameters import load_robot_model
 from modular_framework_planning.planning_scene.planning_scene import empty_scene
+from modular_framework_planning.robot_model.multi_dof_joint import PLANAR
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
-from modular_framework_planning.visualization.goal_marker import Choice, GoalMarker
+from modular_framework_planning.visualization.goal_marker import BASE, GOAL, ON_THE_GROUND, SIX_WAYS, Choice, GoalMarker
 from modular_framework_planning.visualization.move_group_client import MotionOptions, MoveGroupClient
 from modular_framework_ros.publishing import publish
 
@@ -35,12 +36,15 @@ RANDOM_ATTEMPTS = 200
 TEXT_ABOVE_TIP_M = 0.45  # clear of the hand
 TEXT_WIDTH, TEXT_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
+BASE_SCALE = 3.0  # the marker of the base, of the size of that at the tip
 JOB_END_S = 0.2  # after a job has reported its end, until the next one can start
 DEFAULT_PLANNER = "move_group's default"
 
 
 class InteractiveGoal:
     """A marker at the tip to drag the goal with, ghosts of start and goal, and a menu.
+
+    A group with a planar or floating base has a second marker, which places the base.
 
     Publishes: ~goal_ghost, ~start_ghost (visualization_msgs/MarkerArray, latched).
     Interactive marker: ~marker.
@@ -76,7 +80,7 @@ class InteractiveGoal:
         self._trajectory: Any = None
         self._status = ""
         self._goal_color = VALID
-        self._dragged: Pose | None = None
+        self._dragged: tuple[str, Pose] | None = None
         self._solving = False
         self._drag_changed = threading.Condition()
         self._job = threading.Lock()
@@ -87,7 +91,8 @@ class InteractiveGoal:
         self._goal = self._positions_of(self._client.state())
         self._fill_menu()
         self._show_goal()
-        self._marker.show(self._model.planning_frame, self._tip_pose(), float(rospy.get_param("~marker_scale", 0.25)))
+        self._scale_m = float(rospy.get_param("~marker_scale", 0.25))
+        self._show_markers()
         for topic, command in (
             ("plan", self.plan),
             ("execute", self.execute),
@@ -170,7 +175,7 @@ class InteractiveGoal:
         self._group, self._trajectory = self._model.group(name), None
         self._options = replace(self._options, pipeline_id="", planner_id="")
         self._guarded(self._fill_menu)
-        self._marker.move(self._tip_pose())
+        self._show_markers()
         self._set_status(f"group: {name}")
 
     # ---------------------------------------------------------------- jobs, one at a time
@@ -199,7 +204,7 @@ class InteractiveGoal:
     def _plan(self) -> bool:
         with self._drag_changed:
             self._drag_changed.wait_for(lambda: self._dragged is None and not self._solving, DRAG_TIMEOUT_S)
-        goal = {name: float(self._goal[self._model.index[name]]) for name in self._group.joints}
+        goal = goal_values(self._model, self._group.joints, self._goal)
         self._trajectory = None
         self._trajectory = self._client.plan(
             self._group.name, self._start or RobotState(is_diff=True), goal, self._options
@@ -227,14 +232,32 @@ class InteractiveGoal:
             positions = self._model.with_mimics(positions, frozenset(int(number) for number in indices))
             if not self._client.problem_of(self._group.name, self._state_of(positions)):
                 self._set_goal(positions, VALID, "random goal")
-                self._marker.move(self._tip_pose())
+                self._move_markers()
                 return
         self._set_status(f"none of {RANDOM_ATTEMPTS} random states is valid; is the robot in contact?")
 
     # ---------------------------------------------------------------- the goal
-    def _on_drag(self, pose: Pose) -> None:
+    def _has_base(self) -> bool:
+        """Whether the group places the base."""
+        base = self._model.base
+        return base is not None and base.variables[0] in self._group.joints
+
+    def _show_markers(self) -> None:
+        frame = self._model.planning_frame
+        self._marker.show(GOAL, frame, self._tip_pose(), self._scale_m)
+        if self._model.base is not None and self._has_base():
+            ways = ON_THE_GROUND if self._model.base.kind == PLANAR else SIX_WAYS
+            self._marker.show(BASE, frame, self._base_pose(), BASE_SCALE * self._scale_m, ways)
+        else:
+            self._marker.hide(BASE)
+
+    def _move_markers(self) -> None:
+        self._marker.move(GOAL, self._tip_pose())
+        self._marker.move(BASE, self._base_pose())
+
+    def _on_drag(self, marker: str, pose: Pose) -> None:
         with self._drag_changed:
-            self._dragged = pose
+            self._dragged = marker, pose
             self._drag_changed.notify_all()
 
     def _follow_drags(self) -> None:
@@ -243,10 +266,12 @@ class InteractiveGoal:
             with self._drag_changed:
                 if self._dragged is None:
                     self._drag_changed.wait(0.5)
-                pose, self._dragged = self._dragged, None
-                self._solving = pose is not None
-            if pose is not None:
-                self._guarded(lambda wanted=pose: self._solve(wanted))
+                drag, self._dragged = self._dragged, None
+                self._solving = drag is not None
+            if drag is not None:
+                marker, pose = drag
+                follow = self._place_base if marker == BASE else self._solve
+                self._guarded(lambda run=follow, wanted=pose: run(wanted))
                 with self._drag_changed:
                     self._solving = False
                     self._drag_changed.notify_all()
@@ -258,13 +283,19 @@ class InteractiveGoal:
         for avoid in (True, False):
             found = self._client.solve_ik(self._group.name, self._group.tip_link, target, seed, avoid)
             if found is not None:
-                positions = self._model.merge(
-                    self._goal, {name: value for name, value in found.items() if name in self._model.index}
-                )
+                positions = self._positions_of(found)
                 problem = "" if avoid else self._client.problem_of(self._group.name, self._state_of(positions))
                 self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
+                self._marker.move(BASE, self._base_pose())
                 return
         self._set_goal(self._goal, UNREACHABLE, "no inverse kinematics solution there")
+
+    def _place_base(self, pose: Pose) -> None:
+        """Puts the base of the goal elsewhere; the other joints stay, so the tip goes with it."""
+        positions = self._model.with_base(self._goal, transform_from_pose(pose, "the marker of the base"))
+        problem = self._client.problem_of(self._group.name, self._state_of(positions))
+        self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
+        self._move_markers()
 
     def _on_state(self, message: RobotState, take: Callable[[RobotState], None]) -> None:
         self._guarded(lambda: take(message))
@@ -273,7 +304,7 @@ class InteractiveGoal:
         positions = self._positions_of(state)
         problem = self._client.problem_of(self._group.name, self._state_of(positions))
         self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
-        self._marker.move(self._tip_pose())
+        self._move_markers()
 
     def _take_start(self, state: RobotState) -> None:
         positions = self._positions_of(state)
@@ -312,6 +343,9 @@ class InteractiveGoal:
     def _tip_pose(self) -> Pose:
         return pose_message(self._model.link_transforms(self._goal)[self._group.tip_link])
 
+    def _base_pose(self) -> Pose:
+        return pose_message(self._model.base_transform(self._goal))
+
     def _positions_of(self, state: RobotState) -> Array:
         where, joints = "robot state", state.joint_state
         placed = with_multi_dof(self._scene.with_positions(self._goal), state.multi_dof_joint_state, where)
@@ -322,6 +356,23 @@ class InteractiveGoal:
         state = state_message(self._scene, positions, with_attached=False)
         state.is_diff = True
         return state
+
+
+def goal_values(model: RobotModel, joints: Sequence[str], positions: Array) -> dict[str, float]:
+    """Returns a goal by joint as every move_group reads it: the rotation of a floating base as a quaternion.
+
+    Args:
+        model: the robot.
+        joints: of the group.
+        positions: of the whole robot [rad or m].
+    """
+    goal = {name: float(positions[model.index[name]]) for name in joints}
+    base = model.base
+    if base is None or not base.quaternion or base.variables[0] not in goal:
+        return goal
+    turn = pose_message(model.base_transform(positions)).orientation
+    numbers = dict(zip(base.quaternion, (turn.x, turn.y, turn.z, turn.w), strict=True))
+    return {name: value for name, value in goal.items() if name not in base.angles} | numbers
 
 
 def _numbered(markers: list[Marker]) -> MarkerArray:

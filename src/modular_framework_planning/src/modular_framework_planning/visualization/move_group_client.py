@@ -105,8 +105,8 @@ class MoveGroupClient:
 
     def solve_ik(
         self, group: str, link: str, target: PoseStamped, seed: RobotState, avoid_collisions: bool
-    ) -> dict[str, float] | None:
-        """Returns the joint positions that bring a link to a pose, nearest to the seed; None where there are none."""
+    ) -> RobotState | None:
+        """Returns the state that brings a link to a pose, nearest to the seed; None where there is none."""
         answer = self._ik(
             PositionIKRequest(
                 group_name=group,
@@ -118,7 +118,7 @@ class MoveGroupClient:
         )
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
             return None
-        return dict(zip(answer.solution.joint_state.name, answer.solution.joint_state.position, strict=True))
+        return answer.solution
 
     def problem_of(self, group: str, state: RobotState) -> str:
         """Says why a state is not valid; empty where it is."""
