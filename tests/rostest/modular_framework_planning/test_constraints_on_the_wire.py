@@ -247,12 +247,12 @@ def test_ik_keeps_constraints_and_says_which_it_cannot_keep() -> None:
     assert answer.error_code.val == CODES.NO_IK_SOLUTION and "'elbow_joint' is" in report["reason"]
 
 
-def test_ik_is_for_one_tip_which_may_come_as_a_list_of_one() -> None:
+def test_ik_of_a_chain_is_for_one_tip_which_may_come_as_a_list_of_one() -> None:
     stamped = ik().pose_stamped
     assert solve(ik(ik_link_name="", ik_link_names=[TIP], pose_stamped_vector=[stamped]))[0] == OK
     several = ik(ik_link_names=[TIP, "tool0"], pose_stamped_vector=[stamped, stamped])
     answer, report = report_of(lambda: call("compute_ik", GetPositionIK, several))
-    assert answer.error_code.val == CODES.NO_IK_SOLUTION and "several tips" in report["reason"]
+    assert answer.error_code.val == CODES.NO_IK_SOLUTION and "one chain of joints, for one link" in report["reason"]
 
 
 def test_ik_places_a_held_object() -> None:

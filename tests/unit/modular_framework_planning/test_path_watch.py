@@ -16,6 +16,7 @@ ARM = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_join
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 END = START + [1.5, 0, 0, 0, 0, 0]
 ROWS = np.linspace(START, END, 31)
+TIMES = np.linspace(0.0, 3.0, 31)
 
 
 def scene_at(model: RobotModel, values: np.ndarray) -> PlanningScene:
@@ -35,24 +36,25 @@ def scene(model: RobotModel) -> PlanningScene:
 
 
 def test_a_box_on_the_way_blocks_and_is_named(scene: PlanningScene) -> None:
-    watch = PathWatch(ARM, ROWS, scene)
-    assert watch.blocked_by(scene) == ""
-    assert "object 'box'" in watch.blocked_by(with_box_at_tip(scene, END))
-    assert watch.blocked_by(with_box_at_tip(scene, END - [3.0, 0, 0, 0, 0, 0])) == ""
+    watch = PathWatch(ARM, TIMES, ROWS, scene)
+    assert watch.blocked_by(scene) is None
+    hit = watch.blocked_by(with_box_at_tip(scene, END))
+    assert hit is not None and "object 'box'" in hit.describe()
+    assert watch.blocked_by(with_box_at_tip(scene, END - [3.0, 0, 0, 0, 0, 0])) is None
 
 
 def test_what_lies_behind_the_robot_does_not_block(scene: PlanningScene) -> None:
-    watch = PathWatch(ARM, ROWS, scene)
+    watch = PathWatch(ARM, TIMES, ROWS, scene)
     behind = with_box_at_tip(scene, START)
     assert watch.blocked_by(behind)
     for values in ROWS[:25]:
         watch.advance(scene_at(scene.model, values).positions)
-    assert watch.blocked_by(behind.with_positions(scene_at(scene.model, ROWS[24]).positions)) == ""
+    assert watch.blocked_by(behind.with_positions(scene_at(scene.model, ROWS[24]).positions)) is None
 
 
 def test_a_contact_the_planner_accepted_does_not_block(scene: PlanningScene) -> None:
     touching = with_box_at_tip(scene, START)
-    watch = PathWatch(ARM, ROWS, touching)
+    watch = PathWatch(ARM, TIMES, ROWS, touching)
     far = CollisionObject("far", pin.SE3(np.eye(3), np.array([0.0, 0.0, 3.0])), ((Box(1, 1, 1), pin.SE3.Identity()),))
-    assert watch.blocked_by(touching.with_object(far)) == ""
+    assert watch.blocked_by(touching.with_object(far)) is None
     assert watch.blocked_by(with_box_at_tip(touching, END))

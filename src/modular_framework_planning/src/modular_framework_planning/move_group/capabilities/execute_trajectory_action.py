@@ -11,10 +11,14 @@ from moveit_msgs.msg import ExecuteTrajectoryAction, ExecuteTrajectoryResult
 from modular_framework_planning.errors import ErrorCode
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import ActionCapability, PublishState
+from modular_framework_planning.move_group.motion_watch import WatchedMotion
 
 
 class ExecuteTrajectory(ActionCapability):
-    """Offers execute_trajectory (moveit_msgs/ExecuteTrajectory): a new motion cancels those of the same joints."""
+    """Offers execute_trajectory (moveit_msgs/ExecuteTrajectory): a new motion cancels those of the same joints.
+
+    As in MoveIt, changes of the world do not stop it; the robot's other joints do where they get in its way.
+    """
 
     name, kind = names.EXECUTE_ACTION, ExecuteTrajectoryAction
 
@@ -26,7 +30,7 @@ class ExecuteTrajectory(ActionCapability):
         publish_state("MONITOR")
         joints = list(goal.trajectory.joint_trajectory.joint_names)
         try:
-            self._context.execution.execute(goal.trajectory, cancelled)
+            WatchedMotion(self._context, goal.trajectory, self._context.monitor.snapshot(), None).execute(cancelled)
         except Exception as error:  # noqa: BLE001 - the client must get a code; the reporter logs the error
             result.error_code.val = self._context.reporter.failure("execute", error, joints=joints)
             return result, str(error)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,60 +17,26 @@ from moveit_msgs.srv import (
 
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
-from modular_framework_planning.geometry.spatial import Array, Transform
-from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.solution_choice import clearest, first_free
-from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message
 from modular_framework_planning.messages.conversions import scene_with_state, state_message
 from modular_framework_planning.messages.multi_dof import names_joints
-from modular_framework_planning.messages.poses import pose_message, stamped_in_scene
+from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
+from modular_framework_planning.move_group.ik_targets import combined_solutions, ik_targets, solvers_of
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
-from modular_framework_planning.robot_model.robot_model import JointGroup
 
 LONGEST_TIMEOUT_S = 10.0
 MAX_COMPARED = 4  # free solutions whose clearance decides between them
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Wanted:
-    """A parsed compute_ik request.
-
-    Attributes:
-        link: the link that is moved.
-        placed: pose, in the link's frame, of the frame to place: the link itself, a held object or a subframe of it.
-        target: its target pose in the planning frame.
-    """
-
-    link: str
-    placed: Transform
-    target: Transform
-
-    def solutions(self, solver: InverseKinematics, seed: Array, timeout_s: float | None) -> list[Array]:
-        """Returns positions of the whole robot, nearest to the seed first.
-
-        The orientation is left open where the group's settings ask for the position only.
-        """
-        if solver.settings.position_only:
-            return solver.position_solutions(
-                self.link, self.placed.translation, self.target.translation, seed, timeout_s
-            )
-        return solver.solutions(self.link, self.target * self.placed.inverse(), seed, timeout_s)
-
-    def failure_reason(self, solver: InverseKinematics, seed: Array) -> str:
-        """Says why there is no solution."""
-        if solver.settings.position_only:
-            where = np.array2string(self.target.translation, precision=3, separator=", ")
-            return (
-                f"no inverse kinematics for '{self.link}': no joint positions within the bounds of group "
-                f"'{solver.group.name}' reach the position {where} m, whatever the orientation (position_only_ik)"
-            )
-        return solver.explain_unreachable(self.link, self.target * self.placed.inverse(), seed)
-
-
 class KinematicsService(MoveGroupCapability):
-    """Offers compute_ik (GetPositionIK) and compute_fk (GetPositionFK)."""
+    """Offers compute_ik (GetPositionIK) and compute_fk (GetPositionFK).
+
+    As in MoveIt, pose_stamped_vector with ik_link_names asks for several tips of a group that holds a chain for each.
+    """
 
     def connect(self) -> None:
         """Advertises both services."""
@@ -104,13 +69,11 @@ class KinematicsService(MoveGroupCapability):
     def _solve(self, scene: PlanningScene, request: Any) -> Array:
         """Returns the solution nearest to the seed; raises PlanningError with the cause."""
         group = self._context.model.group(request.group_name)
-        solver = self._context.kinematics.solver(group.name)
-        wanted = self._target(scene, group, request)
-        link = wanted.link
-        found = wanted.solutions(solver, scene.positions, self._timeout(request))
-        if not found:
-            raise PlanningError(ErrorCode.NO_IK_SOLUTION, wanted.failure_reason(solver, scene.positions))
-        kept = self._constrained(scene, request, found, link)
+        targets = ik_targets(scene, group, request)
+        links = [target.link for target in targets]
+        solvers = solvers_of(self._context.kinematics, self._context.model, group, links)
+        found = combined_solutions(targets, solvers, scene.positions, self._timeout(request))
+        kept = self._constrained(scene, request, found, links)
         if not request.avoid_collisions:
             return kept[0]
         checker = self._context.new_checker(scene, group.indices)
@@ -120,7 +83,7 @@ class KinematicsService(MoveGroupCapability):
         contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))
         raise PlanningError(
             ErrorCode.NO_IK_SOLUTION,
-            f"all {len(kept)} inverse kinematics solutions for '{link}' collide; the nearest: {contacts}",
+            f"all {len(kept)} inverse kinematics solutions for {', '.join(links)} collide; the nearest: {contacts}",
         )
 
     @staticmethod
@@ -130,35 +93,17 @@ class KinematicsService(MoveGroupCapability):
         return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
 
     @staticmethod
-    def _target(scene: PlanningScene, group: JointGroup, request: Any) -> _Wanted:
-        """Reads the frame to place and its target; raises PlanningError."""
-        links, poses = list(request.ik_link_names), list(request.pose_stamped_vector)
-        if len(links) > 1 or len(poses) > 1:
-            raise PlanningError(
-                ErrorCode.NO_IK_SOLUTION,
-                f"{len(links)} ik_link_names and {len(poses)} poses in "
-                "pose_stamped_vector; several tips at once are not supported: ask for one link with "
-                "ik_link_name and pose_stamped",
-            )
-        name = ((links[0] if links else request.ik_link_name) or group.tip_link).removeprefix("/")
-        target = stamped_in_scene(scene, poses[0] if poses else request.pose_stamped, "pose_stamped")
-        link = holding_link(scene, name)
-        if not link:
-            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", name, [*scene.model.frame_ids, *scene.attached])
-        return _Wanted(link, scene.frame_transform(link).actInv(scene.frame_transform(name)), target)
-
-    @staticmethod
-    def _constrained(scene: PlanningScene, request: Any, found: list[Array], link: str) -> list[Array]:
+    def _constrained(scene: PlanningScene, request: Any, found: list[Array], links: list[str]) -> list[Array]:
         """Returns the solutions that satisfy the request's constraints; raises PlanningError where none does."""
         constraints = constraints_from_message(
-            scene, request.constraints, "ik_request.constraints", ErrorCode.NO_IK_SOLUTION, link
+            scene, request.constraints, "ik_request.constraints", ErrorCode.NO_IK_SOLUTION, links[0]
         )
         kept = [positions for positions in found if constraints.satisfied(positions)]
         if not kept:
             raise PlanningError(
                 ErrorCode.NO_IK_SOLUTION,
                 f"none of {len(found)} inverse kinematics solutions for "
-                f"'{link}' satisfies the constraints; the nearest: {constraints.describe(found[0])}",
+                f"{', '.join(links)} satisfies the constraints; the nearest: {constraints.describe(found[0])}",
             )
         return kept
 

@@ -18,9 +18,13 @@ from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
 
 class MoveAction(PlannedMotionAction):
-    """Offers move_group (moveit_msgs/MoveGroup)."""
+    """Offers move_group (moveit_msgs/MoveGroup): a new goal cancels those of groups that share joints with its own."""
 
     name, kind, report = names.MOVE_ACTION, MoveGroupAction, "plan"
+
+    def _uses(self, goal: Any) -> frozenset[str] | None:
+        group = self._context.model.groups.get(goal.request.group_name)
+        return frozenset(group.joints) if group else frozenset()
 
     def _plan(self, goal: Any, change: SceneChange, cancelled: Event) -> PlannedMotion:
         request = goal.request if goal.planning_options.plan_only else with_current_start(goal.request, "request")

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from modular_framework_planning.trajectory_execution.execution_settings import (
     ExecutionSettings,
     parse_execution_settings,
 )
+from modular_framework_planning.trajectory_execution.path_watch import PathWatch
 
 SETTLE_TIMEOUT_S = 1.0
 SETTLED_RAD = 1.0e-4
@@ -50,11 +51,22 @@ class _Motion:
 
     Attributes:
         joints: All joints of its controllers.
+        path: Where it goes; None where nobody watches it.
         stop: Set to stop it.
+        admitted: Set when it may begin.
     """
 
     joints: frozenset[str]
-    stop: threading.Event
+    path: PathWatch | None
+    stop: threading.Event = field(default_factory=threading.Event)
+    admitted: threading.Event = field(default_factory=threading.Event)
+
+
+Admission = Callable[[Sequence[PathWatch]], None]
+
+
+def _always(_: Sequence[PathWatch]) -> None:
+    """Lets a motion begin whatever moves."""
 
 
 class TrajectoryExecution:
@@ -105,8 +117,26 @@ class TrajectoryExecution:
         """Describes the controllers that execute motions."""
         return "no execution of motions" if self.manager is None else self.manager.describe()
 
-    def execute(self, trajectory: Any, cancelled: threading.Event) -> None:
+    def others(self, path: PathWatch) -> list[PathWatch]:
+        """Returns the paths of the motions under way other than this one."""
+        with self._ended:
+            known = [motion.path for motion in self._motions if motion.admitted.is_set()]
+        return [other for other in known if other is not None and other is not path]
+
+    def execute(
+        self,
+        trajectory: Any,
+        cancelled: threading.Event,
+        path: PathWatch | None = None,
+        admit: Admission = _always,
+    ) -> None:
         """Executes a RobotTrajectory and returns when the robot is there.
+
+        Args:
+            trajectory: the message.
+            cancelled: set to stop it.
+            path: where it goes, for motions beside it.
+            admit: called with the paths of the motions that came before it; raises PlanningError to refuse it.
 
         Raises:
             PlanningError: what went wrong, with the controller's own message where it sent one.
@@ -128,7 +158,8 @@ class TrajectoryExecution:
             return
         motion = at_speed(trajectory.joint_trajectory, self.settings.execution_velocity_scaling)
         parts = self._parts(motion, self.manager)
-        with self._only_motion_of({joint for part in parts for joint in part.controller.joints}) as stop:
+        joints = frozenset(joint for part in parts for joint in part.controller.joints)
+        with self._entered(_Motion(joints, path), admit) as stop:
             self._check_start(motion)
             if self._is_there_already(motion, parts):
                 return
@@ -138,22 +169,24 @@ class TrajectoryExecution:
                 self._settle(motion.joint_names)
 
     @contextmanager
-    def _only_motion_of(self, joints: set[str]) -> Iterator[threading.Event]:
-        """Enters a motion of these joints; yields the event that stops it.
+    def _entered(self, entered: _Motion, admit: Admission) -> Iterator[threading.Event]:
+        """Enters a motion; yields the event that stops it.
 
         Raises:
-            PlanningError: another motion moves one of them.
+            PlanningError: another motion moves one of its joints, or it was not admitted beside the others.
         """
-        entered = _Motion(frozenset(joints), threading.Event())
         with self._ended:
-            busy = sorted({joint for motion in self._motions for joint in motion.joints & joints})
+            busy = sorted({joint for motion in self._motions for joint in motion.joints & entered.joints})
             if busy:
                 raise PlanningError(
                     ErrorCode.CONTROL_FAILED,
                     f"another motion of {', '.join(busy)} is under way; wait for its end or stop it",
                 )
+            others = [motion.path for motion in self._motions if motion.path is not None]
             self._motions.append(entered)
         try:
+            admit(others)
+            entered.admitted.set()
             yield entered.stop
         finally:
             with self._ended:
