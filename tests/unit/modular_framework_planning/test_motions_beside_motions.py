@@ -97,3 +97,10 @@ def test_other_joints_count_as_moved_when_they_did_and_the_own_ones_do_not() -> 
     assert not watch.elsewhere_moved(scene(right=0.05).positions)
     finger = robot().merge(scene(right=0.05).positions, {"left_finger": 0.03})
     assert watch.elsewhere_moved(finger)
+
+
+def test_a_motion_of_all_joints_has_nothing_beside_it() -> None:
+    names = [name for name in robot().joint_names if name not in robot().document.mimics]
+    watch = PathWatch(names, np.array([0.0, 1.0]), np.zeros((2, len(names))), scene())
+    assert not watch.elsewhere_moved(scene(left=0.5).positions)
+    assert watch.robot_in_the_way(scene()) is None

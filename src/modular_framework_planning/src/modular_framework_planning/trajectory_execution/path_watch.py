@@ -61,7 +61,8 @@ class PathWatch:
         self._planned_in, self._new_checker, self._was_planned = planned_in, new_checker, was_planned
         members = set(self._indices.tolist())
         followers = {follower for follower, leader, _, _ in self._model.mimics if leader in members}
-        self._elsewhere = np.array([n for n in range(len(self._model.joint_names)) if n not in members | followers])
+        elsewhere = [number for number in range(len(self._model.joint_names)) if number not in members | followers]
+        self._elsewhere = np.array(elsewhere, dtype=np.int64)
         self._seen_elsewhere = planned_in.positions[self._elsewhere]
         self._reached = 0
 
