@@ -13,6 +13,7 @@ from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from controller_manager_msgs.srv import LoadController, SwitchController
 from diagnostic_msgs.msg import DiagnosticArray
+from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -73,10 +74,11 @@ def test_each_moves_its_own_joint_within_its_own_limits(robots: Any, robot: str)
 def test_readiness_and_figures_are_published_under_the_names_of_each(robots: Any) -> None:
     assert rospy.wait_for_message("/left/arm_ready", Bool, 30.0).data is True
     seen: set[str] = set()
-    deadline = time.monotonic() + 30.0
-    while seen != {"left/robot_hw: control loop", "right/robot_hw: control loop"}:
-        seen.update(status.name for status in rospy.wait_for_message("/diagnostics", DiagnosticArray, 30.0).status)
-        assert time.monotonic() < deadline, seen
+    diagnostics = rospy.Subscriber(
+        "/diagnostics", DiagnosticArray, lambda array: seen.update({status.name for status in array.status})
+    )
+    until(lambda: seen == {"left/robot_hw: control loop", "right/robot_hw: control loop"}, "diagnostics of both robots")
+    diagnostics.unregister()
 
 
 def test_a_description_that_is_not_the_robots_is_not_taken_and_the_log_says_so(robots: Any) -> None:

@@ -61,6 +61,7 @@ def to(home: Pose, x: float, y: float, z: float, planner: str = "LIN", **changes
         planner_id=planner,
         max_velocity_scaling_factor=0.2,
         max_acceleration_scaling_factor=0.2,
+        allowed_planning_time=20.0,  # a slow motion has many states to check
         **changes,
     )
 
