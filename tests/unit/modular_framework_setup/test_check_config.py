@@ -57,6 +57,13 @@ EDITS = {
     "end effector's group": Edit(SRDF, 'parent_group="arm"', 'parent_group="am"', ("parent_group 'am'", "'arm'")),
     "pair of unknown links": Edit(SRDF, 'link2="turret"', 'link2="turet"', ("link2 'turet'", "did you mean 'turret'")),
     "virtual joint": Edit(SRDF, 'child_link="base"', 'child_link="boom"', ("'boom' is not the root", "allowed: base")),
+    "place of a planar base": Edit(
+        SRDF,
+        '  <virtual_joint name="fixed_base" type="fixed"',
+        '  <group name="base"><joint name="fixed_base"/></group><group_state name="dock" group="base"><joint '
+        'name="fixed_base" value="1 2"/></group_state>\n  <virtual_joint name="fixed_base" type="planar"',
+        ("state 'dock'", "'fixed_base' has 2 numbers", "planar virtual joint: 3 (x y theta)"),
+    ),
     "passive joint": Edit(SRDF, 'passive_joint name="grip_2"', 'passive_joint name="grp_2"', ("'grp_2'", "'grip_2'")),
     "misspelt element": Edit(SRDF, "<passive_joint", "<pasive_joint", ("element 'pasive_joint'", "'passive_joint'")),
     "broken SRDF": Edit(SRDF, "</robot>", "</robt>", ("not an XML document",)),

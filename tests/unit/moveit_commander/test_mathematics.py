@@ -16,8 +16,8 @@ from moveit_commander.chain_jacobian import jacobian
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_joint_targets import link_and_approximate
 from moveit_commander.group_motion import cartesian_options
+from moveit_commander.joints import Joint
 from moveit_commander.object_region import Region, inside
-from moveit_commander.robot_model import Joint
 from moveit_commander.trajectory_timing import distinct, retime, unwound
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, CollisionObject, Constraints
 from scipy.spatial.transform import Rotation

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from moveit_commander.chain_jacobian import jacobian, link_pose
-from moveit_commander.robot_model import Joint
+from moveit_commander.joints import Joint
 
 STEPS = 200
 DAMPING = 0.02  # [m]; of the least squares: joints move gently where the arm is stretched

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from moveit_commander.robot_model import Joint
+from moveit_commander.joints import Joint
 
 
 def jacobian(chain: Sequence[Joint], positions: Mapping[str, float], reference_point: Sequence[float]) -> Any:

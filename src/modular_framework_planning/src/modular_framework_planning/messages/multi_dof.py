@@ -120,6 +120,23 @@ def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, co
     return [item for item in constraints if item.joint_name not in given] + angles
 
 
+def goal_values(model: RobotModel, joints: Sequence[str], positions: Array) -> dict[str, float]:
+    """Returns a goal by joint as every move_group reads it: the rotation of a floating base as a quaternion.
+
+    Args:
+        model: the robot.
+        joints: of the group.
+        positions: of the whole robot [rad or m].
+    """
+    goal = {name: float(positions[model.index[name]]) for name in joints}
+    base = model.base
+    if base is None or not base.quaternion or base.variables[0] not in goal:
+        return goal
+    turn = pose_message(model.base_transform(positions)).orientation
+    numbers = dict(zip(base.quaternion, (turn.x, turn.y, turn.z, turn.w), strict=True))
+    return {name: value for name, value in goal.items() if name not in base.angles} | numbers
+
+
 def multi_dof_message(model: RobotModel, positions: Array) -> MultiDOFJointState:
     """Writes where the base is in the planning frame; without names where the robot has a fixed base."""
     message = MultiDOFJointState()

@@ -25,6 +25,18 @@ SLACKS_S = (-0.1, 0.0, 0.1)  # by how much a motion under way may be late or ear
 JOIN_TIMEOUT_S = 5.0
 
 
+class _StopRequest(threading.Event):
+    """Set by the watch of a motion, or with the event by which the client gives it up."""
+
+    def __init__(self, cancelled: threading.Event) -> None:
+        super().__init__()
+        self._cancelled = cancelled
+
+    def is_set(self) -> bool:
+        """Returns whether the motion is to stop."""
+        return super().is_set() or self._cancelled.is_set()
+
+
 class WatchedMotion:
     """One execution of one motion; `executed` holds what was measured, also after a failure.
 
@@ -65,7 +77,7 @@ class WatchedMotion:
             self._watch = PathWatch(self._joints, times, rows, seen, context.new_checker, change is not None)
         self._seen_version = planned_in.geometry_version
         self._watching = threading.Lock()
-        self._stop, self._ended = threading.Event(), threading.Event()
+        self._ended = threading.Event()
         self._blocked = ""
         self._hit: Hit | None = None
         frequency = context.settings.plan_execution.record_trajectory_state_frequency
@@ -89,10 +101,11 @@ class WatchedMotion:
         self._raise_if_blocked()
         self._begun = rospy.Time.now()
         self._record()
-        watcher = threading.Thread(target=self._monitor, args=(cancelled,), daemon=True)
+        stop = _StopRequest(cancelled)
+        watcher = threading.Thread(target=self._monitor, args=(stop,), daemon=True)
         watcher.start()
         try:
-            self._context.execution.execute(self._trajectory, self._stop, self._watch, self._admit)
+            self._context.execution.execute(self._trajectory, stop, self._watch, self._admit)
         except PlanningError as error:
             if error.code == ErrorCode.PREEMPTED and not cancelled.is_set():
                 self._raise_if_blocked()
@@ -122,11 +135,9 @@ class WatchedMotion:
                 "that one, and plan again",
             )
 
-    def _monitor(self, cancelled: threading.Event) -> None:
+    def _monitor(self, stop: threading.Event) -> None:
         pause_s, due_s = min(PERIOD_S, self._period_s), time.monotonic() + self._period_s
         while not self._ended.is_set():
-            if cancelled.is_set():
-                self._stop.set()
             if time.monotonic() >= due_s:
                 due_s = time.monotonic() + self._period_s
                 self._record()
@@ -135,8 +146,8 @@ class WatchedMotion:
             except Exception as error:  # noqa: BLE001 - a motion nobody can watch any more must stop
                 self._blocked = f"watching it failed with {type(error).__name__}: {error}"
             if self._blocked:
-                self._stop.set()
-            cancelled.wait(pause_s) if not cancelled.is_set() else self._ended.wait(pause_s)
+                stop.set()
+            self._ended.wait(pause_s)
 
     def _check(self) -> None:
         """Checks what is left of the motion when the geometry of the scene changed, or other joints moved."""

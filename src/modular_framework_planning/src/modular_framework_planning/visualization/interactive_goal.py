@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import textwrap
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.messages.conversions import joint_values, state_message
-from modular_framework_planning.messages.multi_dof import with_multi_dof
+from modular_framework_planning.messages.multi_dof import goal_values, with_multi_dof
 from modular_framework_planning.messages.poses import pose_message, transform_from_pose
 from modular_framework_planning.move_group.markers.scene_markers import robot_markers
 from modular_framework_planning.move_group.robot_parameters import load_robot_model
@@ -356,23 +356,6 @@ class InteractiveGoal:
         state = state_message(self._scene, positions, with_attached=False)
         state.is_diff = True
         return state
-
-
-def goal_values(model: RobotModel, joints: Sequence[str], positions: Array) -> dict[str, float]:
-    """Returns a goal by joint as every move_group reads it: the rotation of a floating base as a quaternion.
-
-    Args:
-        model: the robot.
-        joints: of the group.
-        positions: of the whole robot [rad or m].
-    """
-    goal = {name: float(positions[model.index[name]]) for name in joints}
-    base = model.base
-    if base is None or not base.quaternion or base.variables[0] not in goal:
-        return goal
-    turn = pose_message(model.base_transform(positions)).orientation
-    numbers = dict(zip(base.quaternion, (turn.x, turn.y, turn.z, turn.w), strict=True))
-    return {name: value for name, value in goal.items() if name not in base.angles} | numbers
 
 
 def _numbered(markers: list[Marker]) -> MarkerArray:

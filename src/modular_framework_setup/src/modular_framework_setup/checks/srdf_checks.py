@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_setup.checks.group_checks import GroupChecker
 from modular_framework_setup.config_files.robot_tree import END_M, PlanningGroup, RobotTree, Semantics
+from modular_framework_urdf.srdf_reader import VARIABLES
 from modular_framework_urdf.xml_text import Element
 
 VIRTUAL_KINDS = ("fixed", "planar", "floating")
@@ -37,6 +38,7 @@ class _SrdfChecker:
 
     def __init__(self, root: Element, where: str, tree: RobotTree, faults: FaultList) -> None:
         self._root, self._where, self._tree, self._faults = root, where, tree, faults
+        self._virtual_kinds = {item.get("name", ""): item.get("type", "") for item in root.findall("virtual_joint")}
 
     def check(self) -> Semantics:
         self._check_top()
@@ -121,6 +123,14 @@ class _SrdfChecker:
         if not values:
             found = item.get("value", "")
             self._faults.add(self._at(item), f"{owner}: '{name}' is '{found}'; expected a position in rad or m")
+            return
+        variables = VARIABLES.get(self._virtual_kinds.get(name, ""), values)
+        if len(values) != len(variables):
+            self._faults.add(
+                self._at(item),
+                f"{owner}: '{name}' has {len(values)} numbers; expected for a {self._virtual_kinds[name]} virtual joint: "
+                f"{len(variables)} ({' '.join(map(str, variables))}); correct it",
+            )
             return
         joint = self._tree.joints.get(name)
         if joint is None or joint.limit is None or joint.kind not in ("revolute", "prismatic"):

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One joint of the robot model, made from the URDF, the SRDF's virtual joint, or their entries in joint_limits.yaml."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from modular_framework_urdf import robot as urdf_robot
+from modular_framework_urdf.mimics import Mimic
+from modular_framework_urdf.robot import MOVABLE_KINDS, Vector
+from modular_framework_urdf.srdf_reader import VirtualJoint
+from moveit_commander.exception import RobotModelError
+
+ASSUMED_ROOT_JOINT = "ASSUMED_FIXED_ROOT_JOINT"
+NO_MIMIC = Mimic("", 1.0, 0.0)
+QUATERNION_W = "rot_w"
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One joint; bounds [rad or m], origin [m, rad] in the parent link, axis in the joint's own frame.
+
+    A planar or floating one has `parts`: one joint for each of its variables, called "joint/variable". `neutral` is
+    where a joint is that nobody has placed.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    lower: float = 0.0
+    upper: float = 0.0
+    velocity: float = 1.0
+    acceleration: float = 1.0
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (1.0, 0.0, 0.0)
+    leader: str = ""
+    multiplier: float = 1.0
+    offset: float = 0.0
+    parts: tuple[Joint, ...] = ()
+    neutral: float = 0.0
+
+    @property
+    def variables(self) -> tuple[Joint, ...]:
+        """Returns what has a position of its own: itself, the parts of a planar or floating joint, or nothing."""
+        return self.parts or ((self,) if self.movable else ())
+
+    @property
+    def movable(self) -> bool:
+        return self.kind in MOVABLE_KINDS
+
+    @property
+    def active(self) -> bool:
+        """Whether it moves by itself: neither fixed nor mimic."""
+        return bool(self.parts) or (self.movable and not self.leader)
+
+    @property
+    def default(self) -> float:
+        """The neutral position, or the middle of the bounds where that is out of them."""
+        return self.neutral if self.lower <= self.neutral <= self.upper else (self.lower + self.upper) / 2.0
+
+    def admits(self, value: float, tolerance: float = 0.0) -> bool:
+        """Returns whether a position keeps the bounds; a continuous joint has none."""
+        if not math.isfinite(value):
+            return False
+        return self.kind == "continuous" or self.lower - tolerance <= value <= self.upper + tolerance
+
+    def bounded(self, value: float) -> float:
+        """Returns the position, wrapped to (-pi, pi] or cut off at the bounds."""
+        if self.kind == "continuous":
+            return math.remainder(value, 2.0 * math.pi)
+        return min(max(value, self.lower), self.upper)
+
+
+def root_joint(virtual: VirtualJoint | None, root_link: str, limits: Mapping[str, Any]) -> Joint:
+    """Returns the joint above the root link: that of the SRDF, with its limits of joint_limits.yaml, or a fixed one."""
+    if virtual is None:
+        return Joint(ASSUMED_ROOT_JOINT, "fixed", "", root_link)
+    parts = tuple(_part(virtual, name, limits) for name in virtual.variables)
+    return Joint(virtual.name, virtual.kind if parts else "fixed", virtual.parent_frame, root_link, parts=parts)
+
+
+def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
+    """Returns one variable of a virtual joint, with MoveIt's bounds or those of joint_limits.yaml."""
+    variable = name.rpartition("/")[2]
+    bound = math.pi if variable == "theta" else 1.0 if variable.startswith("rot_") else math.inf
+    part = Joint(
+        name,
+        "continuous" if variable == "theta" else "prismatic",
+        joint.parent_frame,
+        joint.child_link,
+        -bound,
+        bound,
+        neutral=1.0 if variable == QUATERNION_W else 0.0,
+    )
+    of_joint = limits.get(joint.name) or {}  # the parameter server splits "joint/variable" at the slash
+    entry = limits.get(name) or (of_joint.get(variable) if isinstance(of_joint, Mapping) else None) or {}
+    if not entry.get("has_position_limits", False):
+        return part
+    lower, upper = float(entry.get("min_position", -bound)), float(entry.get("max_position", bound))
+    return replace(part, kind="prismatic", lower=lower, upper=upper)
+
+
+def is_quaternion(variable: Joint) -> bool:
+    """Returns whether a variable is one of the four numbers of a floating joint's rotation."""
+    return variable.name.rpartition("/")[2].startswith("rot_")
+
+
+def joint_of(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
+    """Returns a joint of the URDF within its limits; raises RobotModelError for what is no number."""
+    try:
+        return _limited(joint, limits.get(joint.name) or {})
+    except (ValueError, TypeError, AttributeError) as error:
+        raise RobotModelError(
+            f"URDF joint '{joint.name}' or its entry in joint_limits.yaml: {error}; numbers and the "
+            "elements parent and child are needed"
+        ) from error
+
+
+def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
+    """The joint within the limits of the description, or those that its entry in joint_limits.yaml puts in place."""
+    lower, upper, velocity = (
+        (0.0, 0.0, 1.0) if joint.limit is None else (joint.limit.lower, joint.limit.upper, joint.limit.velocity or 1.0)
+    )
+    if joint.safety is not None:
+        lower = lower if joint.safety.soft_lower_limit is None else max(lower, joint.safety.soft_lower_limit)
+        upper = upper if joint.safety.soft_upper_limit is None else min(upper, joint.safety.soft_upper_limit)
+    if joint.kind == "continuous":
+        lower, upper = -math.pi, math.pi
+    if entry.get("has_position_limits", False):
+        lower, upper = float(entry.get("min_position", lower)), float(entry.get("max_position", upper))
+    if entry.get("has_velocity_limits", False):
+        velocity = float(entry.get("max_velocity", velocity))
+    acceleration = float(entry.get("max_acceleration", 1.0)) if entry.get("has_acceleration_limits", False) else 1.0
+    mimic = joint.mimic or NO_MIMIC
+    return Joint(
+        joint.name,
+        joint.kind,
+        joint.parent,
+        joint.child,
+        lower,
+        upper,
+        velocity,
+        acceleration,
+        joint.origin.xyz,
+        joint.origin.rpy,
+        joint.axis,
+        mimic.leader,
+        mimic.multiplier,
+        mimic.offset,
+    )
