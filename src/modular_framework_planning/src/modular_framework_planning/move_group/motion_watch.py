@@ -73,8 +73,8 @@ class WatchedMotion:
             rows = np.array([point.positions for point in motion.points], dtype=float)[:, columns]
             times = [point.time_from_start.to_sec() for point in motion.points]
             times = np.array(times) / context.execution.settings.execution_velocity_scaling
-            seen = planned_in if change is None else change(planned_in)
-            self._watch = PathWatch(self._joints, times, rows, seen, context.new_checker, change is not None)
+            seen, was_planned = self._as_planned(planned_in), change is not None
+            self._watch = PathWatch(self._joints, times, rows, seen, context.new_checker, was_planned)
         self._seen_version = planned_in.geometry_version
         self._watching = threading.Lock()
         self._ended = threading.Event()
@@ -115,6 +115,10 @@ class WatchedMotion:
             watcher.join(JOIN_TIMEOUT_S)
             self._record()
 
+    def _as_planned(self, scene: PlanningScene) -> PlanningScene:
+        """Returns a scene with what the plan changed in it for itself alone, such as collisions it allowed."""
+        return scene if self._change is None else self._change(scene)
+
     def _raise_if_blocked(self) -> None:
         if self._blocked:
             raise PlanningError(
@@ -127,7 +131,7 @@ class WatchedMotion:
         if not others or self._watch is None:
             return
         with self._watching:
-            hit = self._watch.robot_in_the_way(self._context.monitor.snapshot(), others, SLACKS_S)
+            hit = self._watch.robot_in_the_way(self._as_planned(self._context.monitor.snapshot()), others, SLACKS_S)
         if hit is not None:
             raise PlanningError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -157,11 +161,12 @@ class WatchedMotion:
             watch.advance(scene.positions)
             if self._change is not None and scene.geometry_version != self._seen_version:
                 self._seen_version = scene.geometry_version
-                self._hit = watch.blocked_by(self._change(scene))
+                self._hit = watch.blocked_by(self._as_planned(scene))
                 if self._hit is not None:
                     self._blocked = "the scene changed and the rest of the motion is blocked"
             if self._hit is None and watch.elsewhere_moved(scene.positions):
-                self._hit = watch.robot_in_the_way(scene, self._context.execution.others(watch))
+                others = self._context.execution.others(watch)
+                self._hit = watch.robot_in_the_way(self._as_planned(scene), others)
                 if self._hit is not None:
                     self._blocked = "another part of the robot moved and the rest of the motion would hit it"
 

@@ -128,8 +128,8 @@ class _SrdfChecker:
         if len(values) != len(variables):
             self._faults.add(
                 self._at(item),
-                f"{owner}: '{name}' has {len(values)} numbers; expected for a {self._virtual_kinds[name]} virtual joint: "
-                f"{len(variables)} ({' '.join(map(str, variables))}); correct it",
+                f"{owner}: '{name}' has {len(values)} numbers; expected for a {self._virtual_kinds[name]} virtual "
+                f"joint: {len(variables)} ({' '.join(map(str, variables))}); correct it",
             )
             return
         joint = self._tree.joints.get(name)
