@@ -22,6 +22,7 @@ base:
   ros__parameters: {{joints: [c], command_interfaces: [velocity, position]}}
 """
 MOCK = "mock_components/GenericSystem"
+SIMULATED = "gz_ros2_control/GazeboSimSystem"
 
 
 def tag(name: str, plugin: str, *joints: str, parameters: str = "") -> str:
@@ -41,15 +42,23 @@ def visited(*nodes: Node) -> LaunchContext:
     return context
 
 
-def hardware(urdf: str, srdf: str = "", *, controllers: dict | None = None) -> dict:
-    """The parameters of a control node's hardware: all but those of controllers and descriptions."""
+def prepared(urdf: str, srdf: str = "", *, controllers: dict | None = None, **options: str) -> LaunchContext:
+    """Visits a control node beside a node that has the description."""
     description = {"robot_description": urdf, **({"robot_description_semantic": srdf} if srdf else {})}
-    control = Node(package="controller_manager", executable="ros2_control_node", parameters=[controllers or {}])
-    other = Node(package="tf2_ros", executable="buffer_server", name="o", parameters=[description] if urdf else [])
+    parameters = [controllers or {}]
+    control = Node(package="controller_manager", executable="ros2_control_node", parameters=parameters, **options)
+    given = [description] if urdf else []
+    other = Node(package="tf2_ros", executable="buffer_server", name="o", parameters=given, **options)
     context = visited(control, other)
     prepare = context.requests[0].prepare
     assert prepare is not None
     prepare(context.parameters.get)
+    return context
+
+
+def hardware(urdf: str, srdf: str = "", *, controllers: dict | None = None) -> dict:
+    """The parameters of a control node's hardware: all but those of controllers and descriptions."""
+    context = prepared(urdf, srdf, controllers=controllers)
     names = {name: value for name, value in context.parameters.values().items() if "robot_description" not in name}
     return {name: value for name, value in names.items() if not name.startswith("/arm/")}
 
@@ -149,6 +158,28 @@ def test_mock_hardware_is_one_for_each_kind_of_command() -> None:
     parameters = hardware(f"<robot name='r'>{mixed}</robot>")
     assert parameters["/robot_hardware"] == ["arm_position", "arm_velocity"]
     assert parameters["/arm_velocity/command_interface"] == "VelocityJointInterface"
+
+
+@pytest.mark.parametrize("plugin", [SIMULATED, "ign_ros2_control/IgnitionSystem", "gazebo_ros2_control/GazeboSystem"])
+def test_simulated_hardware_starts_the_simulation_which_is_the_clock_of_all_nodes(plugin: str) -> None:
+    arm = tag("arm", plugin, joint("a"), parameters="<param name='gui'>true</param>")
+    controllers = {"arm": {"type": "position_controllers/JointTrajectoryController", "joints": ["a"]}}
+    context = prepared(f"<robot name='r'>{arm}</robot>", controllers=controllers)
+    path, *words = context.requests[0].command
+    assert Path(path).parts[-2:] == ("modular_framework_simulation", "simulation")
+    assert words == ["__name:=controller_manager"]
+    values = context.parameters.values()
+    assert (values["/use_sim_time"], values["/controller_manager/gui"]) == (True, True)
+    assert values["/arm/type"] == "position_controllers/JointTrajectoryController"
+    assert "/controller_manager/type" not in values and "/robot_hardware" not in values
+
+
+def test_simulated_hardware_stands_alone_in_the_namespace_of_the_simulation() -> None:
+    arm, hand = tag("arm", SIMULATED, joint("a")), tag("hand", MOCK, joint("b"))
+    with pytest.raises(RuntimeError, match="name='hand'> is mock_components.* beside simulated hardware; allowed: all"):
+        prepared(f"<robot name='r'>{arm}{hand}</robot>")
+    with pytest.raises(RuntimeError, match="in namespace /left has simulated hardware; allowed: namespace /"):
+        prepared(f"<robot name='r'>{arm}</robot>", namespace="left")
 
 
 def test_without_a_tag_all_joints_are_mock_and_begin_in_a_named_state() -> None:

@@ -38,6 +38,13 @@ from modular_framework_simulation.physics.robot_body import RobotBody, Role
 Script = Callable[[float], None]
 
 
+def with_ros2_control(joints: str, plugin: str = "gz_ros2_control/GazeboSimSystem") -> str:
+    """The two-finger robot with the tag that ROS 2's descriptions have for their controllers."""
+    hardware = f"<hardware><plugin>{plugin}</plugin></hardware>"
+    tag = f"<ros2_control name='r' type='system'>{hardware}{joints}</ros2_control>"
+    return lift_robot_urdf().replace("</robot>", f"{tag}</robot>")
+
+
 class Commander:
     """Stands where the controller manager does: calls a script with the time of each cycle."""
 
@@ -258,6 +265,29 @@ def test_a_robot_with_a_name_the_engine_has_no_room_for_is_refused(
         RobotBody(world, read_robot(urdf, no_packages, convex_parts, False), "r", Pose(), {"n" * 2000: 1.0})
 
 
+@pytest.mark.parametrize(
+    ("plugin", "interface", "position"),
+    [
+        ("gz_ros2_control/GazeboSimSystem", EffortJointInterface, 0.25),
+        ("mock_components/GenericSystem", PositionJointInterface, 0.0),
+    ],
+)
+def test_a_tag_of_simulated_hardware_says_how_joints_are_commanded_and_where_they_begin(
+    world: PhysicsWorld, convex_parts: ConvexParts, plugin: str, interface: type, position: float
+) -> None:
+    state = "<state_interface name='position'><param name='initial_value'>0.25</param></state_interface>"
+    urdf = with_ros2_control(f"<joint name='lift'><command_interface name='effort'/>{state}</joint>", plugin)
+    description = read_robot(urdf, no_packages, convex_parts, False)
+    robot = RobotBody(world, description, "r", Pose(), description.initial_positions)
+    hardware = PyBulletRobotHW(robot)
+    assert hardware.init(MappingNodeHandle(), MappingNodeHandle())
+    commanded = {each: hardware.find(each) for each in (EffortJointInterface, PositionJointInterface)}
+    found = {each for each, offered in commanded.items() if offered and "lift" in offered.names}
+    assert found == {interface}
+    assert "slide_1" in hardware.get(PositionJointInterface).names  # its transmission says so
+    assert robot.starting_positions["lift"] == position
+
+
 def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
     description = read_robot(lift_robot_urdf(), no_packages, convex_parts, False)
     with pytest.raises(DescriptionError, match=r"\['elbow'\].*allowed: lift, slide_1, slide_2"):
@@ -297,6 +327,14 @@ def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, c
             "<robot name='r'><link name='a'><collision><geometry><box size='1 1e30 1'/></geometry></collision></link>"
             "</robot>",
             "link 'a', <box size=...>: got '1 1e30 1'; allowed: lengths of at most 10000 m",
+        ),
+        (
+            with_ros2_control("<joint name='elbow'/>"),
+            "<ros2_control>, joint 'elbow': is no joint that moves; allowed: lift",
+        ),
+        (
+            with_ros2_control("<joint name='lift'><command_interface name='torque'/></joint>"),
+            "joint 'lift': has the command interface 'torque'; allowed in simulation: position, velocity, effort",
         ),
     ],
 )

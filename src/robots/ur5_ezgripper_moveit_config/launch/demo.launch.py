@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The UR5 with EZGripper, mock hardware or the robot, with move_group and RViz; written as MoveIt 2's tutorial."""
+"""The UR5 with EZGripper on mock hardware, simulated or real, with move_group and RViz; as MoveIt 2's tutorial."""
 
 import os
 
@@ -20,6 +20,7 @@ def generate_launch_description() -> LaunchDescription:
         "robot_ip": LaunchConfiguration("robot_ip"),
         "gripper_port": LaunchConfiguration("gripper_port"),
         "use_fake_hardware": LaunchConfiguration("use_fake_hardware"),
+        "sim_gazebo": LaunchConfiguration("sim_gazebo"),
         "initial_z": "0.86",
     }
     hardware_args = [
@@ -28,6 +29,12 @@ def generate_launch_description() -> LaunchDescription:
             default_value="true",
             choices=["true", "false"],
             description="mock hardware that follows its commands exactly; false: the robot",
+        ),
+        DeclareLaunchArgument(
+            "sim_gazebo",
+            default_value="false",
+            choices=["true", "false"],
+            description="the simulated robot, whatever use_fake_hardware says",
         ),
         DeclareLaunchArgument("robot_ip", default_value="192.168.56.101", description="address of the arm"),
         DeclareLaunchArgument("gripper_port", default_value="/dev/ttyUSB0", description="serial device of the gripper"),
@@ -97,7 +104,7 @@ def generate_launch_description() -> LaunchDescription:
         parameters=[moveit_config.robot_description],
     )
 
-    # Hardware, as use_fake_hardware says, and its controllers.
+    # Hardware, as sim_gazebo and use_fake_hardware say, and its controllers.
     ros2_controllers_path = os.path.join(
         get_package_share_directory("ur5_ezgripper_moveit_config"),
         "config",

@@ -13,7 +13,24 @@ from launch.core.parameter_plan import Lookup
 
 from launch_ros import ros2_control
 from launch_ros.node_parameters import ParameterSource
-from launch_ros.ros2_control_hardware import hardware_parameters
+from launch_ros.ros2_control_hardware import hardware_plan
+
+
+@dataclass(frozen=True)
+class LatePlan:
+    """What is known of a node only once all parameters of the launch are.
+
+    Attributes:
+        parameters: More parameters of the node.
+        namespace_parameters: More parameters of its namespace.
+        simulated_time: Whether the node is the clock of all others.
+        program: Package and program to start in place of its own; None for its own.
+    """
+
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    namespace_parameters: Mapping[str, Any] = field(default_factory=dict)
+    simulated_time: bool = False
+    program: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -28,8 +45,7 @@ class NodePlan:
         arguments: Arguments of the program.
         sources: Entries of its `parameters`.
         namespace_parameters: Parameters for its namespace, besides what it is given.
-        late_parameters: Called before the parameters are set, with a look-up of parameters; returns more of them, for
-            the node itself and for its namespace.
+        late: Called before the parameters are set, with a look-up of parameters.
         companions: Nodes to start besides it.
     """
 
@@ -40,7 +56,7 @@ class NodePlan:
     arguments: tuple[str, ...] = ()
     sources: tuple[ParameterSource, ...] = ()
     namespace_parameters: Mapping[str, Any] = field(default_factory=dict)
-    late_parameters: Callable[[Lookup], tuple[Mapping[str, Any], Mapping[str, Any]]] | None = None
+    late: Callable[[Lookup], LatePlan] | None = None
     companions: tuple[NodePlan, ...] = ()
 
 
@@ -64,6 +80,7 @@ def _rviz(plan: NodePlan) -> NodePlan:
     return replace(plan, package="rviz", executable="rviz", companions=companions)
 
 
+SIMULATION = ("modular_framework_simulation", "simulation")
 MARKER_TIMEOUT_S = 300.0
 """How long the marker for goals waits for move_group [s], whose first start compiles what it runs."""
 _TRANSFORM_DEFAULTS = {"--x": "0", "--y": "0", "--z": "0", "--yaw": "0", "--pitch": "0", "--roll": "0"}
@@ -91,13 +108,18 @@ def _static_transform(plan: NodePlan) -> NodePlan:
 
 
 def _control_node(plan: NodePlan) -> NodePlan:
-    """The node with hardware and controller manager: controllers from its files, hardware from the description."""
+    """The node with hardware and controller manager: controllers from its files, hardware from the description.
+
+    Where that is simulated hardware, the program is the simulation, which has the controller manager in it.
+    """
     name = plan.name or "controller_manager"
     private = ros2_control.manager_parameters(plan.sources, plan.namespace, name)
     controllers = ros2_control.controller_parameters(plan.sources)
 
-    def late_parameters(lookup: Lookup) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-        return hardware_parameters(lookup, plan.namespace, private, controllers)
+    def late(lookup: Lookup) -> LatePlan:
+        hardware = hardware_plan(lookup, plan.namespace, private, controllers)
+        program = SIMULATION if hardware.simulated else None
+        return LatePlan(hardware.parameters, hardware.around, hardware.simulated, program)
 
     return replace(
         plan,
@@ -106,7 +128,7 @@ def _control_node(plan: NodePlan) -> NodePlan:
         name=name,
         sources=(ParameterSource(private),),
         namespace_parameters=controllers,
-        late_parameters=late_parameters,
+        late=late,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from launch.core.errors import LaunchError
@@ -16,10 +16,15 @@ from launch_ros.namespaces import full_name
 from launch_ros.node_parameters import DESCRIPTION
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.robot import Joint
+from modular_framework_urdf.ros2_control import (
+    MOCK_PLUGINS,
+    Ros2ControlHardware,
+    Ros2ControlJoint,
+    read_ros2_control,
+)
 from modular_framework_urdf.srdf_reader import read_srdf
 from modular_framework_urdf.urdf_reader import read_urdf
 
-MOCK_PLUGINS = ("mock_components/GenericSystem", "fake_components/GenericSystem")
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
 SINGLE_AXIS = ("revolute", "continuous", "prismatic")
 """Kinds of joints that controllers move."""
@@ -34,95 +39,27 @@ MOCK_INTERFACES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Ros2ControlJoint:
-    """A joint of a `<ros2_control>` tag.
+class HardwarePlan:
+    """How the control node gets its hardware.
 
     Attributes:
-        name: Its name.
-        command_interfaces: What it is commanded, in order; none for a joint that is only read.
-        initial_position: Where it begins [rad|m].
+        parameters: Parameters of the node.
+        around: Parameters of its namespace.
+        simulated: Whether the simulation is to run in its place: world, robot, controllers and clock are one program.
     """
 
-    name: str
-    command_interfaces: tuple[str, ...]
-    initial_position: float
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    around: Mapping[str, Any] = field(default_factory=dict)
+    simulated: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Ros2ControlHardware:
-    """A `<ros2_control>` tag.
-
-    Attributes:
-        name: Its name.
-        plugin: Its hardware.
-        parameters: Parameters of the hardware.
-        joints: Its joints.
-    """
-
-    name: str
-    plugin: str
-    parameters: Mapping[str, Any]
-    joints: tuple[Ros2ControlJoint, ...]
-
-
-def read_ros2_control(urdf: str) -> list[Ros2ControlHardware]:
-    """Returns the `<ros2_control>` tags of a robot description.
-
-    Raises:
-        LaunchError: The description is no XML, or a tag names no hardware.
-    """
-    try:
-        root = xml_text.parse(urdf, DESCRIPTION)
-    except xml_text.XmlError as error:
-        raise LaunchError(str(error)) from None
-    return [_hardware(tag) for tag in root.iter("ros2_control")]
-
-
-def _hardware(tag: xml_text.Element) -> Ros2ControlHardware:
-    name = tag.get("name", "")
-    plugin = (tag.findtext("hardware/plugin") or "").strip()
-    if not plugin:
-        raise LaunchError(
-            f"{DESCRIPTION}: <ros2_control name='{name}'> has no <hardware><plugin>; allowed: {MOCK_PLUGINS[0]}, or "
-            "package/Class of a RobotHW"
-        )
-    parameters = {
-        each.get("name", ""): _number_or_text((each.text or "").strip()) for each in tag.findall("hardware/param")
-    }
-    joints = [_joint(each) for each in tag.findall("joint") if each.find("param[@name='mimic']") is None]
-    return Ros2ControlHardware(name, plugin, parameters, tuple(joints))
-
-
-def _joint(tag: xml_text.Element) -> Ros2ControlJoint:
-    name = tag.get("name", "")
-    interfaces = tuple(sorted(each.get("name", "") for each in tag.findall("command_interface")))
-    text = tag.findtext("state_interface[@name='position']/param[@name='initial_value']")
-    text = text or tag.findtext("param[@name='initial_position']") or "0"
-    try:
-        return Ros2ControlJoint(name, interfaces, float(text))
-    except ValueError:
-        raise LaunchError(f"{DESCRIPTION}: <ros2_control>: initial value of joint '{name}' is '{text}'") from None
-
-
-def _number_or_text(text: str) -> Any:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    for number in (int, float):
-        try:
-            return number(text)
-        except ValueError:
-            continue
-    return text
-
-
-def hardware_parameters(
+def hardware_plan(
     lookup: Lookup, namespace: str, private: Mapping[str, Any], controllers: Mapping[str, Mapping[str, Any]]
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Returns the parameters of the control node that describe its hardware.
+) -> HardwarePlan:
+    """Returns the hardware of the control node: what `<ros2_control>` in the robot's description names.
 
-    It is what `<ros2_control>` in the robot's description names. Without such a tag it is mock hardware with all joints
-    of the robot that can be moved, in the first state of each group that the SRDF names. Where `type` or
-    `robot_hardware` says it already, there is nothing to add.
+    Without such a tag it is mock hardware with all joints of the robot that can be moved, in the first state of each
+    group that the SRDF names. Where `type` or `robot_hardware` says it already, there is nothing to add.
 
     Args:
         lookup: Look-up of parameters.
@@ -130,16 +67,19 @@ def hardware_parameters(
         private: The node's own parameters.
         controllers: Controllers with their parameters.
 
-    Returns:
-        Parameters of the node, and of its namespace.
-
     Raises:
-        LaunchError: There is neither description nor joint.
+        LaunchError: There is neither description nor joint, or the hardware cannot be had together.
     """
     if "type" in private or lookup(full_name(namespace, "robot_hardware")) is not None:
-        return {}, {}
+        return HardwarePlan()
     urdf = private.get(DESCRIPTION) or lookup(full_name(namespace, DESCRIPTION))
-    described = [part for each in (read_ros2_control(urdf) if urdf else []) for part in _parts(each)]
+    try:
+        tags = read_ros2_control(urdf, DESCRIPTION) if urdf else ()
+    except xml_text.XmlError as error:
+        raise LaunchError(str(error)) from None
+    if any(tag.simulated for tag in tags):
+        return _simulation(tags, namespace)
+    described = [part for tag in tags for part in _parts(tag)]
     if not described:
         joints = _joints_of_description(urdf, lookup(full_name(namespace, f"{DESCRIPTION}_semantic"))) if urdf else []
         described = [("mock", _mock(joints or _joints_of_controllers(controllers), ("position",)))]
@@ -148,8 +88,24 @@ def hardware_parameters(
             ", ".join(described[0][1]["joints"]),
         )
     if len(described) == 1:
-        return described[0][1], {}
-    return {}, {"robot_hardware": [name for name, _ in described], **dict(described)}
+        return HardwarePlan(parameters=described[0][1])
+    return HardwarePlan(around={"robot_hardware": [name for name, _ in described], **dict(described)})
+
+
+def _simulation(tags: Iterable[Ros2ControlHardware], namespace: str) -> HardwarePlan:
+    """Returns the simulation, which reads joints and initial positions from the description by itself."""
+    others = [tag for tag in tags if not tag.simulated]
+    if others:
+        raise LaunchError(
+            f"{DESCRIPTION}: <ros2_control name='{others[0].name}'> is {others[0].plugin} beside simulated hardware; "
+            "allowed: all of it simulated, or none, because the clock of a simulation is not that of other hardware"
+        )
+    if namespace != "/":
+        raise LaunchError(
+            f"a control node in namespace {namespace} has simulated hardware; allowed: namespace /, because the "
+            f"simulation has one robot, /{DESCRIPTION}"
+        )
+    return HardwarePlan({name: value for tag in tags for name, value in tag.parameters.items()}, simulated=True)
 
 
 def _parts(hardware: Ros2ControlHardware) -> list[tuple[str, dict[str, Any]]]:

@@ -98,7 +98,8 @@ class SimulationNode:
             parameters.robot_description, self._resources.find_package, self._parts, self._world.engine.has_window
         )
         name = parameters.robot_name or description.name
-        robot = RobotBody(self._world, description, name, Pose(), parameters.starting_positions)
+        positions = description.initial_positions | parameters.starting_positions
+        robot = RobotBody(self._world, description, name, Pose(), positions)
         hardware = PyBulletRobotHW(robot)
         handle = RosNodeHandle("/")
         hardware.init(handle, handle)

@@ -20,8 +20,16 @@ from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
 from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.mimics import Mimic, resolved
 from modular_framework_urdf.robot import Joint, Limit, Robot
+from modular_framework_urdf.ros2_control import Ros2ControlJoint, read_ros2_control
 from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
 from modular_framework_urdf.xml_text import Element
+
+COMMAND_INTERFACES = {
+    "position": "hardware_interface/PositionJointInterface",
+    "velocity": "hardware_interface/VelocityJointInterface",
+    "effort": "hardware_interface/EffortJointInterface",
+}
+"""By ros2_control's name of what a joint is commanded: ros_control's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +44,7 @@ class RobotJoint:
         upper: [rad or m]
         effort: Largest effort of its drive [Nm or N].
         velocity: Largest velocity [rad/s or m/s].
-        interfaces: Hardware interfaces its transmission names; empty for a joint without a drive of its own.
+        interfaces: Hardware interfaces it is commanded by; empty for a joint without a drive of its own.
         mimic: The joint it follows, if it follows one.
     """
 
@@ -61,6 +69,7 @@ class RobotDescription:
         links: All link names, in file order.
         parents: Parent link of every link that has one.
         engine_urdf: The URDF for the physics engine.
+        initial_positions: Where the description lets joints begin [rad or m], by name.
     """
 
     name: str
@@ -68,6 +77,7 @@ class RobotDescription:
     links: tuple[str, ...]
     parents: dict[str, str]
     engine_urdf: str
+    initial_positions: dict[str, float]
 
 
 def read_robot(
@@ -94,13 +104,16 @@ def read_robot(
     links = tuple(link.name for link in robot.links)
     if root.tag != "robot" or not links:
         raise DescriptionError("robot_description", f"<{root.tag}> with {len(links)} links", "expected a URDF <robot>")
-    interfaces = _interfaces(robot)
+    simulated = _simulated_joints(text, robot)
+    interfaces = _interfaces(robot) | {joint.name: _commands(joint) for joint in simulated}
     _require_ends(robot)
     joints = _with_leaders(tuple(_joint(joint, interfaces.get(joint.name, ())) for joint in robot.movable_joints()))
     _rewrite_meshes(root, find_package, convex_parts, with_visuals)
     _give_frames_no_weight(root)
     parents = {joint.child: joint.parent for joint in robot.joints}
-    return RobotDescription(root.get("name", "robot"), joints, links, parents, xml_text.to_text(root))
+    followers = {joint.name for joint in robot.joints if joint.mimic is not None}
+    initial = {joint.name: joint.initial_position for joint in simulated if joint.name not in followers}
+    return RobotDescription(root.get("name", "robot"), joints, links, parents, xml_text.to_text(root), initial)
 
 
 def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
@@ -127,6 +140,31 @@ def _interfaces(robot: Robot) -> dict[str, tuple[str, ...]]:
                 raise DescriptionError(where, "has no <hardwareInterface>", "name the position, velocity or effort one")
             interfaces[joint.name] = interfaces.get(joint.name, ()) + tuple(each.text for each in joint.interfaces)
     return interfaces
+
+
+def _simulated_joints(text: str, robot: Robot) -> list[Ros2ControlJoint]:
+    """Returns the joints of the `<ros2_control>` tags that name a simulation."""
+    try:
+        tags = read_ros2_control(text)
+    except xml_text.XmlError as error:
+        raise DescriptionError(error.where, error.found, error.allowed) from error
+    movable = [joint.name for joint in robot.movable_joints()]
+    joints = [joint for tag in tags if tag.simulated for joint in tag.joints]
+    for joint in joints:
+        if joint.name not in movable:
+            where = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
+            raise DescriptionError(where, "is no joint that moves", f"allowed: {', '.join(movable)}")
+    return joints
+
+
+def _commands(joint: Ros2ControlJoint) -> tuple[str, ...]:
+    """Returns the hardware interfaces of ros_control for the command interfaces of a joint."""
+    unknown = [name for name in joint.command_interfaces if name not in COMMAND_INTERFACES]
+    if unknown:
+        where = f"robot_description:{joint.line}: <ros2_control>, joint '{joint.name}'"
+        allowed = f"allowed in simulation: {', '.join(COMMAND_INTERFACES)}"
+        raise DescriptionError(where, f"has the command interface '{unknown[0]}'", allowed)
+    return tuple(COMMAND_INTERFACES[name] for name in joint.command_interfaces)
 
 
 def _require_ends(robot: Robot) -> None:

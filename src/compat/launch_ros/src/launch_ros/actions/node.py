@@ -17,7 +17,7 @@ from launch.ros_packages import program_of_package
 from launch.substitutions.text import described
 
 from launch_ros.namespaces import check_node_name, full_name, join, name_from
-from launch_ros.node_parameters import ParameterSource, evaluate_sources, parameters_of_node, plan_parameters
+from launch_ros.node_parameters import CLOCK, ParameterSource, evaluate_sources, parameters_of_node, plan_parameters
 from launch_ros.ros1_programs import NodePlan, ros1_plan
 from launch_ros.ros_arguments import RosArguments, split_ros_arguments
 
@@ -115,7 +115,7 @@ class Node(ExecuteProcess):
 
     def _complete(self, context: LaunchContext, request: ProcessRequest, plan: NodePlan, own: RosArguments) -> None:
         """Writes the node into the request of its process, and plans its parameters."""
-        name = plan.name or (name_from(plan.executable) if plan.sources or plan.late_parameters else "")
+        name = plan.name or (name_from(plan.executable) if plan.sources or plan.late else "")
         self._full_name = self._full_name or full_name(plan.namespace, name or name_from(plan.executable))
         path = program_of_package(plan.package, plan.executable) if plan.package else plan.executable
         request.name = full_name(plan.namespace, name or name_from(plan.executable)).lstrip("/")
@@ -140,16 +140,23 @@ class Node(ExecuteProcess):
             plan_parameters(context.parameters, plan.namespace, name, parameters)
         for key, value in plan.namespace_parameters.items():
             context.parameters.set(full_name(plan.namespace, key), value, f"node {node}")
-        late = plan.late_parameters
+        late = plan.late
         if late is None:
             return
 
         def prepare(lookup: Lookup) -> None:
-            own, around = late(lookup)
-            for key, value in own.items():
-                context.parameters.set(full_name(node, key), value, f"node {node}")
-            for key, value in around.items():
-                context.parameters.set(full_name(plan.namespace, key), value, f"node {node}")
+            found = late(lookup)
+            owner = f"node {node}"
+            for key, value in found.parameters.items():
+                context.parameters.set(full_name(node, key), value, owner)
+            for key, value in found.namespace_parameters.items():
+                context.parameters.set(full_name(plan.namespace, key), value, owner)
+            if found.simulated_time:
+                context.parameters.set(f"/{CLOCK}", True, owner, shared=True)
+            if found.program is not None:
+                path = program_of_package(*found.program)
+                own = program_of_package(plan.package, plan.executable)
+                request.command = [path if word == own else word for word in request.command]
 
         request.prepare = prepare
 
