@@ -18,7 +18,7 @@ from modular_framework_setup.checks.sensor_checks import check_sensors
 from modular_framework_setup.checks.srdf_checks import check_srdf
 from modular_framework_setup.checks.urdf_checks import check_urdf
 from modular_framework_setup.config_files.config_package import ConfigPackage, packages_beside, read_config_package
-from modular_framework_setup.config_files.description_files import XmlDocument, parse_document, read_document
+from modular_framework_setup.config_files.description_files import XmlDocument, package_document, parse_document
 from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
 from modular_framework_setup.config_files.yaml_files import is_open, load_yaml
 from modular_framework_urdf.srdf_reader import SemanticDescription, read_srdf
@@ -63,7 +63,7 @@ def read_and_check(folder: Path) -> CheckedPackage:
     with packages_beside(folder):
         package = read_config_package(folder, faults)
         tree = _read_robot(package, faults)
-        document = _read_srdf(package, faults)
+        document = package_document(package, package.srdf, faults)
         root = parse_document(document, faults) if document else None
         semantics = check_srdf(root, document.where, tree, faults) if document and root is not None and tree else None
         files = _check_yaml_files(package, tree, semantics, faults)
@@ -72,18 +72,8 @@ def read_and_check(folder: Path) -> CheckedPackage:
 
 
 def _read_robot(package: ConfigPackage, faults: FaultList) -> RobotTree | None:
-    if package.urdf is None:
-        return None
-    arguments = {**package.launch_mappings(package.urdf.name), **package.xacro_arguments}
-    document = read_document(package.urdf, arguments, faults)
+    document = package_document(package, package.urdf, faults)
     return check_urdf(document, faults) if document else None
-
-
-def _read_srdf(package: ConfigPackage, faults: FaultList) -> XmlDocument | None:
-    if package.srdf is None:
-        return None
-    arguments = {**package.launch_mappings(package.srdf.name), **package.xacro_arguments}
-    return read_document(package.srdf, arguments, faults)
 
 
 def _contents(document: XmlDocument | None) -> SemanticDescription | None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from xacro_rospkg import PackageNotFoundError, expand
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
+from modular_framework_setup.config_files.config_package import ConfigPackage
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.xml_text import XmlError
 
@@ -61,6 +62,13 @@ def read_document(path: Path, arguments: Mapping[str, str], faults: FaultList) -
         reason = " ".join(str(error).split()) or type(error).__name__
         faults.add(SourceLocation(str(file), line, 1), f"xacro fails: {reason}; mend the file, or give the argument")
         return None
+
+
+def package_document(package: ConfigPackage, path: Path | None, faults: FaultList) -> XmlDocument | None:
+    """Reads the URDF or SRDF of a config package, with the arguments its launch files and settings give it."""
+    if path is None:
+        return None
+    return read_document(path, {**package.launch_mappings(path.name), **package.xacro_arguments}, faults)
 
 
 def _place_of(path: Path, reason: str, error: Exception) -> tuple[Path, int]:
