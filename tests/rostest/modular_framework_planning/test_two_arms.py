@@ -14,13 +14,15 @@ import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import PoseStamped
-from moveit_commander import MoveGroupCommander
-from moveit_msgs.msg import MoveItErrorCodes, PositionIKRequest, RobotState
+from moveit_commander import MoveGroupCommander, RobotCommander
+from moveit_msgs.msg import MoveGroupAction, MoveGroupGoal, MoveItErrorCodes, PositionIKRequest, RobotState
 from moveit_msgs.srv import GetPositionFK, GetPositionIK
 from planning_wire import report_of
 from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+
+from modular_framework_ros.action_client import SteadyActionClient
 
 SIDES = ("left", "right")
 JOINTS = {side: [f"{side}_joint{number}" for number in range(1, 8)] for side in SIDES}
@@ -194,32 +196,63 @@ def test_a_motion_into_one_under_way_is_not_begun_and_both_links_are_named(
     until(lambda: abs(recorder.now("left_joint1") + 1.2) < 1e-3, "the end of the motion that came first")
 
 
+ACROSS = {"right_joint1": 1.2, "right_joint2": 0.3, "right_joint4": -1.7, "right_joint6": 2.0}
+AWAY = {"right_joint1": 0.0, "right_joint2": -0.785, "right_joint4": -2.356, "right_joint6": 1.571}
+
+
+def push(recorder: Recorder, places: dict[str, float]) -> None:
+    """Puts joints elsewhere, by no motion of move_group."""
+    publisher = rospy.Publisher("move_group/fake_controller_joint_states", JointState, queue_size=5)
+    until(publisher.get_num_connections, "the joint state publisher")
+    time.sleep(0.2)  # it hears a new publisher a little later than that hears of it
+    publisher.publish(JointState(Header(stamp=rospy.Time.now()), list(places), list(places.values()), [], []))
+    until(lambda: all(recorder.now(name) == place for name, place in places.items()), "the joints elsewhere")
+    publisher.unregister()
+
+
 def test_a_motion_stops_when_the_other_arm_comes_into_its_way_by_itself(
     groups: dict[str, MoveGroupCommander], recorder: Recorder
 ) -> None:
-    left, worked_out = groups["left_arm"], []
+    left, results = groups["left_arm"], []
     across(left, "left")
     worked, motion, _, _ = left.plan()
     assert worked
-    points = motion.joint_trajectory.points
-    for point in points:
+    for point in motion.joint_trajectory.points:
         point.time_from_start *= 4.0
         point.velocities, point.accelerations = [], []
-    mover = threading.Thread(target=lambda: worked_out.append(left.execute(motion)))
+    mover = threading.Thread(target=lambda: results.append(left.execute(motion)))
     mover.start()
     until(lambda: recorder.now("left_joint1") < -0.02, "the begin of the motion")
-    pushed = rospy.Publisher("move_group/fake_controller_joint_states", JointState, queue_size=5)
-    until(pushed.get_num_connections, "the joint state publisher")
-    time.sleep(0.2)
-    target = {"right_joint1": 1.2, "right_joint2": 0.3, "right_joint4": -1.7, "right_joint6": 2.0}
-    message = JointState(Header(stamp=rospy.Time.now()), list(target), list(target.values()), [], [])
-    _, report = report_of(lambda: pushed.publish(message), "execute")
+    _, report = report_of(lambda: push(recorder, ACROSS), "execute")
     mover.join(30.0)
-    pushed.unregister()
-    assert worked_out == [False]
+    assert results == [False]
     assert recorder.now("left_joint1") > -1.1, "it stopped on its way"
     said = report["reason"]
     assert "another part of the robot moved" in said and "link 'left_" in said and "link 'right_" in said
+
+
+def test_a_motion_whose_plan_allows_the_arms_to_touch_goes_on(
+    groups: dict[str, MoveGroupCommander], recorder: Recorder
+) -> None:
+    left = groups["left_arm"]
+    across(left, "left")
+    left.set_max_velocity_scaling_factor(0.3)
+    goal = MoveGroupGoal(request=left.construct_motion_plan_request())
+    left.set_max_velocity_scaling_factor(1.0)
+    links = [link for link in RobotCommander().get_link_names() if link.startswith("left_")]
+    diff = goal.planning_options.planning_scene_diff
+    diff.is_diff = diff.robot_state.is_diff = True
+    diff.allowed_collision_matrix.default_entry_names = links
+    diff.allowed_collision_matrix.default_entry_values = [True] * len(links)
+    client = SteadyActionClient("move_group", MoveGroupAction)
+    assert client.wait_for_server(rospy.Duration(20.0))
+    client.send_goal(goal)
+    until(lambda: recorder.now("left_joint1") < -0.02, "the begin of the motion")
+    push(recorder, ACROSS)
+    assert client.wait_for_result(rospy.Duration(30.0))
+    assert client.get_result().error_code.val == MoveItErrorCodes.SUCCESS
+    assert recorder.now("left_joint1") == pytest.approx(-1.2, abs=1e-3)
+    push(recorder, AWAY)
 
 
 def ik(avoid_collisions: bool = True, **changes: Any) -> PositionIKRequest:
