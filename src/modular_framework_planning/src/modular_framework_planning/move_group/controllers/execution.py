@@ -164,9 +164,11 @@ class TrajectoryExecution:
             if self._is_there_already(motion, parts):
                 return
             self.manager.prepare(parts)
-            self._run(parts, self.manager, _delay_s(motion), cancelled, stop)
-            if self.settings.wait_for_trajectory_completion:
-                self._settle(motion.joint_names)
+            try:
+                self._run(parts, self.manager, _delay_s(motion), cancelled, stop)
+            finally:  # a motion that was stopped, too: the goal that takes its place begins where the robot stays
+                if self.settings.wait_for_trajectory_completion and not rospy.is_shutdown():
+                    self._settle(motion.joint_names)
 
     @contextmanager
     def _entered(self, entered: _Motion, admit: Admission) -> Iterator[threading.Event]:
