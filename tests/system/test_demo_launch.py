@@ -46,11 +46,10 @@ ARM_AND_HAND = [MOVES[0], MOVES[-1]]
     ("file", "hardware", "moves"),
     [
         ("demo.launch.py", {}, MOVES),
-        ("demo.launch", {}, MOVES),
+        ("demo.launch", {}, ARM_AND_HAND),
         ("demo.launch.py", {"sim_gazebo": "true"}, ARM_AND_HAND),
-        ("demo.launch", {"sim_gazebo": "true"}, ARM_AND_HAND),
     ],
-    ids=["python mock", "xml mock", "python simulated", "xml simulated"],
+    ids=["python mock", "xml mock", "python simulated"],
 )
 def test_a_script_moves_arm_and_gripper_of_the_demonstration(
     session: RosSession, file: str, hardware: dict[str, str], moves: list[tuple[str, str, str, str]]
