@@ -259,6 +259,18 @@ def test_the_same_seed_makes_the_same_package(package_path: Path) -> None:
     assert texts[0] == texts[1]
 
 
+@pytest.mark.parametrize("is_on_path", [True, False])
+def test_the_last_lines_start_the_packages(
+    is_on_path: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if is_on_path:
+        monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}{os.pathsep}{os.environ['ROS_PACKAGE_PATH']}")
+    make("crane_1", tmp_path / "new", write(tmp_path, CRANE), "--samples", "20")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "    roslaunch crane_1_moveit_config demo.launch"
+    assert (f"    export ROS_PACKAGE_PATH={tmp_path / 'new'}:$ROS_PACKAGE_PATH" in lines) is not is_on_path
+
+
 def test_nothing_is_overwritten(package_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write(package_path, CRANE)
     (package_path / "crane_1_robot").mkdir()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from collections.abc import Sequence
@@ -128,5 +129,9 @@ def _report(plan: RobotPlan, folders: Sequence[Path]) -> None:
     print(f"self collisions: {off} of {len(plan.verdicts)} pairs of links need no check")
     for note in plan.notes:
         print(f"note: {note}")
-    print(f"made {folders[0]} and {folders[1]}; build them, or put their folder on ROS_PACKAGE_PATH, and start")
+    print(f"made {folders[0]} and {folders[1]}; start with")
+    folder = folders[0].resolve().parent
+    paths = [Path(path).resolve() for path in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if path]
+    if not any(folder.is_relative_to(path) for path in paths):
+        print(f"    export ROS_PACKAGE_PATH={folder}:$ROS_PACKAGE_PATH")
     print(f"    roslaunch {plan.choices.config_package} demo.launch")
