@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Describes an experiment: which methods it compares, by which metrics.
+
+It is what a result database keeps of an experiment file, so that statistics and reports need no other source.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Direction(Enum):
+    """Which values of a metric are better."""
+
+    HIGHER = "higher"
+    LOWER = "lower"
+
+
+class MetricKind(Enum):
+    """What the values of a metric are, which decides the statistics that fit."""
+
+    RATE = "rate"  # true or false in each episode, such as success
+    VALUE = "value"  # a number, such as a length
+    TIME = "time"  # a duration, censored at a limit when the episode did not finish
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A figure of an episode.
+
+    Attributes:
+        name: Identifier, a column of the result table: `planning_time`.
+        component: What it measures: `task`, `generation`, `planning`, `execution`, `grasp` or a user's own.
+        kind: What its values are.
+        better: Which values are better.
+        unit: Unit of the values, such as `s`; "" for none.
+        limit: Value at which it is censored [unit]; None: never. An episode that failed counts at the limit.
+        description: What it says, in a sentence.
+    """
+
+    name: str
+    component: str
+    kind: MetricKind
+    better: Direction
+    unit: str = ""
+    limit: float | None = None
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Factor:
+    """What is varied between episodes.
+
+    Attributes:
+        name: Identifier, such as `grasp_method`.
+        levels: Labels of its values, such as ("top_down", "antipodal").
+    """
+
+    name: str
+    levels: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ExperimentDescription:
+    """An experiment as the result database keeps it.
+
+    Attributes:
+        name: Name of the experiment.
+        mode: `task` (the whole stack in simulation), `planning`, `kinematics` or `grasps`.
+        text: The experiment file, verbatim.
+        digest: SHA-256 of what decides the episodes, hexadecimal: two files with the same digest run the same episodes.
+        factors: What is varied.
+        compared: Name of the factor whose levels are the methods that are compared.
+        metrics: What is measured.
+        time_limit_s: Longest an episode may take [s].
+        confidence: Level of the intervals, such as 0.95.
+    """
+
+    name: str
+    mode: str
+    text: str
+    digest: str
+    factors: tuple[Factor, ...]
+    compared: str
+    metrics: tuple[Metric, ...]
+    time_limit_s: float
+    confidence: float = 0.95
