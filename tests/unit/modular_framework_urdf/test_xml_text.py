@@ -98,7 +98,7 @@ def _core_groups(text: str, _folder: Path) -> None:
 
 
 def _core_gripper(text: str, _folder: Path) -> None:
-    from top_down_grasps.gripper_geometry import measure_gripper
+    from modular_framework_core.grasp_generation.gripper_geometry import measure_gripper
 
     measure_gripper(text, "palm", "finger")
 

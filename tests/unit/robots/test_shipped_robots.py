@@ -19,7 +19,7 @@ from roslaunch.config import load_config_default
 from xacro_rospkg import expand
 
 from modular_framework_core.commander.robot_groups import read_group
-from top_down_grasps.gripper_geometry import measure_gripper
+from modular_framework_core.grasp_generation.gripper_geometry import measure_gripper
 
 ROBOTS = ("panda_hand_robot", "iiwa_wsg50_robot", "dual_panda_robot")
 POSES = ("initial_pose", "stability_pose")

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from top_down_grasps import surface_points
-from top_down_grasps.gripper_geometry import (
+from modular_framework_core.grasp_generation import surface_points
+from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
     GripperGeometryError,
     measure_gripper,
     rotation_about,
 )
-from top_down_grasps.surface_points import Surface
+from modular_framework_core.grasp_generation.surface_points import Surface
 from top_down_grasps.top_down import TopDownGrasp, TopDownSettings, top_down_grasps
 
 coal = pytest.importorskip("coal")

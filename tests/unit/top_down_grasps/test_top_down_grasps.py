@@ -13,21 +13,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from top_down_grasps import surface_points
-from top_down_grasps.gripper_geometry import (
+from modular_framework_core.grasp_generation import surface_points
+from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
     GripperGeometryError,
     measure_gripper,
     rotation_about,
 )
-from top_down_grasps.planning_scene_objects import (
+from modular_framework_core.grasp_generation.planning_scene_objects import (
     CropBox,
     SceneObjectError,
     is_named,
     rotation_matrix,
     scene_object,
 )
-from top_down_grasps.surface_points import Surface
+from modular_framework_core.grasp_generation.surface_points import Surface
 from top_down_grasps.top_down import TopDownSettings, top_down_grasps
 
 UP = np.array([0.0, 0.0, 1.0])

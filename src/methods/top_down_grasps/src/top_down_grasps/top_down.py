@@ -18,18 +18,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from top_down_grasps.gripper_geometry import GripperGeometry
-from top_down_grasps.surface_points import Surface
+from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
+from modular_framework_core.grasp_generation.hand_clearance import (
+    CONTACT_DEPTH_M,
+    HEIGHT_ROUNDS,
+    HEIGHT_TOLERANCE_M,
+    Passage,
+    highest_points,
+    lowest_height,
+)
+from modular_framework_core.grasp_generation.surface_points import Surface
 
 Array = npt.NDArray[np.float64]
 
-CONTACT_DEPTH_M = 0.001
-CLOSING_CLEARANCE_M = 0.002
-"""Room between the object and what is not a pad when the pads touch it: the spacing error of surface points."""
-CLOSING_STEPS, OPENING_STEPS = 5, 8
-HEIGHT_TOLERANCE_M = 0.0005
-HEIGHT_ROUNDS = 4
-COLUMN_M = 0.004
 SAME_DIRECTION_RAD = math.radians(3.0)
 
 
@@ -103,7 +104,7 @@ def top_down_grasps(
         Usable grasps, best first; empty when the object cannot be grasped from above.
     """
     grasps = []
-    top = _highest_points(surface.points)
+    top = highest_points(surface.points)
     for yaw in _directions(surface, settings.yaw_step_rad):
         closing = np.array([math.cos(yaw), math.sin(yaw)])
         across = np.array([math.sin(yaw), -math.cos(yaw)])
@@ -136,13 +137,6 @@ class _Slice:
     def top_around(self, x: float, y: float) -> Array:
         """Returns the highest points relative to a point in the plane."""
         return self.top - [x, y, 0.0]
-
-
-def _highest_points(points: Array) -> Array:
-    """Keeps the highest point of each small column: what a hand from above meets first."""
-    order = np.argsort(-points[:, 2])
-    _, first = np.unique(np.floor(points[order, :2] / COLUMN_M).astype(np.int64), axis=0, return_index=True)
-    return points[order[first]]
 
 
 def _directions(surface: Surface, step: float) -> list[float]:
@@ -257,55 +251,12 @@ def _highest_hold(
         clearance = min(settings.finger_clearance_m, gripper.max_opening / 2 - half_width)
         if clearance < min(settings.min_finger_clearance_m, settings.finger_clearance_m):
             return None
-        way = _WayDown(high - low, half_width, clearance)
-        lowest, opening = _lowest_height(flat.top_around(middle, y_grasp), way, z, gripper)
+        passage = Passage(high - low, half_width, clearance)
+        lowest, opening = lowest_height(flat.top_around(middle, y_grasp), passage, z, gripper)
         if lowest <= z + HEIGHT_TOLERANCE_M:
             return _Hold(z, pad_z, low, high, overlap, opening, touching)
         z = lowest
     return None
-
-
-@dataclass(frozen=True, slots=True)
-class _WayDown:
-    """Between the pads on the way down.
-
-    Attributes:
-        width: Opening at which the pads touch [m].
-        half_width: Farthest the object reaches from the middle of the hand [m].
-        clearance: Room to keep on each side [m].
-    """
-
-    width: float
-    half_width: float
-    clearance: float
-
-
-def _lowest_height(top: Array, way: _WayDown, wanted: float, gripper: GripperGeometry) -> tuple[float, float]:
-    """Chooses the opening with which the hand can come down to a wanted height, or else the farthest.
-
-    Args:
-        top: Highest points of the object around the middle of the hand.
-        way: What the pads have to pass.
-        wanted: Height of the grasp frame that is wanted [m].
-        gripper: Geometry of the hand.
-
-    Returns:
-        The least height at which the hand is clear all the time [m], and the opening to come down with [m].
-    """
-    needed = 2 * (way.half_width + way.clearance)
-    closing = np.linspace(way.width, needed, CLOSING_STEPS, endpoint=False)
-    coming = np.linspace(needed, gripper.max_opening, OPENING_STEPS)
-    openings = np.concatenate([closing, coming])
-    while_closing = np.maximum.accumulate(
-        gripper.lowest_heights(openings, top, CLOSING_CLEARANCE_M, with_pads=False, floor=wanted)
-    )
-    # The pads' own room is in the opening already; without the last bit, rounding would open the hand a step wider.
-    coming_down = gripper.lowest_heights(
-        coming, top, max(0.0, way.clearance - CONTACT_DEPTH_M), with_pads=True, floor=wanted
-    )
-    heights = np.maximum(while_closing[CLOSING_STEPS:], coming_down)
-    chosen = int(np.argmax(heights <= heights.min() + HEIGHT_TOLERANCE_M))
-    return float(heights[chosen]), float(coming[chosen])
 
 
 def _alignment(flat: _Slice, side: npt.NDArray[np.bool_], sign: float) -> float:

@@ -10,16 +10,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from modular_framework_urdf.robot import Joint
-from modular_framework_urdf.urdf_reader import read_urdf
-from modular_framework_urdf.xml_text import XmlError
-from top_down_grasps.convex_bodies import (
+from modular_framework_core.grasp_generation.convex_bodies import (
     ConvexBody,
     ShapeError,
     collision_body,
     column_fronts,
 )
-from top_down_grasps.hand_axes import hand_axes
+from modular_framework_core.grasp_generation.hand_axes import hand_axes
+from modular_framework_urdf.robot import Joint
+from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.xml_text import XmlError
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 200

@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from modular_framework_core.grasp_generation import ros_grasp_generator as node
+from modular_framework_core.grasp_generation import surface_points
+from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
+from modular_framework_core.grasp_generation.wait_limit import WaitLimit
 from modular_framework_ros.calls import CallError
-from top_down_grasps import ros_top_down_node as node
-from top_down_grasps import surface_points
-from top_down_grasps.planning_scene_objects import SceneObject
-from top_down_grasps.wait_limit import WaitLimit
 
 LIMIT_S = 20.0
 EMPTY = node.NoObjectError("no object of the planning scene is in the crop box")
@@ -32,16 +32,16 @@ def test_patience_begins_when_the_clock_of_a_simulation_does_and_again_when_it_i
     assert [wait_limit.is_exceeded(now, LIMIT_S) for now in (300.0, 5.0, 24.0, 26.0)] == [False, False, False, True]
 
 
-class Scripted(node.TopDownGraspGenerator):
+class Scripted(node.GraspGenerator):
     """Sees what a script says, one scene after the other, and stores what it signalled."""
 
     def __init__(self, scenes: list[object], makes: Callable[[], list[object]], attached: Iterable[str]) -> None:
-        super().__init__()
-        self._attached = set(attached)
+        super().__init__(SimpleNamespace())
+        self._scene = SimpleNamespace(targets=self._next_scene, attached=set(attached))
         self.scenes, self.makes, self.signals = list(scenes), makes, []
         self._stored = SimpleNamespace(replace=lambda grasps, prefix: None)
 
-    def _candidates(self, settings):
+    def _next_scene(self, settings):
         scene = self.scenes.pop(0)
         if isinstance(scene, Exception):
             raise scene
@@ -71,6 +71,7 @@ def watched(monkeypatch):
             "rospy",
             SimpleNamespace(
                 get_time=lambda: clock.now,
+                get_name=lambda: "/grasp_generator",
                 is_shutdown=lambda: not generator.scenes,
                 loginfo_throttle=lambda *_: None,
                 rostime=SimpleNamespace(wallsleep=sleep),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Converts collision objects of the planning scene to surfaces in the planning frame."""
+"""Converts collision objects of the planning scene to surfaces and solids in the planning frame."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from top_down_grasps import surface_points
-from top_down_grasps.surface_points import Surface
+from modular_framework_core.grasp_generation import solid_meshes, surface_points
+from modular_framework_core.grasp_generation.surface_points import Surface
+from modular_framework_urdf.mesh_reader import TriangleMesh
 
 BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
 
@@ -26,11 +27,13 @@ class SceneObject:
 
     Attributes:
         name: Id of the object.
-        surface: Its surface in the planning frame.
+        surface: Points on its surface, in the planning frame.
+        solids: Its parts as closed meshes in the planning frame; empty where only the surface is known.
     """
 
     name: str
     surface: Surface
+    solids: tuple[TriangleMesh, ...] = ()
 
     @property
     def centre(self) -> npt.NDArray[np.float64]:
@@ -75,23 +78,31 @@ def _translation(position: Any) -> npt.NDArray[np.float64]:
     return np.array([position.x, position.y, position.z])
 
 
-def _placed(surface: Surface, pose: Any) -> Surface:
-    return surface.moved(rotation_matrix(pose.orientation), _translation(pose.position))
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A part of an object: points on its surface, and its mesh."""
+
+    surface: Surface
+    solid: TriangleMesh
+
+    def placed(self, pose: Any) -> _Part:
+        rotation, translation = rotation_matrix(pose.orientation), _translation(pose.position)
+        return _Part(self.surface.moved(rotation, translation), solid_meshes.moved(self.solid, rotation, translation))
 
 
-def _primitive(primitive: Any, where: str) -> Surface:
+def _primitive(primitive: Any, where: str) -> _Part:
     sizes = list(primitive.dimensions)
     if not sizes or min(sizes) <= 0.0:
         raise SceneObjectError(f"{where} has the dimensions {sizes}; all must be positive")
     match primitive.type, len(sizes):
         case (1, 3):
-            return surface_points.box(sizes)
+            return _Part(surface_points.box(sizes), solid_meshes.box(sizes))
         case (2, 1):
-            return surface_points.sphere(sizes[0])
+            return _Part(surface_points.sphere(sizes[0]), solid_meshes.sphere(sizes[0]))
         case (3, 2):
-            return surface_points.cylinder(sizes[0], sizes[1])
+            return _Part(surface_points.cylinder(sizes[0], sizes[1]), solid_meshes.cylinder(sizes[0], sizes[1]))
         case (4, 2):
-            return surface_points.cylinder(sizes[0], sizes[1], 0.0)
+            return _Part(surface_points.cylinder(sizes[0], sizes[1], 0.0), solid_meshes.cone(sizes[0], sizes[1]))
         case _:
             raise SceneObjectError(
                 f"{where} has type {primitive.type} with {len(sizes)} dimensions; allowed are box "
@@ -112,7 +123,7 @@ def scene_object(message: Any) -> SceneObject | None:
         SceneObjectError: A part cannot be understood.
     """
     parts = [
-        _placed(_primitive(shape, f"object '{message.id}', primitive {number}"), pose)
+        _primitive(shape, f"object '{message.id}', primitive {number}").placed(pose)
         for number, (shape, pose) in enumerate(zip(message.primitives, message.primitive_poses, strict=True))
     ]
     for shape, pose in zip(message.meshes, message.mesh_poses, strict=True):
@@ -123,5 +134,10 @@ def scene_object(message: Any) -> SceneObject | None:
                 f"object '{message.id}' has a mesh of {len(vertices)} vertices and {len(triangles)} "
                 "triangles that does not hold together"
             )
-        parts.append(_placed(surface_points.mesh(vertices, triangles), pose))
-    return SceneObject(message.id, _placed(surface_points.joined(parts), message.pose)) if parts else None
+        solid = solid_meshes.outward(TriangleMesh(vertices, triangles))
+        parts.append(_Part(surface_points.mesh(vertices, triangles), solid).placed(pose))
+    if not parts:
+        return None
+    placed = [part.placed(message.pose) for part in parts]
+    surface = surface_points.joined([part.surface for part in placed])
+    return SceneObject(message.id, surface, tuple(part.solid for part in placed))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from top_down_grasps.gripper_geometry import GripperGeometryError, measure_gripper
-from top_down_grasps.hand_axes import hand_axes
+from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
+from modular_framework_core.grasp_generation.hand_axes import hand_axes
 
 FINGERS = np.array([[0.04, 0.0, -0.02], [-0.04, 0.0, -0.02]])
 PALM = np.array([0.0, 0.005, -0.08])

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
-from top_down_grasps.planning_scene_objects import SceneObject
+from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
 
 MOVED_M = 0.005
 """A surface point farther than this from where it was makes grasps of the object stale: about half the room between

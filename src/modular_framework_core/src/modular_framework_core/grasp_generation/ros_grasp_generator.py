@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Watches the planning scene, has a method find grasps for what stands there, and stores them in the grasp manager."""
+
+from __future__ import annotations
+
+import heapq
+import threading
+from collections import Counter
+
+import rospy
+from scipy.spatial.transform import Rotation
+from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger, TriggerResponse
+
+from modular_framework_core.commander.arm_commander import ArmCommander, CommanderError
+from modular_framework_core.grasp_generation.generated_objects import GeneratedObjects, at_rest
+from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspMethod, GraspQuery
+from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
+from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
+from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings, read_settings
+from modular_framework_core.grasp_generation.ros_grasp_reachability import Reach, check_reach
+from modular_framework_core.grasp_generation.ros_scene_objects import NoGraspError, NoObjectError, SceneObjects
+from modular_framework_core.grasp_generation.ros_stored_grasps import StoredGrasps
+from modular_framework_core.grasp_generation.wait_limit import WaitLimit
+from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
+from modular_framework_core.msg import StandardisedGrasp
+from modular_framework_ros.calls import CallError
+from modular_framework_ros.start_up import start_timeout
+
+SIGNAL_TOPIC = "grasp_generated"
+GENERATE_SERVICES = ("generate_grasps", "~generate")
+REFRESH_SERVICES = ("refresh_grasps", "~refresh")
+SCENE_PERIOD_S = 0.25
+WAITING_PERIOD_S = 10.0
+
+
+class GraspGenerator:
+    """Generates grasps when an object appears in the crop box or was moved, or on demand.
+
+    New grasps replace the ones that were generated before. An object that the robot carries counts as the one that
+    is set down under its name.
+
+    Parameters: see :mod:`ros_generator_settings`, and those of the method; they are read again for every generation.
+    Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched).
+    Services (std_srvs/Trigger), the names of every method first, this node's own second:
+        ``generate_grasps``, ``~generate``: generates grasps.
+        ``refresh_grasps``, ``~refresh``: waits until the objects rest, and generates grasps if one was moved since;
+            those that are left of the last generation stay otherwise.
+    Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``,
+        ``clear_anonymous_grasps``.
+
+    Args:
+        method: Finds the grasps of an object.
+    """
+
+    def __init__(self, method: GraspMethod) -> None:
+        """Connects to nothing yet, see :meth:`connect`."""
+        self._method = method
+        self._generated = GeneratedObjects()
+        self._scene = SceneObjects()
+        self._stored = StoredGrasps()
+        self._generating = threading.Lock()
+
+    def connect(self) -> None:
+        """Measures the gripper and waits for the nodes it needs, at most ``/start_timeout`` for each.
+
+        Raises:
+            NoGraspError: Something needed is missing; the text names it.
+        """
+        self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
+        self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
+        settings = read_settings()
+        if not settings.gripper_joint:
+            raise NoGraspError(
+                f"parameter '{rospy.resolve_name('~gripper_joint')}' is not set; it has to name the "
+                "actuated joint of the fingers; set it in generative_methods_config.yaml"
+            )
+        self._commander = ArmCommander(settings.arm_group)
+        try:
+            self._commander.connect()
+            self._scene.connect(start_timeout())
+            self._stored.connect(start_timeout())
+            tip = self._commander.group.tip_link
+            self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
+        except (CommanderError, CallError, GripperGeometryError) as error:
+            raise NoGraspError(str(error)) from error
+        self._services = [
+            rospy.Service(name, Trigger, lambda _, refresh=refresh: self._on_demand(refresh))
+            for refresh, names in ((False, GENERATE_SERVICES), (True, REFRESH_SERVICES))
+            for name in names
+        ]
+
+    def watch(self) -> None:
+        """Generates for each object that appears, also when it was there before, or was moved, until ROS shuts down.
+
+        What may still arrive is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
+        there yet, a service that does not answer in time on a busy machine.
+        """
+        before: list[SceneObject] = []
+        wait_limit: WaitLimit | None = WaitLimit()  # None: every object that is there has been handled
+        scene_was_read = False
+        while not rospy.is_shutdown():
+            settings = read_settings()
+            try:
+                objects = self._scene.targets(settings)
+                self._generated.keep({found.name for found in objects} | self._scene.attached)
+                scene_was_read = True
+                if self._generated.stale(objects):
+                    wait_limit = wait_limit or WaitLimit()
+                    if at_rest(before, objects):
+                        self._signal_grasps(settings, objects, refresh=True)
+                        wait_limit = None
+                before = objects
+            except (NoObjectError, CallError, CommanderError) as error:
+                if isinstance(error, NoObjectError):
+                    self._generated.keep(self._scene.attached)
+                    if wait_limit and not scene_was_read:
+                        wait_limit, scene_was_read = WaitLimit(), True
+                if wait_limit and self._gives_up(error, wait_limit, settings):
+                    self._generated.mark(before)
+                    wait_limit = None
+                before = []
+            rospy.rostime.wallsleep(SCENE_PERIOD_S)
+
+    def _gives_up(self, error: Exception, wait_limit: WaitLimit, settings: GeneratorSettings) -> bool:
+        """Signals failure once the wait limit is exceeded; logs what is waited for until then."""
+        if wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s):
+            self._publish(False, f"{error} (waited {settings.scene_timeout_s:.0f} s of the ROS clock)")
+            return True
+        rospy.loginfo_throttle(WAITING_PERIOD_S, f"{rospy.get_name()}: waiting, for {error}.")
+        return False
+
+    def _on_demand(self, refresh: bool) -> TriggerResponse:
+        try:
+            settings = read_settings()
+            objects = self._resting(settings) if refresh else self._scene.targets(settings)
+            return TriggerResponse(*self._signal_grasps(settings, objects, refresh))
+        except (NoGraspError, CallError, CommanderError) as error:
+            self._publish(False, str(error))
+            return TriggerResponse(False, str(error))
+
+    def _resting(self, settings: GeneratorSettings) -> list[SceneObject]:
+        """Returns the objects to grasp once they rest, or as they are when that takes too long."""
+        before, wait_limit = self._scene.targets(settings), WaitLimit()
+        while True:
+            rospy.rostime.wallsleep(SCENE_PERIOD_S)
+            objects = self._scene.targets(settings)
+            if at_rest(before, objects) or wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s):
+                return objects
+            before = objects
+
+    def _signal_grasps(
+        self, settings: GeneratorSettings, objects: list[SceneObject], refresh: bool
+    ) -> tuple[bool, str]:
+        """Stores grasps in place of the earlier ones and signals it, or signals that what is there cannot be grasped.
+
+        Args:
+            settings: The parameters.
+            objects: What to grasp.
+            refresh: Whether grasps of objects that have not moved since are left as they are.
+
+        Returns:
+            What was signalled.
+
+        Raises:
+            CallError, CommanderError: Another node does not answer.
+        """
+        with self._generating:  # a request by service may come while grasps of a new object are generated
+            if refresh and not self._generated.stale(objects):
+                return True, f"nothing has moved; the grasps of {sorted(found.name for found in objects)} stay"
+            try:
+                grasps = self._generate(settings, objects)
+                self._stored.replace(grasps, settings.name_prefix)
+                success, text = True, f"{len(grasps)} grasps of {sorted({g.object_id for g in grasps})} were stored"
+            except NoGraspError as error:
+                self._stored.replace([], settings.name_prefix)
+                success, text = False, str(error)
+            self._generated.mark(objects)
+            self._publish(success, text)
+            return success, text
+
+    def _publish(self, success: bool, text: str) -> None:
+        (rospy.loginfo if success else rospy.logerr)("%s: %s.", rospy.get_name(), text)
+        self._reason.publish(text)
+        self._signal.publish(success)
+
+    def _generate(self, settings: GeneratorSettings, objects: list[SceneObject]) -> list[StandardisedGrasp]:
+        found_in: list[list[tuple[SceneObject, GraspCandidate]]] = []
+        present = self._scene.read()
+        for found in objects:
+            support = max(found.bottom, settings.crop.low[2]) if settings.crop.holds(found.centre) else found.bottom
+            obstacles = tuple(other for other in present if other.name != found.name)
+            query = GraspQuery(found, obstacles, support, self._gripper, settings.seed)
+            found_in.append([(found, candidate) for candidate in self._method.candidates(query)])
+        ranked = list(heapq.merge(*found_in, key=lambda pair: -pair[1].quality))
+        if not ranked:
+            raise NoGraspError(
+                f"no part of {'; '.join(_sides(found) for found in objects)} can be grasped {self._method.manner}: the "
+                f"gripper opens to {self._gripper.max_opening:.3f} m and needs flat or round sides"
+            )
+        return self._reachable(ranked, settings)
+
+    def _reachable(
+        self, ranked: list[tuple[SceneObject, GraspCandidate]], settings: GeneratorSettings
+    ) -> list[StandardisedGrasp]:
+        chosen: list[StandardisedGrasp] = []
+        reasons: Counter[str] = Counter()
+        tried = ranked[: settings.max_checks]
+        for found, candidate in tried:
+            message = self._message(found, candidate, settings)
+            reach = check_reach(self._commander, message) if settings.check_reachability else Reach("")
+            if reach.reason:
+                reasons[reach.reason] += 1
+                continue
+            message.grasp_quality = self._method.reached_quality(candidate, reach.joint_travel)
+            chosen.append(message)
+            if len(chosen) >= settings.max_grasps:
+                break
+        if not chosen:
+            names = sorted({found.name for found, _ in tried})
+            raise NoGraspError(
+                f"no grasp of {names} is reachable: all {len(tried)} that were tried fail, for example "
+                f"because {reasons.most_common(1)[0][0]}"
+            )
+        return sorted(chosen, key=lambda message: -message.grasp_quality)
+
+    def _message(self, found: SceneObject, candidate: GraspCandidate, settings: GeneratorSettings) -> StandardisedGrasp:
+        orientation = (Rotation.from_matrix(candidate.hand_axes) * Rotation.from_matrix(self._gripper.axes.T)).as_quat()
+        poses = [
+            generate_pose_stamped_message(settings.frame, position.tolist(), orientation.tolist())
+            for position in (candidate.pregrasp_position, candidate.position, candidate.postgrasp_position)
+        ]
+        closed = [self._gripper.closed_position]
+        return get_standardised_grasp(
+            [self._gripper.joint],
+            [candidate.pregrasp_joint],
+            closed,
+            closed,
+            [settings.torque],
+            *poses,
+            grasp_quality=candidate.quality,
+            hand_id=settings.hand_id,
+            object_id=found.name,
+        )
+
+
+def _sides(found: SceneObject) -> str:
+    lengths = found.surface.points.max(axis=0) - found.surface.points.min(axis=0)
+    return f"'{found.name}' with the sides {' x '.join(f'{length:.3f}' for length in lengths)} m"
+
+
+def run_grasp_generator(name: str, method: GraspMethod) -> int:
+    """Runs a grasp generator until ROS shuts down.
+
+    The work has a thread of its own: a signal that met the main thread inside a call to the master would wait for that
+    call's lock, which only the interrupted main thread could give back.
+
+    Args:
+        name: Name of the node.
+        method: Finds the grasps.
+
+    Returns:
+        The exit code: 1 when something the node needs is missing.
+    """
+    rospy.init_node(name)
+    codes: list[int] = []
+    threading.Thread(target=_work, args=(method, codes), daemon=True, name="grasp generation").start()
+    rospy.spin()
+    return codes[0] if codes else 0
+
+
+def _work(method: GraspMethod, codes: list[int]) -> None:
+    """Generates until ROS shuts down; leaves the exit code in the list and ends the node."""
+    try:
+        generator = GraspGenerator(method)
+        generator.connect()
+        generator.watch()
+    except Exception as error:  # whatever it is must end the node, which would stay without doing anything
+        if not rospy.is_shutdown():
+            codes.append(1)
+            rospy.logfatal("%s: %s", rospy.get_name(), error, exc_info=not isinstance(error, NoGraspError))
+    finally:
+        rospy.signal_shutdown("the generator has ended")

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the objects of move_group's planning scene, and chooses those that are to be grasped."""
+
+from __future__ import annotations
+
+import rospy
+from moveit_msgs.msg import PlanningSceneComponents
+from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
+
+from modular_framework_core.grasp_generation.planning_scene_objects import (
+    CropBox,
+    SceneObject,
+    SceneObjectError,
+    is_named,
+    scene_object,
+)
+from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings
+from modular_framework_ros.calls import call_service, wait_for_service
+
+SERVICE_TIMEOUT_S = 10.0
+WARNING_PERIOD_S = 30.0
+
+
+class NoGraspError(RuntimeError):
+    """No grasp can be offered; the text says why."""
+
+
+class NoObjectError(NoGraspError):
+    """The planning scene was read, and what is to be grasped is not in it."""
+
+
+class SceneObjects:
+    """The objects of the planning scene.
+
+    Services called: ``get_planning_scene``.
+
+    Attributes:
+        attached: Names of the objects that the robot carried when the scene was last read.
+    """
+
+    def __init__(self) -> None:
+        """Connects to nothing yet, see :meth:`connect`."""
+        self.attached: set[str] = set()
+
+    def connect(self, timeout_s: float) -> None:
+        """Waits for move_group.
+
+        Raises:
+            CallError: It is not there in time.
+        """
+        self._scene = rospy.ServiceProxy("get_planning_scene", GetPlanningScene)
+        wait_for_service(self._scene, timeout_s)
+
+    def targets(self, settings: GeneratorSettings) -> list[SceneObject]:
+        """Returns the objects to grasp: the named one, or all in the crop box.
+
+        Raises:
+            NoObjectError: There is none.
+            CallError: move_group does not answer.
+        """
+        objects = self.read()
+        if settings.object_name:
+            named = [found for found in objects if is_named(found.name, settings.object_name)]
+            if not named:
+                raise NoObjectError(
+                    f"the planning scene has no object '{settings.object_name}'; "
+                    f"it has {sorted(found.name for found in objects)}"
+                )
+            return named
+        inside = [found for found in objects if settings.crop.holds(found.centre)]
+        if not inside:
+            raise NoObjectError(
+                f"no object of the planning scene is in the crop box {_describe(settings.crop)} of "
+                f"frame '{settings.frame}'; there are "
+                f"{[_place(found) for found in objects] or 'no objects'}"
+            )
+        return inside
+
+    def read(self) -> list[SceneObject]:
+        """Returns all objects of the scene that the robot does not carry; one that is not understood is left out.
+
+        Raises:
+            CallError: move_group does not answer.
+        """
+        components = PlanningSceneComponents(
+            components=PlanningSceneComponents.WORLD_OBJECT_NAMES
+            | PlanningSceneComponents.WORLD_OBJECT_GEOMETRY
+            | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
+        )
+        answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
+        self.attached = {item.object.id for item in answer.scene.robot_state.attached_collision_objects}
+        objects = []
+        for message in answer.scene.world.collision_objects:
+            try:
+                found = scene_object(message)
+            except (SceneObjectError, ValueError) as error:
+                rospy.logwarn_throttle(WARNING_PERIOD_S, f"{rospy.get_name()}: {error}; this object is left out.")
+                continue
+            objects += [found] if found is not None else []
+        return objects
+
+
+def _describe(crop: CropBox) -> str:
+    return ", ".join(f"{axis} {low} to {high}" for axis, low, high in zip("xyz", crop.low, crop.high, strict=True))
+
+
+def _place(found: SceneObject) -> str:
+    x, y, z = found.centre
+    return f"{found.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m"

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns the shapes of objects into closed triangle meshes, for methods that cast rays or measure distances."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from modular_framework_urdf.mesh_reader import TriangleMesh
+
+Array = npt.NDArray[np.float64]
+
+SIDES = 64
+SPHERE_DIVISIONS = 3
+"""A sphere of 1,280 triangles: their normals are at most 4 degrees off."""
+
+
+def box(size: Sequence[float]) -> TriangleMesh:
+    """Makes a box around the origin with these lengths along x, y, z [m]."""
+    return _scaled(_unit("box"), size)
+
+
+def cylinder(height: float, radius: float) -> TriangleMesh:
+    """Makes a cylinder along z around the origin [m]: a prism of 64 sides, inside the round one."""
+    return _scaled(_unit("cylinder"), (radius, radius, height))
+
+
+def cone(height: float, radius: float) -> TriangleMesh:
+    """Makes a cone along z, the middle of its height at the origin, tip up [m]."""
+    return _scaled(_unit("cone"), (radius, radius, height))
+
+
+def sphere(radius: float) -> TriangleMesh:
+    """Makes a sphere around the origin [m]."""
+    return _scaled(_unit("sphere"), (radius, radius, radius))
+
+
+def outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Returns a closed mesh with its triangles counter-clockwise seen from outside."""
+    corners = mesh.vertices[mesh.triangles]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    return mesh if volume >= 0.0 else TriangleMesh(mesh.vertices, mesh.triangles[:, ::-1])
+
+
+def moved(mesh: TriangleMesh, rotation: Array, translation: Array) -> TriangleMesh:
+    """Returns a mesh after a rotation (3, 3) and a translation (3,) [m]."""
+    return TriangleMesh(mesh.vertices @ rotation.T + translation, mesh.triangles)
+
+
+def joined(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
+    """Puts meshes into one; solids that overlap stay as they are, each closed in itself."""
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return TriangleMesh(
+        np.vstack([mesh.vertices for mesh in meshes]),
+        np.vstack([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=False)]),
+    )
+
+
+def _scaled(mesh: TriangleMesh, factors: Sequence[float]) -> TriangleMesh:
+    return TriangleMesh(mesh.vertices * np.array(factors, dtype=float), mesh.triangles)
+
+
+@functools.cache
+def _unit(kind: str) -> TriangleMesh:
+    """Returns a shape of radius or length 1, made once."""
+    import trimesh  # slow to load
+
+    match kind:
+        case "box":
+            made = trimesh.creation.box((1.0, 1.0, 1.0))
+        case "cylinder":
+            made = trimesh.creation.cylinder(1.0, 1.0, sections=SIDES)
+        case "cone":
+            made = trimesh.creation.cone(1.0, 1.0, sections=SIDES)
+            made.apply_translation([0.0, 0.0, -0.5])
+        case _:
+            made = trimesh.creation.icosphere(SPHERE_DIVISIONS, 1.0)
+    return TriangleMesh(np.asarray(made.vertices, dtype=np.float64), np.asarray(made.faces, dtype=np.int64))
