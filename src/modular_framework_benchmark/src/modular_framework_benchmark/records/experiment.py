@@ -75,6 +75,7 @@ class ExperimentDescription:
         metrics: What is measured.
         time_limit_s: Longest an episode may take [s].
         confidence: Level of the intervals, such as 0.95.
+        sequential: Whether a stopping rule looks at the results: its comparisons must then hold at any time.
     """
 
     name: str
@@ -86,3 +87,4 @@ class ExperimentDescription:
     metrics: tuple[Metric, ...]
     time_limit_s: float
     confidence: float = 0.95
+    sequential: bool = False

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the statistics say of an experiment: a summary of each method, a comparison of each pair of methods.
+
+Plain numbers and words (no NumPy scalars), so that they can be written to JSON; what cannot be computed is None.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Verdict(Enum):
+    """What a comparison shows."""
+
+    FIRST_BETTER = "first_better"
+    SECOND_BETTER = "second_better"
+    NOT_SHOWN = "not_shown"  # compared, and no difference was shown
+    NO_DATA = "no_data"  # nothing to compare
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A confidence interval.
+
+    Attributes:
+        low: Lower end, in the unit of the figure.
+        high: Upper end, in the unit of the figure.
+        confidence: Its level, such as 0.95.
+        method: How it was computed, in words: `Wilson`.
+    """
+
+    low: float
+    high: float
+    confidence: float
+    method: str
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A figure with its interval.
+
+    Attributes:
+        name: What is estimated: `rate`, `mean`, `restricted mean`, `median`, `interquartile mean`.
+        value: The figure, in the metric's unit; a rate from 0 to 1.
+        interval: Its interval; None where it has none.
+    """
+
+    name: str
+    value: float
+    interval: Interval | None
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeCounts:
+    """How the episodes of a method ended and what became of them in the figures of a metric.
+
+    Attributes:
+        episodes: Finished episodes, broken ones included.
+        succeeded: Those that succeeded.
+        failed: Those that ran to their end without success.
+        timed_out: Those that did not end within the time limit.
+        broken: Those whose launch died or whose measurement failed. In rates and in metrics with a limit they count as
+            failures.
+        counted: Those with a value of the metric, the ones at the limit included.
+        censored: Those that count at the metric's limit.
+        missing: Those without a value, which are in none of the figures.
+    """
+
+    episodes: int
+    succeeded: int
+    failed: int
+    timed_out: int
+    broken: int
+    counted: int
+    censored: int
+    missing: int
+
+
+@dataclass(frozen=True, slots=True)
+class MethodSummary:
+    """A metric of a method.
+
+    Attributes:
+        method: Level of the compared factor.
+        metric: Name of the metric.
+        unit: Its unit; "" for none and for rates.
+        levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
+        counts: How the episodes ended.
+        estimate: Rate, mean, or restricted mean (of a metric with a limit); None without data.
+        without_broken: The same figure with the broken episodes left out; None where there are none, or no data.
+        median: Median; None for rates and without data.
+        interquartile_mean: Mean of the middle half; None for rates and without data.
+        quartiles: First and third quartile; None for rates and without data.
+        sentence: All of that in words.
+    """
+
+    method: str
+    metric: str
+    unit: str
+    levels: str
+    counts: EpisodeCounts
+    estimate: Estimate | None
+    without_broken: Estimate | None
+    median: float | None
+    interquartile_mean: Estimate | None
+    quartiles: tuple[float, float] | None
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A size of an effect, which does not depend on the number of episodes.
+
+    Attributes:
+        name: Its name, such as `matched-pairs rank-biserial correlation`.
+        value: Its value; above 0 where the first method has the higher values.
+    """
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class PairCounts:
+    """What was compared.
+
+    Attributes:
+        pairs: Pairs of episodes (same trial, same levels of the other factors); 0 when the comparison is unpaired.
+        units: Independent parts of them: pairs that share a seed are one unit.
+        first_episodes: Episodes of the first method that were compared.
+        second_episodes: Those of the second method.
+        unmatched: Finished episodes of either method whose partner is not finished or not planned.
+        censored: Compared episodes that count at the metric's limit.
+        broken: Compared episodes that are broken.
+        missing: Pairs left out because an episode has no value of the metric.
+    """
+
+    pairs: int
+    units: int
+    first_episodes: int
+    second_episodes: int
+    unmatched: int
+    censored: int
+    broken: int
+    missing: int
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A pair of methods by a metric.
+
+    Attributes:
+        first: One level of the compared factor.
+        second: The other level.
+        metric: Name of the metric.
+        unit: Its unit; "" for none and for rates.
+        levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
+        counts: What was compared.
+        first_estimate: Figure of the first method over what was compared; None without data.
+        second_estimate: That of the second.
+        difference: First minus second with its interval, in the metric's unit (0.12 for 12 points of a rate).
+        p_value: P value of the test; None without data.
+        p_corrected: The same after the correction for many comparisons.
+        correction: The correction, in words: `Holm, 6 comparisons`.
+        test: Name of the test.
+        effect: Size of the effect.
+        improvement: Probability that the first is better in a pair, ties counting half.
+        verdict: What is shown: a difference only where the corrected p value and the interval both say so.
+        verdict_without_broken: The same with the pairs of broken episodes left out; None where there are none.
+        pairs_needed: How many pairs in all would show `difference_planned` with 80 % power; None if already there or
+            unknown.
+        difference_planned: The difference which `pairs_needed` is for, in the metric's unit.
+        sentence: The result in words, one sentence.
+        notes: What a reader must know beside it: censored, missing, broken, unfinished.
+    """
+
+    first: str
+    second: str
+    metric: str
+    unit: str
+    levels: str
+    counts: PairCounts
+    first_estimate: float | None
+    second_estimate: float | None
+    difference: Estimate | None
+    p_value: float | None
+    p_corrected: float | None
+    correction: str
+    test: str
+    effect: Effect | None
+    improvement: float | None
+    verdict: Verdict
+    verdict_without_broken: Verdict | None
+    pairs_needed: int | None
+    difference_planned: float | None
+    sentence: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """The statistics of an experiment.
+
+    Attributes:
+        methods: The methods, as in the experiment file.
+        metrics: The metrics by name, the task's success first.
+        summaries: Each method by each metric.
+        comparisons: Each pair of methods by each metric, over all levels of the other factors.
+        sentences: The main results in words, the most important first.
+        rule: What the verdicts rest on, in words: test, correction, error rate, sequential or not.
+    """
+
+    methods: tuple[str, ...]
+    metrics: tuple[str, ...]
+    summaries: tuple[MethodSummary, ...]
+    comparisons: tuple[Comparison, ...]
+    sentences: tuple[str, ...]
+    rule: str

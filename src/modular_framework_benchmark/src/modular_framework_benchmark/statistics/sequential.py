@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tests and intervals that hold at any time, for experiments that look at their results and stop by them.
+
+They bet on the differences of pairs: capital that starts at 1 and is, if the true difference is m, a martingale. By
+Ville's inequality it ever reaches 1 / error rate with at most that rate, however often one looks. The inverse of the
+capital against "no difference" is a p value, the differences m whose capital stays below are an interval. The bet is a
+mixture over its size, fixed beforehand, so that both depend on the differences only and not on their order.
+Source: I. Waudby-Smith, A. Ramdas, Estimating means of bounded random variables by betting, J. R. Statist. Soc. B 86
+(2024) 1-27; for pairs of 0 and 1 and m = 0 it is the mixture sequential probability ratio test of the share of pairs
+that the first method wins among those that differ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special
+
+from modular_framework_benchmark.statistics.comparison import Interval
+
+Floats = NDArray[np.float64]
+
+_SIZES, _WEIGHTS = special.roots_legendre(64)
+_LOG_WEIGHTS = np.log(_WEIGHTS / _WEIGHTS.sum())
+GRID = 401
+"""Candidates for the true difference from -1 to 1, between which an end of the interval is then refined."""
+
+
+def log_capital(differences: Floats, counts: Floats, true_difference: float = 0.0) -> Floats:
+    """Returns the logarithm of what betting against a true difference has won.
+
+    Args:
+        differences: The values that a difference of a pair can have, each from -1 to 1, shape (k,).
+        counts: How often each was seen, shape (..., k).
+        true_difference: What is bet against, above -1 and below 1.
+
+    Returns:
+        Logarithm of the capital, 0 at the start, shape (...).
+    """
+    largest = np.where(_SIZES < 0.0, 1.0 / (1.0 - true_difference), 1.0 / (1.0 + true_difference))
+    gains = np.log1p((_SIZES * largest)[:, None] * (differences - true_difference)[None, :])
+    return np.asarray(special.logsumexp(counts @ gains.T + _LOG_WEIGHTS, axis=-1))
+
+
+def anytime_p_value(differences: Floats, bound: float = 1.0) -> float:
+    """Returns a p value of "the mean difference is 0" that holds at any time.
+
+    Args:
+        differences: Independent differences, each from -bound to bound, shape (n,).
+        bound: Largest difference there can be.
+    """
+    seen, counts = np.unique(differences / bound, return_counts=True)
+    return min(1.0, float(np.exp(-log_capital(seen, counts.astype(float)))))
+
+
+def anytime_interval(differences: Floats, confidence: float, bound: float = 1.0) -> Interval:
+    """Returns an interval of the mean difference that holds at any time, at all times together.
+
+    Args:
+        differences: Independent differences, each from -bound to bound, shape (n,).
+        confidence: Level of the interval.
+        bound: Largest difference there can be.
+    """
+    seen, counts = np.unique(differences / bound, return_counts=True)
+    most = -np.log(1.0 - confidence)
+
+    def excess(true_difference: float) -> float:
+        return float(log_capital(seen, counts.astype(float), true_difference)) - most
+
+    middle = float(np.clip(np.average(seen, weights=counts), -1 + 1e-9, 1 - 1e-9))
+
+    def limit(end: float) -> float:
+        grid = np.linspace(middle, end, GRID)[1:-1]
+        kept = [candidate for candidate in grid if excess(candidate) < 0.0]
+        inner = kept[-1] if kept else middle
+        outer = inner + (end - middle) / (GRID - 1)
+        if abs(outer) >= 1.0 or excess(outer) < 0.0 or excess(inner) > 0.0:
+            return float(np.clip(outer, -1.0, 1.0))
+        return float(optimize.brentq(excess, inner, outer))
+
+    return Interval(bound * limit(-1.0), bound * limit(1.0), confidence, "betting, valid at any time")
+
+
+def asymptotic_interval(differences: Floats, confidence: float, planned: int = 100) -> Interval:
+    """Returns an interval of a mean without known bounds that holds at any time, once there are many values.
+
+    Source: I. Waudby-Smith, D. Arbour, R. Sinha, E. Kennedy, A. Ramdas, Time-uniform central limit theory and
+    asymptotic confidence sequences, Annals of Statistics 52 (2024) 2613-2640.
+
+    Args:
+        differences: Independent differences, shape (n,), n at least 2.
+        confidence: Level of the interval.
+        planned: Number of values for which it is made narrowest.
+    """
+    count, error_rate = len(differences), 1.0 - confidence
+    squared = (-2 * np.log(error_rate) + np.log(1 - 2 * np.log(error_rate))) / planned
+    scale = count * squared + 1
+    half = float(np.std(differences, ddof=1)) * np.sqrt(
+        2 * scale / (count**2 * squared) * np.log(np.sqrt(scale) / error_rate)
+    )
+    mean = float(np.mean(differences))
+    return Interval(mean - float(half), mean + float(half), confidence, "asymptotic, valid at any time")
