@@ -8,6 +8,7 @@ node when a node died instead.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -73,14 +74,17 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
             self.parent.pm.is_shutdown = True
 
 
-def run_launch_file(package: str, launch_file: str, arguments: list[str], task_name: str) -> int:
+def run_launch_file(
+    package: str, launch_file: str, arguments: list[str], task_name: str, later_files: Sequence[Path] = ()
+) -> int:
     """Runs a launch file until its task or one of its nodes ends, and prints last why it ended.
 
     Args:
         package: ROS package of the launch file.
         launch_file: Name of the file in the package's folder `launch`.
         arguments: Launch arguments, `name:=value`; the launch file has `end_with_task`.
-        task_name: Name of the node that runs the task.
+        task_name: Name of the node that runs the task; "" if the end of every node ends the launch.
+        later_files: Launch files read after it: their parameters replace those of the launch file.
 
     Returns:
         The task's exit code; EXIT_NODE_DIED when another node died first; EXIT_BAD_LAUNCH when the launch file or an
@@ -95,8 +99,9 @@ def run_launch_file(package: str, launch_file: str, arguments: list[str], task_n
         roslaunch.configure_logging(uuid)
         # The task is not a required node here: the watcher ends the launch, without roslaunch's banner of a death.
         given = [*arguments, "end_with_task:=false"]
+        files = [(path, given), *((str(file), []) for file in later_files)]
         parent = roslaunch.parent.ROSLaunchParent(
-            uuid, [(path, given)], process_listeners=[watcher], port=_master_port(), show_summary=False
+            uuid, files, process_listeners=[watcher], port=_master_port(), show_summary=False
         )
         watcher.parent = parent
         parent.start()

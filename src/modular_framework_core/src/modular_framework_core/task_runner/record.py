@@ -30,6 +30,8 @@ class StateRecord:
         outcome: What it returned; None while it runs, or when it raised.
         failed: Whether it ended with its negative (last) outcome, gave a reason, or raised.
         reason: Why, in words of the state; "" when it gave none.
+        ros_started_s: When it started by the ROS clock, which is simulated time in simulation [s]; None without one.
+        ros_ended_s: When it ended by the ROS clock [s]; None while it runs, or without one.
     """
 
     path: str
@@ -38,6 +40,8 @@ class StateRecord:
     outcome: str | None = None
     failed: bool = False
     reason: str = ""
+    ros_started_s: float | None = None
+    ros_ended_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,15 +91,22 @@ Listener = Callable[[StateRecord, tuple[str, ...]], None]
 class TaskRecorder:
     """Keeps the records of one run of one task; safe to use from several threads."""
 
-    def __init__(self, listener: Listener | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        listener: Listener | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        ros_clock: Callable[[], float | None] = lambda: None,
+    ) -> None:
         """Starts the task's clock.
 
         Args:
             listener: Notified of each start and end of a state that has no children.
             clock: Returns the time [s].
+            ros_clock: Returns the time by the ROS clock [s].
         """
         self._listener = listener
         self._clock = clock
+        self._ros_clock = ros_clock
         self._zero = clock()
         self._lock = threading.Lock()
         self._notify_lock = threading.Lock()
@@ -139,7 +150,7 @@ class TaskRecorder:
     def _begin(self, path: str, state: smach.State) -> int:
         with self._lock:
             number = len(self._records)
-            self._records.append(StateRecord(path, self.elapsed_s()))
+            self._records.append(StateRecord(path, self.elapsed_s(), ros_started_s=self._ros_clock()))
             self._active[number] = path, state
         self._notify(number)
         return number
@@ -150,7 +161,12 @@ class TaskRecorder:
             if failed and not reason:
                 reason = f"gave '{outcome}' and no reason"
             self._records[number] = replace(
-                self._records[number], ended_s=self.elapsed_s(), outcome=outcome, failed=failed, reason=reason
+                self._records[number],
+                ended_s=self.elapsed_s(),
+                outcome=outcome,
+                failed=failed,
+                reason=reason,
+                ros_ended_s=self._ros_clock(),
             )
         self._notify(number)
 

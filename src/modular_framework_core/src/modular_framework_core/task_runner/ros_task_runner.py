@@ -12,9 +12,11 @@ Parameters (used where there is no argument):
     ``~config_directory``: folder whose files have the names of messages a task may use; empty: these are not checked.
     ``/robot_description_semantic``: has the postures and planning groups it may use.
     ``/run_id``: written by roslaunch; holds the time at which the launch began.
+    ``~wait_for_start``: whether the task waits until it is asked to start, and may be started again and again (false).
     ``~record_directory``: where the record of the run is written (default:
         ``$ROS_HOME/modular_framework/task_records``).
-Services: ``~stop`` (std_srvs/Trigger) stops the task as SIGINT does, and answers when the request has been passed on.
+Services: ``~stop`` (std_srvs/Trigger) stops the task as SIGINT does, and answers when the request has been passed on;
+    with ``~wait_for_start`` ``~start`` (std_srvs/Trigger) starts the task, and answers at once.
 Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched: at every start
     and end of a state, and twice a second while states run), for viewers those of ``ros_introspection``.
 Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when the task could not be run.
@@ -45,7 +47,7 @@ from modular_framework_core.task_constructor.known_names import KnownNames, name
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder, write_record
 from modular_framework_core.task_runner.ros_introspection import shown
-from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, TaskResult, TaskRun
+from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, EXIT_SUCCEEDED, TaskResult, TaskRun
 
 STOP_GRACE_S = 0.6
 """How long running states have to stop [s] before the node gives up on them."""
@@ -55,6 +57,9 @@ STATUS_PERIOD_S = 0.5
 
 PUBLISH_TIME_S = 0.2
 """Time for the last messages to be sent before the process exits [s]."""
+
+START_POLL_S = 0.1
+"""Time between two looks whether the node is to end while the task waits for its start [s]."""
 
 _PROCESS_START = time.time()
 _UUID_EPOCH_S = 12219292800
@@ -152,20 +157,23 @@ class TaskReporter:
             )
 
 
-def run_machine(name: str, factory: Callable[[], smach.Container]) -> int:
+def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Callable[[], None] = lambda: None) -> int:
     """Runs a task to its end, or until SIGINT, SIGTERM or the shutdown of ROS; returns the exit code.
 
     Args:
         name: Name of the task.
         factory: Makes its state machine; called in the task's thread.
+        on_signal: Called when SIGINT or SIGTERM arrives.
     """
     asked_by: list[str] = []
-    previous = {
-        number: signal.signal(number, lambda received, frame: asked_by.append(signal.Signals(received).name))
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
+
+    def on_stop(received: int, frame: Any) -> None:
+        asked_by.append(signal.Signals(received).name)
+        on_signal()
+
+    previous = {number: signal.signal(number, on_stop) for number in (signal.SIGINT, signal.SIGTERM)}
     reporter, begun = TaskReporter(name), time.time()
-    recorder = TaskRecorder(reporter.on_state)
+    recorder = TaskRecorder(reporter.on_state, ros_clock=rospy.get_time)
     run = TaskRun(name, shown(name, factory), recorder)
     run.start()
     stop = rospy.Service("~stop", Trigger, lambda request: _asked(asked_by))
@@ -238,7 +246,44 @@ def main() -> int:
     except TaskNotRun as error:
         rospy.logfatal("The task could not be run: %s", error)
         return _finish(EXIT_NOT_RUN)
+    if rospy.get_param("~wait_for_start", False):
+        return _finish(StartedRuns(name, factory).serve())
     return _finish(run_machine(name, factory))
+
+
+class StartedRuns:
+    """Runs a task whenever it is asked to, until SIGINT, SIGTERM or the shutdown of ROS."""
+
+    def __init__(self, name: str, factory: Callable[[], smach.Container]) -> None:
+        """Stores what to run.
+
+        Args:
+            name: Name of the task.
+            factory: Makes its state machine, for each run a new one.
+        """
+        self._name, self._factory = name, factory
+        self._asked, self._running, self._ended = threading.Event(), threading.Lock(), threading.Event()
+
+    def serve(self) -> int:
+        """Runs the task each time the service ``~start`` is called; returns the exit code of the last run."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda received, frame: self._ended.set())
+        service = rospy.Service("~start", Trigger, lambda request: self._start())
+        exit_code = EXIT_SUCCEEDED
+        while not self._ended.is_set() and not rospy.is_shutdown():
+            if not self._asked.wait(START_POLL_S):
+                continue
+            with self._running:
+                self._asked.clear()
+                exit_code = run_machine(self._name, self._factory, self._ended.set)
+        service.shutdown("the node ends")
+        return exit_code
+
+    def _start(self) -> TriggerResponse:
+        if self._running.locked() or self._asked.is_set():
+            return TriggerResponse(success=False, message=f"task '{self._name}' runs already; wait for its end")
+        self._asked.set()
+        return TriggerResponse(success=True, message=f"task '{self._name}' starts")
 
 
 def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:

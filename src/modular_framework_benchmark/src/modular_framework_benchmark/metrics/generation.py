@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Metrics of the method that generates grasps, from what it reports (component `generation`)."""
+
+from __future__ import annotations
+
+from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
+
+
+def _first(episode: EpisodeMeasurements) -> ComponentReport | None:
+    """Returns the first report: later ones are of objects that the task moved."""
+    reports = episode.of_component("generation")
+    return reports[0] if reports else None
+
+
+def generation_time(episode: EpisodeMeasurements) -> float | None:
+    """Real time that the first generation of grasps took [s]; None if it gave no grasp."""
+    first = _first(episode)
+    return first.wall_s if first is not None and first.succeeded else None
+
+
+def generation_success(episode: EpisodeMeasurements) -> float | None:
+    """Whether the first generation gave a grasp: 1 or 0."""
+    first = _first(episode)
+    return None if first is None else float(first.succeeded)
+
+
+def candidates(episode: EpisodeMeasurements) -> float | None:
+    """How many grasps the first generation found before their reachability was checked."""
+    first = _first(episode)
+    return None if first is None else first.figures.get("candidates")
+
+
+def reachable_share(episode: EpisodeMeasurements) -> float | None:
+    """Share of the grasps checked in the first generation that the arm can reach without collision, 0 to 1."""
+    first = _first(episode)
+    if first is None or not first.figures.get("checked"):
+        return None
+    return first.figures.get("reachable", 0.0) / first.figures["checked"]

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Metrics of motion planning, over all plans of an episode (component `planning`)."""
+
+from __future__ import annotations
+
+from modular_framework_benchmark.metrics import motion_figures
+from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, Motion
+
+
+def _motions(episode: EpisodeMeasurements) -> list[Motion]:
+    return [report.motion for report in episode.of_component("planning") if report.succeeded and report.motion]
+
+
+def _mean(values: list[float]) -> float | None:
+    return sum(values) / len(values) if values else None
+
+
+def planning_time(episode: EpisodeMeasurements) -> float | None:
+    """Mean time a successful plan took, as the planner reports it [s]."""
+    return _mean(
+        [
+            report.figures.get("planning_time_s", report.wall_s)
+            for report in episode.of_component("planning")
+            if report.succeeded
+        ]
+    )
+
+
+def planning_success(episode: EpisodeMeasurements) -> float | None:
+    """Share of the requests for plans that gave a motion, 0 to 1."""
+    reports = episode.of_component("planning")
+    return _mean([float(report.succeeded) for report in reports])
+
+
+def path_length(episode: EpisodeMeasurements) -> float | None:
+    """Mean length of the planned paths through joint space [rad], see `motion_figures.path_length`."""
+    return _mean([motion_figures.path_length(motion.positions) for motion in _motions(episode)])
+
+
+def motion_duration(episode: EpisodeMeasurements) -> float | None:
+    """Mean duration of the planned motions [s]."""
+    return _mean([motion_figures.motion_duration(motion.times_s) for motion in _motions(episode)])
+
+
+def smoothness(episode: EpisodeMeasurements) -> float | None:
+    """Mean log dimensionless jerk of the planned motions, see `motion_figures.smoothness`."""
+    values = [motion_figures.smoothness(motion.times_s, motion.positions) for motion in _motions(episode)]
+    return _mean([value for value in values if value is not None])
+
+
+def clearance(episode: EpisodeMeasurements) -> float | None:
+    """Smallest distance between the robot and anything it may not touch along the planned motions [m]."""
+    values = [
+        report.figures["clearance_m"] for report in episode.of_component("planning") if "clearance_m" in report.figures
+    ]
+    return min(values) if values else None
+
+
+def attempts(episode: EpisodeMeasurements) -> float | None:
+    """How many plans were asked for, successful or not; None without any."""
+    reports = episode.of_component("planning")
+    return float(len(reports)) if reports else None

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The one place where metrics are registered, and where a user's own are loaded."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from modular_framework_benchmark.metrics import execution, generation, grasp, planning, task
+from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
+from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
+
+MetricFunction = Callable[[EpisodeMeasurements], float | None]
+"""Returns the value for an episode; None where it has none."""
+
+
+class MetricError(ValueError):
+    """A metric is not known, or a user's own cannot be loaded; the text says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class RegisteredMetric:
+    """A metric and the function that measures it."""
+
+    metric: Metric
+    measure: MetricFunction
+
+
+_RATE, _VALUE, _TIME = MetricKind.RATE, MetricKind.VALUE, MetricKind.TIME
+_HIGHER, _LOWER = Direction.HIGHER, Direction.LOWER
+
+
+def _registered(
+    measure: MetricFunction, component: str, kind: MetricKind, better: Direction, unit: str = ""
+) -> RegisteredMetric:
+    """Describes a metric by the name and the first line of the docstring of its function."""
+    description = (inspect.getdoc(measure) or "").splitlines()[0]
+    return RegisteredMetric(
+        Metric(getattr(measure, "__name__", ""), component, kind, better, unit, description=description), measure
+    )
+
+
+_ALL = (
+    _registered(task.success, "task", _RATE, _HIGHER),
+    _registered(task.task_time, "task", _TIME, _LOWER, "s"),
+    _registered(task.task_wall_time, "task", _TIME, _LOWER, "s"),
+    _registered(task.failed_states, "task", _VALUE, _LOWER),
+    _registered(generation.generation_time, "generation", _TIME, _LOWER, "s"),
+    _registered(generation.generation_success, "generation", _RATE, _HIGHER),
+    _registered(generation.candidates, "generation", _VALUE, _HIGHER),
+    _registered(generation.reachable_share, "generation", _VALUE, _HIGHER),
+    _registered(planning.planning_time, "planning", _TIME, _LOWER, "s"),
+    _registered(planning.planning_success, "planning", _VALUE, _HIGHER),
+    _registered(planning.path_length, "planning", _VALUE, _LOWER, "rad"),
+    _registered(planning.motion_duration, "planning", _TIME, _LOWER, "s"),
+    _registered(planning.smoothness, "planning", _VALUE, _HIGHER),
+    _registered(planning.clearance, "planning", _VALUE, _HIGHER, "m"),
+    _registered(planning.attempts, "planning", _VALUE, _LOWER),
+    _registered(execution.execution_time, "execution", _TIME, _LOWER, "s"),
+    _registered(execution.execution_success, "execution", _VALUE, _HIGHER),
+    _registered(execution.tracking_error, "execution", _VALUE, _LOWER, "rad"),
+    _registered(execution.greatest_tracking_error, "execution", _VALUE, _LOWER, "rad"),
+    _registered(execution.executed_length, "execution", _VALUE, _LOWER, "rad"),
+    _registered(execution.executed_smoothness, "execution", _VALUE, _HIGHER),
+    _registered(execution.greatest_effort, "execution", _VALUE, _LOWER, "Nm"),
+    _registered(grasp.lift, "grasp", _VALUE, _HIGHER, "m"),
+    _registered(grasp.slip, "grasp", _VALUE, _LOWER, "m"),
+    _registered(grasp.grasp_time, "grasp", _TIME, _LOWER, "s"),
+    _registered(grasp.hold_time, "grasp", _TIME, _HIGHER, "s"),
+)
+
+METRICS: Mapping[str, RegisteredMetric] = {entry.metric.name: entry for entry in _ALL}
+"""Every metric of the framework, by name."""
+
+
+def find_metric(name: str) -> RegisteredMetric:
+    """Returns a metric of the framework.
+
+    Raises:
+        MetricError: There is none of this name; the text has the nearest ones.
+    """
+    if name in METRICS:
+        return METRICS[name]
+    near = get_close_matches(name, METRICS, n=1)
+    raise MetricError(
+        f"there is no metric '{name}'{f'; did you mean {near[0]!r}' if near else ''}; allowed are "
+        f"{', '.join(METRICS)}, or FILE.py:FUNCTION for one of your own"
+    )
+
+
+def load_metric(reference: str) -> MetricFunction:
+    """Returns a user's function.
+
+    Args:
+        reference: `FILE.py:FUNCTION`, the path of the file and a function of it that takes `EpisodeMeasurements` and
+            returns a number or None.
+
+    Raises:
+        MetricError: There is no such file or function, or the file cannot be imported.
+    """
+    file, _, name = reference.rpartition(":")
+    path = Path(file)
+    if not file.endswith(".py") or not name.isidentifier():
+        raise MetricError(f"metric '{reference}' has not the form FILE.py:FUNCTION; correct it")
+    if not path.is_file():
+        raise MetricError(f"metric '{reference}': there is no file {path.resolve()}; correct the path")
+    found = getattr(_module(path), name, None)
+    if not callable(found):
+        defined = [key for key, value in vars(_module(path)).items() if inspect.isfunction(value)]
+        raise MetricError(
+            f"metric '{reference}': {path} has no function '{name}'; it has {', '.join(defined) or 'none'}"
+        )
+    return found  # type: ignore[no-any-return]  # what it returns is checked when it measures
+
+
+def _module(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"metrics_of_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise MetricError(f"{path} cannot be imported as a Python module")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # the user's code may raise anything
+        raise MetricError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
+    return module
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredMetrics:
+    """Values of metrics, and what went wrong with those that raised.
+
+    Attributes:
+        values: Value by name of metric; None where it has none or raised.
+        faults: Text of the exception by name of metric.
+    """
+
+    values: Mapping[str, float | None]
+    faults: Mapping[str, str]
+
+
+def measure(wanted: Iterable[str | Mapping[str, Any]], episode: EpisodeMeasurements) -> MeasuredMetrics:
+    """Measures an episode.
+
+    Args:
+        wanted: The entries of `metrics` of an experiment: names, or mappings with `function` and perhaps `name`.
+        episode: What was recorded.
+
+    Raises:
+        MetricError: A metric is not known or cannot be loaded.
+    """
+    values: dict[str, float | None] = {}
+    faults: dict[str, str] = {}
+    for entry in wanted:
+        if isinstance(entry, str) and ":" not in entry:
+            name, function = entry, find_metric(entry).measure
+        else:
+            reference = str(entry if isinstance(entry, str) else entry["function"])
+            name = str((entry if isinstance(entry, Mapping) else {}).get("name") or reference.rpartition(":")[2])
+            function = load_metric(reference)
+        try:
+            value = function(episode)
+            values[name] = None if value is None else float(value)
+        except Exception as error:  # one metric must not cost the episode; a user's may raise anything
+            values[name], faults[name] = None, f"{type(error).__name__}: {error}"
+    return MeasuredMetrics(values, faults)

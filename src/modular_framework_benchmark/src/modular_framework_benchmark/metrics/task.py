@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Metrics of the whole task."""
+
+from __future__ import annotations
+
+from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
+from modular_framework_benchmark.records.episode import EpisodeStatus
+
+
+def success(episode: EpisodeMeasurements) -> float | None:
+    """Whether the episode succeeded, checked in the world: 1 or 0.
+
+    An episode whose launch died has no value: it says nothing of the method.
+    """
+    if episode.status is EpisodeStatus.BROKEN:
+        return None
+    return float(episode.status is EpisodeStatus.SUCCEEDED)
+
+
+def task_time(episode: EpisodeMeasurements) -> float | None:
+    """Simulated time from the start of the task to its end [s]; None for a task that did not succeed."""
+    return episode.task_s if episode.status is EpisodeStatus.SUCCEEDED else None
+
+
+def task_wall_time(episode: EpisodeMeasurements) -> float | None:
+    """Real time from the start of the task to its end [s]; None for a task that did not succeed."""
+    return episode.task_wall_s if episode.status is EpisodeStatus.SUCCEEDED else None
+
+
+def failed_states(episode: EpisodeMeasurements) -> float | None:
+    """How many executions of states failed, also those the task recovered from; None without a task."""
+    states = [span for span in episode.states if span.kind == "state"]
+    return float(sum(span.failed for span in states)) if states else None
