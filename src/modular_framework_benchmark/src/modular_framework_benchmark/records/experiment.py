@@ -76,6 +76,7 @@ class ExperimentDescription:
         time_limit_s: Longest an episode may take [s].
         confidence: Level of the intervals, such as 0.95.
         sequential: Whether a stopping rule looks at the results: its comparisons must then hold at any time.
+        source: Path of the experiment file, from whose folder its relative paths count; "" where there is none.
     """
 
     name: str
@@ -88,3 +89,4 @@ class ExperimentDescription:
     time_limit_s: float
     confidence: float = 0.95
     sequential: bool = False
+    source: str = ""

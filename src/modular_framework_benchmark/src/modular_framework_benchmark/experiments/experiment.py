@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An experiment that was read from a file and checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
+
+
+class StoppingKind(Enum):
+    """When an experiment ends."""
+
+    FIXED = "fixed"  # after all trials
+    SEQUENTIAL = "sequential"  # as soon as the methods are told apart with the stated error rate, or after all trials
+
+
+@dataclass(frozen=True, slots=True)
+class Stopping:
+    """When an experiment ends.
+
+    Attributes:
+        kind: The rule.
+        error_rate: Largest probability that a sequential rule sees a difference where there is none.
+        metric: Name of the metric it looks at: one that is a rate.
+        min_trials: Trials before which it does not stop.
+    """
+
+    kind: StoppingKind = StoppingKind.FIXED
+    error_rate: float = 0.05
+    metric: str = "success"
+    min_trials: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Combination:
+    """One level of each factor, and what they set together.
+
+    Attributes:
+        configuration: Level of each factor, by its name.
+        settings: Keys of the mode; numbers of a scene are `Distribution`s still.
+    """
+
+    configuration: Mapping[str, str]
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """An experiment.
+
+    Attributes:
+        name: Its name.
+        description: What it is about, in a sentence; may be empty.
+        mode: `task`, `planning`, `kinematics` or `grasps`.
+        text: The file, verbatim.
+        source: The file.
+        factors: What is varied.
+        compared: Name of the factor whose levels are the methods.
+        combinations: What is run in each trial.
+        trials: How many trials there are, at most with a sequential rule.
+        seed: What scenes and seeds are made from.
+        block: Trials between two changes of the method, at the least.
+        metrics: What is measured.
+        measures: The metrics as the episodes need them: a name, or {function: absolute FILE.py:NAME, ...} of a user.
+        stopping: When it ends.
+        confidence: Level of the intervals.
+        time_limit_s: Longest an episode may take [s].
+        workers: How many episodes run at the same time.
+        record: Which files an episode keeps: `log`, `trajectories`, `bag`, `video`.
+        files: SHA-256 of each file beside it that decides the episodes, by what names it.
+    """
+
+    name: str
+    description: str
+    mode: str
+    text: str
+    source: Path
+    factors: tuple[Factor, ...]
+    compared: str
+    combinations: tuple[Combination, ...]
+    trials: int
+    seed: int
+    block: int
+    metrics: tuple[Metric, ...]
+    measures: tuple[Any, ...]
+    stopping: Stopping
+    confidence: float
+    time_limit_s: float
+    workers: int
+    record: Mapping[str, bool]
+    files: Mapping[str, str]
+
+    def described(self, digest: str) -> ExperimentDescription:
+        """Returns what the result database keeps of it.
+
+        Args:
+            digest: Of what decides its episodes.
+        """
+        return ExperimentDescription(
+            name=self.name,
+            mode=self.mode,
+            text=self.text,
+            digest=digest,
+            factors=self.factors,
+            compared=self.compared,
+            metrics=self.metrics,
+            time_limit_s=self.time_limit_s,
+            confidence=self.confidence,
+            sequential=self.stopping.kind is StoppingKind.SEQUENTIAL,
+            source=str(self.source),
+        )

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads and checks an experiment file before anything starts: all faults at once, each with its line and column."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping as Map
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.experiments.experiment import Combination, Experiment, Stopping, StoppingKind
+from modular_framework_benchmark.experiments.factor_reading import (
+    Levels,
+    combined,
+    note_unused,
+    read_design,
+    read_factors,
+)
+from modular_framework_benchmark.experiments.metric_choices import Measure, metric_files, read_metrics
+from modular_framework_benchmark.experiments.mode_settings import (
+    MODES,
+    model_files,
+    read_settings,
+)
+from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
+from modular_framework_benchmark.experiments.setting_trees import check_references
+from modular_framework_benchmark.experiments.surroundings import Surroundings
+from modular_framework_benchmark.records.experiment import Factor, Metric, MetricKind
+from modular_framework_core.files.atomic_files import read_text
+from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
+from modular_framework_core.files.located_yaml import Mapping, Scalar, loads
+from modular_framework_core.task_constructor.key_spelling import spelt_as_meant, value_of
+
+REQUIRED = ("experiment", "mode", "factors", "compare")
+OPTIONAL = (
+    "description", "design", "trials", "seed", "block", "metrics", "stopping", "confidence", "time_limit", "workers",
+    "record",
+)  # fmt: skip
+KEYS = (*REQUIRED, *OPTIONAL)
+FILES = {"log": True, "trajectories": True, "bag": False, "video": False}
+MOST_EPISODES = 10_000_000
+
+KnownMetrics = Map[str, Map[str, Metric]]
+"""The metrics there are, by name, by mode."""
+
+
+def load_experiment(path: Path, surroundings: Surroundings, known_metrics: KnownMetrics) -> Experiment:
+    """Reads and checks an experiment file.
+
+    Args:
+        path: The file.
+        surroundings: What there is to refer to.
+        known_metrics: The metrics of each mode.
+
+    Raises:
+        ExperimentFault: The file cannot be used; carries every fault.
+    """
+    start = SourceLocation(str(path), 1, 1)
+    try:
+        text = read_text(path)
+    except FileNotFoundError as error:
+        raise ExperimentFault([Fault(start, "there is no such file; name an experiment file (.yaml)")]) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExperimentFault([Fault(start, f"the file cannot be read: {error}")]) from error
+    return read_experiment(text, path, surroundings, known_metrics)
+
+
+def read_experiment(text: str, path: Path, surroundings: Surroundings, known_metrics: KnownMetrics) -> Experiment:
+    """Reads and checks the text of an experiment file; arguments and errors as for `load_experiment`."""
+    faults = FaultList()
+    start = SourceLocation(str(path), 1, 1)
+    if not any(line.strip() and not line.lstrip().startswith("#") for line in text.splitlines()):
+        raise ExperimentFault([Fault(start, f"the file is empty; an experiment needs {', '.join(REQUIRED)}")])
+    try:
+        root = loads(text, str(path), faults)
+    except TaskFault as error:
+        raise ExperimentFault.of(error) from error
+    if not isinstance(root, Mapping):
+        raise ExperimentFault([Fault(root.location, "the file must be a mapping, from keys such as experiment")])
+    reading = Reading(path.resolve().parent, surroundings, faults)
+    experiment = _Reader(root, text, path, reading, known_metrics).read()
+    if experiment is None:
+        raise ExperimentFault(faults.sorted())
+    return experiment
+
+
+class _Reader:
+    """Reads the parts of one file."""
+
+    def __init__(self, root: Mapping, text: str, path: Path, reading: Reading, known_metrics: KnownMetrics) -> None:
+        self._text, self._path, self._reading, self._known = text, path, reading, known_metrics
+        mode = value_of(root, "mode")
+        self._mode = str(mode.value) if isinstance(mode, Scalar) and mode.value in MODES else None
+        mode_keys = tuple(MODES[str(self._mode)].keys) if self._mode is not None else _keys_of_all_modes()
+        self._root = spelt_as_meant(root, (*KEYS, *mode_keys), "the key", reading.faults)
+        self._mode_keys = mode_keys
+        self._refers_to_factors = True
+        self._base = Mapping(
+            {key: value for key, value in self._root.entries.items() if key in mode_keys},
+            {key: value for key, value in self._root.keys.items() if key in mode_keys},
+            root.location,
+        )
+
+    def read(self) -> Experiment | None:
+        """Returns the experiment; None when there are faults."""
+        entries, reading = self._root.entries, self._reading
+        for key in REQUIRED:
+            if key not in entries:
+                reading.faults.add(self._root.location, f"the experiment has no '{key}'; add it")
+        if "mode" in entries:
+            reading.choice(entries["mode"], "mode", tuple(MODES))
+        name = reading.name(entries["experiment"], "experiment") if "experiment" in entries else ""
+        factors = self._factors()
+        compared = self._compared(factors)
+        design = read_design(entries.get("design"), factors, reading) if factors else []
+        self._note_unpaired(design, compared)
+        numbers = self._numbers(len(design))
+        limit = numbers["time_limit"] or 0.0
+        metrics, measures = self._metrics(float(limit))
+        self._note_metric_names(metrics, factors)
+        stopping = self._stopping(metrics)
+        description = reading.text(entries["description"], "description") if "description" in entries else ""
+        record = self._record()
+        combinations = self._combinations(factors, design)
+        if len(reading.faults):
+            return None
+        return Experiment(
+            name=str(name),
+            description=description or "",
+            mode=str(self._mode),
+            text=self._text,
+            source=self._path.resolve(),
+            factors=tuple(Factor(factor, tuple(levels)) for factor, levels in factors.items()),
+            compared=compared,
+            combinations=combinations,
+            trials=int(numbers["trials"] or 0),
+            seed=int(numbers["seed"] or 0),
+            block=int(numbers["block"] or 1),
+            metrics=metrics,
+            measures=measures,
+            stopping=stopping,
+            confidence=float(numbers["confidence"] or 0.0),
+            time_limit_s=float(limit),
+            workers=int(numbers["workers"] or 1),
+            record=record,
+            files=_digests(
+                metric_files(measures) + [file for one in combinations for file in model_files(one.settings)]
+            ),
+        )
+
+    def _factors(self) -> Levels:
+        node = self._root.entries.get("factors")
+        if node is None:
+            return {}
+        factors = read_factors(node, self._mode_keys, self._reading)
+        before = len(self._reading.faults)
+        check_references(self._base, factors, self._reading.faults)
+        for levels in factors.values():
+            for level in levels.values():
+                check_references(level.settings, factors, self._reading.faults)
+        self._refers_to_factors = len(self._reading.faults) == before
+        if isinstance(node, Mapping) and self._refers_to_factors:
+            note_unused(factors, self._base, node, self._reading)
+        return factors
+
+    def _compared(self, factors: Levels) -> str:
+        node = self._root.entries.get("compare")
+        name = self._reading.choice(node, "compare", tuple(factors)) if node is not None and factors else None
+        if node is not None and name is not None and len(factors[name]) < 2:
+            self._reading.faults.add(node.location, f"factor '{name}' has one level; comparing needs at least two")
+        return name or ""
+
+    def _note_unpaired(self, design: list[dict[str, str]], compared: str) -> None:
+        """Notes a listed design in which a method has no partner: nothing could be compared with it."""
+        node = self._root.entries.get("design")
+        if node is None or not design or not compared:
+            return
+        partners: dict[tuple[tuple[str, str], ...], set[str]] = {}
+        for item in design:
+            rest = tuple(sorted((name, label) for name, label in item.items() if name != compared))
+            partners.setdefault(rest, set()).add(item[compared])
+        for rest, methods in partners.items():
+            if len(methods) < 2:
+                where = ", ".join(f"{name} {label}" for name, label in rest) or "the experiment"
+                self._reading.faults.add(
+                    node.location, f"{where} has only {compared} '{min(methods)}'; list another one, to compare it with"
+                )
+
+    def _numbers(self, combinations: int) -> dict[str, float | int | None]:
+        reading, entries = self._reading, self._root.entries
+
+        def count(key: str, default: int, low: int = 1, high: int = 2**31 - 1) -> int | None:
+            return reading.count(entries[key], key, low, high) if key in entries else default
+
+        def number(key: str, default: float, low: float, high: float) -> float | None:
+            return reading.number(entries[key], key, low, high) if key in entries else default
+
+        most = MOST_EPISODES // max(combinations, 1)
+        return {
+            "trials": count("trials", 20, 1, most),
+            "seed": count("seed", 1, 0),
+            "block": count("block", 1),
+            "workers": count("workers", 1, 1, 1024),
+            "confidence": number("confidence", 0.95, 0.5, 0.9999),
+            "time_limit": number("time_limit", 300.0, 0.1, 86400.0),
+        }
+
+    def _stopping(self, metrics: tuple[Metric, ...]) -> Stopping:
+        node = self._root.entries.get("stopping")
+        mapping = self._reading.mapping(node, "stopping", "{rule: sequential}") if node is not None else None
+        if mapping is None:
+            return Stopping()
+        return read_stopping(mapping, metrics, self._reading)
+
+    def _metrics(self, limit_s: float) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
+        if self._mode is None:  # which metrics there are is not known
+            return (), ()
+        return read_metrics(self._root.entries.get("metrics"), self._known.get(self._mode, {}), limit_s, self._reading)
+
+    def _note_metric_names(self, metrics: tuple[Metric, ...], factors: Levels) -> None:
+        node = self._root.entries.get("metrics")
+        for metric in metrics if node is not None else ():
+            if metric.name.lower() in (name.lower() for name in factors):
+                self._reading.faults.add(
+                    node.location,  # type: ignore[union-attr]
+                    f"'{metric.name}' is a metric and a factor; give one of them another name",
+                )
+
+    def _record(self) -> dict[str, bool]:
+        node = self._root.entries.get("record")
+        mapping = self._reading.mapping(node, "record", "{video: true}") if node is not None else None
+        record = dict(FILES)
+        if mapping is None:
+            return record
+        known = spelt_as_meant(mapping, tuple(FILES), "the key of record", self._reading.faults)
+        for key, value in known.entries.items():
+            record[key] = bool(self._reading.truth(value, key))
+        return record
+
+    def _combinations(self, factors: Levels, design: list[dict[str, str]]) -> tuple[Combination, ...]:
+        if self._mode is None or not self._refers_to_factors or not all(factors.values()):
+            return ()
+        return tuple(
+            Combination(item, read_settings(str(self._mode), combined(self._base, factors, item), self._reading))
+            for item in design
+        )
+
+
+def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: Reading) -> Stopping:
+    """Reads the stopping rule.
+
+    Args:
+        node: The mapping of the file.
+        metrics: Of the experiment, for the name of the one it looks at.
+        reading: Where faults are noted.
+    """
+    known = spelt_as_meant(node, ("rule", "error_rate", "metric", "min_trials"), "the key of stopping", reading.faults)
+    kinds = [kind.value for kind in StoppingKind]
+    if "rule" not in known.entries:
+        reading.faults.add(node.location, f"stopping has no rule; allowed: {', '.join(kinds)}")
+        return Stopping()
+    kind = StoppingKind(reading.choice(known.entries["rule"], "rule", kinds) or "fixed")
+    values: dict[str, Any] = {}
+    if "error_rate" in known.entries:
+        values["error_rate"] = reading.number(known.entries["error_rate"], "error_rate", 0.0001, 0.5)
+    if "min_trials" in known.entries:
+        values["min_trials"] = reading.count(known.entries["min_trials"], "min_trials")
+    if "metric" in known.entries:
+        rates = {metric.name for metric in metrics if metric.kind is MetricKind.RATE} | {"success"}
+        values["metric"] = reading.choice(known.entries["metric"], "the metric of stopping", sorted(rates))
+    if kind is StoppingKind.FIXED and values:
+        reading.faults.add(node.location, "the rule fixed looks at nothing; remove the other keys, or write sequential")
+    return Stopping(kind, **{key: value for key, value in values.items() if value is not None})
+
+
+def _keys_of_all_modes() -> tuple[str, ...]:
+    return tuple({key: None for mode in MODES.values() for key in mode.keys})
+
+
+def _digests(paths: list[Path]) -> dict[str, str]:
+    """Returns SHA-256 of each file, by the last two parts of its path: the same on every machine."""
+    return {
+        f"{path.parent.name}/{path.name}": hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(set(paths))
+    }

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the factors of an experiment file, and puts their levels together."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterable
+from collections.abc import Mapping as Map
+from dataclasses import dataclass
+
+from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_benchmark.experiments.setting_trees import (
+    leaves,
+    level_label,
+    merged,
+    references,
+    substituted,
+)
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
+
+EXAMPLE = "{grasp_method: {above: {arguments: {...}}, aside: {...}}, object: [cube, can]}"
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A level of a factor: its label, with the type it was written in, and the settings it makes."""
+
+    value: Scalar
+    settings: Mapping
+
+    @property
+    def label(self) -> str:
+        """Returns its label."""
+        return level_label(self.value)
+
+
+Levels = Map[str, Map[str, Level]]
+"""The levels by their labels, by the factor's name."""
+
+
+def read_factors(node: Node, mode_keys: Collection[str], reading: Reading) -> Levels:
+    """Returns the factors, each with its levels by their labels."""
+    mapping = reading.mapping(node, "factors", EXAMPLE)
+    if mapping is None:
+        return {}
+    if not mapping.entries:
+        reading.faults.add(node.location, f"factors is empty; it needs what is to be compared, such as {EXAMPLE}")
+    factors: dict[str, Map[str, Level]] = {}
+    for name, value in mapping.entries.items():
+        if not name.isidentifier():
+            reading.faults.add(mapping.keys[name], f"the factor '{name}' must be letters, digits and underscores")
+        factors[name] = _read_levels(name, value, mode_keys, reading)
+    _note_conflicts(factors, reading)
+    return factors
+
+
+def _read_levels(factor: str, node: Node, mode_keys: Collection[str], reading: Reading) -> dict[str, Level]:
+    levels: dict[str, Level] = {}
+    if isinstance(node, Mapping):
+        for label, value in node.entries.items():
+            settings = reading.mapping(value, f"the level '{label}'", "{arguments: {...}}")
+            if settings is not None:
+                known = spelt_as_meant(settings, mode_keys, f"what level '{label}' sets,", reading.faults)
+                levels[label] = Level(Scalar(label, node.keys[label]), known)
+    elif isinstance(node, Sequence):
+        for item in node.items:
+            if not isinstance(item, Scalar) or item.value is None or item.value == "":
+                reading.faults.add(item.location, f"a level in a list must be one value, found {kind_of(item)}")
+            elif level_label(item) in levels:
+                reading.faults.add(item.location, f"factor '{factor}' has the level '{level_label(item)}' twice")
+            else:
+                levels[level_label(item)] = Level(item, Mapping({}, {}, item.location))
+    if not levels and (isinstance(node, Scalar) or not _items_of(node)):
+        reading.faults.add(
+            node.location,
+            f"factor '{factor}' has no levels; allowed: a mapping of labels to settings, or a list of labels",
+        )
+    return levels
+
+
+def _items_of(node: Node) -> Iterable[object]:
+    return node.entries if isinstance(node, Mapping) else node.items if isinstance(node, Sequence) else ()
+
+
+def _note_conflicts(factors: Levels, reading: Reading) -> None:
+    """Notes where two factors set the same value: which of them would hold is not said."""
+    first: dict[tuple[str, ...], str] = {}
+    for name, levels in factors.items():
+        for level in levels.values():
+            for path, value in leaves(level.settings):
+                ends = [path[:length] for length in range(1, len(path) + 1)]
+                other = next((first[end] for end in ends if first.get(end, name) != name), None)
+                if other is not None:
+                    reading.faults.add(
+                        value.location,
+                        f"factor '{name}' sets {'.'.join(path)}, as factor '{other}' does; let one of them set it",
+                    )
+        for level in levels.values():
+            first |= {path: first.get(path, name) for path, _ in leaves(level.settings)}
+
+
+def note_unused(factors: Levels, base: Mapping, node: Mapping, reading: Reading) -> None:
+    """Notes each factor that changes nothing: its levels set nothing, and no value refers to it."""
+    used = {name for name, _ in references(base)}
+    for levels in factors.values():
+        for level in levels.values():
+            used |= {name for name, _ in references(level.settings)}
+    for name, levels in factors.items():
+        if levels and name not in used and not any(level.settings.entries for level in levels.values()):
+            reading.faults.add(
+                node.keys[name],
+                f"factor '{name}' changes nothing; write ${name} where its level belongs, or say what each level sets",
+            )
+
+
+def combined(base: Mapping, factors: Levels, configuration: Map[str, str]) -> Mapping:
+    """Returns the settings of one level of each factor: those of the base, and over them those of the levels."""
+    chosen = {name: factors[name][label] for name, label in configuration.items()}
+    tree = base
+    for level in chosen.values():
+        tree = merged(tree, level.settings)
+    return substituted(tree, {name: level.value for name, level in chosen.items()})  # type: ignore[return-value]
+
+
+def read_design(node: Node | None, factors: Levels, reading: Reading) -> list[dict[str, str]]:
+    """Returns the combinations of levels that are run: all of them, or those that the file lists."""
+    full = [dict(zip(factors, labels, strict=True)) for labels in itertools.product(*factors.values())]
+    if node is None or isinstance(node, Scalar) and node.value == "full":
+        return full
+    if not isinstance(node, Sequence):
+        reading.faults.add(
+            node.location, f"design must be full, or a list of combinations of levels, found {kind_of(node)}"
+        )
+        return full
+    listed: list[dict[str, str]] = []
+    for item in reading.items(node, "design", "[{grasp_method: above, object: can}]") or ():
+        configuration = _listed(item, factors, reading)
+        if configuration is not None and configuration in listed:
+            reading.faults.add(item.location, "this combination is listed twice; remove one of them")
+        elif configuration is not None:
+            listed.append(configuration)
+    return listed
+
+
+def _listed(item: Node, factors: Levels, reading: Reading) -> dict[str, str] | None:
+    mapping = reading.mapping(item, "each combination of design", "{grasp_method: above, object: can}")
+    if mapping is None:
+        return None
+    node = spelt_as_meant(mapping, tuple(factors), "the factor", reading.faults)
+    configuration: dict[str, str] = {}
+    for name, levels in factors.items():
+        value = node.entries.get(name)
+        if value is None:
+            reading.faults.add(item.location, f"this combination has no level of factor '{name}'; add it")
+        elif not isinstance(value, Scalar) or level_label(value) not in levels:
+            found = level_label(value) if isinstance(value, Scalar) else kind_of(value)
+            reading.faults.add_unknown(value.location, f"the level of '{name}'", found, levels)
+        else:
+            configuration[name] = level_label(value)
+    return configuration if len(configuration) == len(factors) else None

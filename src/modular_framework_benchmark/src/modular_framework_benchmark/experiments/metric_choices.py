@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads which metrics an experiment has: names of those that are known, or functions in files of the user's own."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+from collections.abc import Mapping as Map
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
+from modular_framework_core.files.faults import listing, nearest
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
+from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
+
+OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description")
+KNOWN_KEYS = ("metric", "limit")
+EXAMPLE = "{function: my_metric.py:smoothness, better: lower, unit: rad}"
+
+Measure = Any  # name of a known metric, or the mapping of a user's function
+
+
+def read_metrics(
+    node: Node | None, known: Map[str, Metric], time_limit_s: float, reading: Reading
+) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
+    """Returns the metrics, and how the episodes are told of them.
+
+    Args:
+        node: The list of the file; None where there is none: all that are known.
+        known: The metrics of the mode, by name.
+        time_limit_s: Limit of durations that have none of their own [s].
+        reading: Where faults are noted.
+    """
+    if node is None:
+        return tuple(_limited(metric, time_limit_s) for metric in known.values()), tuple(known)
+    metrics: dict[str, Metric] = {}
+    measures: list[Measure] = []
+    for item in reading.items(node, "metrics", "[success, task_time]") or ():
+        found = _read_metric(item, known, reading)
+        if found is None:
+            continue
+        metric, measure = found
+        if metric.name.lower() in (name.lower() for name in metrics):
+            reading.faults.add(item.location, f"metrics has '{metric.name}' twice; remove one, or give it another name")
+        metrics[metric.name] = _limited(metric, time_limit_s)
+        measures.append(measure)
+    return tuple(metrics.values()), tuple(measures)
+
+
+def _limited(metric: Metric, time_limit_s: float) -> Metric:
+    if metric.kind is MetricKind.TIME and metric.limit is None:
+        return dataclasses.replace(metric, limit=time_limit_s)
+    return metric
+
+
+def _read_metric(item: Node, known: Map[str, Metric], reading: Reading) -> tuple[Metric, Measure] | None:
+    if isinstance(item, Mapping) and "function" in item.entries:
+        return _own_metric(item, reading)
+    if isinstance(item, Mapping):
+        return _known_with_limit(item, known, reading)
+    name = reading.text(item, "each of metrics")
+    if name is None:
+        return None
+    if ".py:" in name:
+        return _own_metric(Mapping({"function": item}, {"function": item.location}, item.location), reading)
+    if name not in known:
+        reading.faults.add(
+            item.location,
+            f"the metric '{name}' is unknown; {listing(known)}, or a function of one's own: FILE.py:NAME"
+            f"{nearest(name, known)}",
+        )
+        return None
+    return known[name], name
+
+
+def _known_with_limit(item: Mapping, known: Map[str, Metric], reading: Reading) -> tuple[Metric, Measure] | None:
+    node = spelt_as_meant(item, KNOWN_KEYS, "the key of a metric", reading.faults)
+    if "metric" not in node.entries:
+        reading.faults.add(item.location, f"a metric needs the key metric or function, such as {EXAMPLE}")
+        return None
+    found = _read_metric(node.entries["metric"], known, reading)
+    limit = reading.number(node.entries["limit"], "limit", 0.0) if "limit" in node.entries else None
+    if found is None or limit is None:
+        return found
+    return dataclasses.replace(found[0], limit=limit), found[1]
+
+
+def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, Measure] | None:
+    node = spelt_as_meant(item, OWN_KEYS, "the key of a metric", reading.faults)
+    target = reading.text(node.entries["function"], "function")
+    located = None if target is None else _located_function(target, node.entries["function"], reading)
+    if located is None:
+        return None
+    path, function = located
+
+    def text(key: str, default: str) -> str:
+        value = node.entries.get(key)
+        if value is None or isinstance(value, Scalar) and value.value == "":
+            return default
+        return reading.text(value, key) or default
+
+    better = _choice(node, "better", [item.value for item in Direction], "higher", reading)
+    kind = _choice(node, "kind", [item.value for item in MetricKind], "value", reading)
+    limit = reading.number(node.entries["limit"], "limit") if "limit" in node.entries else None
+    name = text("name", function)
+    if not name.isidentifier():
+        reading.faults.add(node.entries["name"].location, f"the name '{name}' must be letters, digits and underscores")
+        return None
+    metric = Metric(
+        name, text("component", "own"), MetricKind(kind), Direction(better), text("unit", ""), limit,
+        text("description", ""),
+    )  # fmt: skip
+    return metric, {"name": name, "function": f"{path}:{function}"}
+
+
+def _choice(node: Mapping, key: str, allowed: list[str], default: str, reading: Reading) -> str:
+    if key not in node.entries:
+        return default
+    return reading.choice(node.entries[key], key, allowed) or default
+
+
+def _located_function(target: str, node: Node, reading: Reading) -> tuple[Path, str] | None:
+    """Returns file and name of a function that is there; the file is read, but not run."""
+    file, _, function = target.rpartition(":")
+    if not file.endswith(".py") or not function.isidentifier():
+        reading.faults.add(node.location, f"'{target}' is no function of a file; allowed: FILE.py:NAME")
+        return None
+    path = reading.path(file)
+    try:
+        tree = ast.parse(path.read_bytes(), str(path))
+    except FileNotFoundError:
+        there = sorted(found.name for found in path.parent.glob("*.py")) if path.parent.is_dir() else []
+        hint = nearest(path.name, there)
+        reading.faults.add(node.location, f"there is no file {path}; name a Python file with the function{hint}")
+        return None
+    except (OSError, SyntaxError, ValueError) as error:
+        reading.faults.add(node.location, f"{path} is no Python file that can be read: {error}")
+        return None
+    functions = {item.name: item for item in tree.body if isinstance(item, ast.FunctionDef)}
+    if function not in functions:
+        reading.faults.add_unknown(node.location, f"the function of {path.name}", function, functions)
+        return None
+    arguments = functions[function].args
+    if len(arguments.posonlyargs) + len(arguments.args) - len(arguments.defaults) > 1 or not (
+        arguments.posonlyargs or arguments.args or arguments.vararg
+    ):
+        reading.faults.add(
+            node.location, f"the function '{function}' must take one argument, what is known of an episode"
+        )
+        return None
+    return path, function
+
+
+def metric_files(measures: tuple[Measure, ...]) -> list[Path]:
+    """Returns the files of the user's own functions."""
+    functions = [measure["function"] for measure in measures if not isinstance(measure, str)]
+    return [Path(function.rpartition(":")[0]) for function in functions]

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The settings of each mode: which keys there are, what they may be, and what they are when they are not given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.experiments import launch_settings, problem_sets
+from modular_framework_benchmark.experiments.reading import Reading, json_value
+from modular_framework_benchmark.experiments.scene_objects import read_objects
+from modular_framework_benchmark.experiments.surroundings import NotThere
+from modular_framework_core.files.located_yaml import Mapping as Node_Mapping
+from modular_framework_core.files.located_yaml import Node, Scalar
+
+ReadValue = Callable[[Node, Reading], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class SettingKey:
+    """A key of a mode.
+
+    Attributes:
+        read: Reads its value; notes faults.
+        default: Its value when it is not given.
+        required: Whether it has to be given.
+    """
+
+    read: ReadValue
+    default: Any = None
+    required: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """What the settings of a mode are.
+
+    Attributes:
+        keys: Its keys.
+        finish: Checks what keys have to do with each other, and returns the settings.
+    """
+
+    keys: Mapping[str, SettingKey]
+    finish: Callable[[Node_Mapping, dict[str, Any], Reading], dict[str, Any]]
+
+
+def read_settings(mode: str, node: Node_Mapping, reading: Reading) -> dict[str, Any]:
+    """Reads the settings of a combination of levels.
+
+    Args:
+        mode: Name of the mode.
+        node: Base and levels together; known keys only.
+        reading: Where faults are noted, and what there is to refer to.
+
+    Returns:
+        A value for each key of the mode.
+    """
+    values: dict[str, Any] = {}
+    before = len(reading.faults)
+    for key, setting in MODES[mode].keys.items():
+        if key in node.entries:
+            values[key] = setting.read(node.entries[key], reading)
+        elif setting.required:
+            reading.faults.add(node.location, f"mode {mode} needs the key '{key}', in the file or in every level")
+        else:
+            values[key] = setting.default
+    return MODES[mode].finish(node, values, reading) if len(reading.faults) == before else values
+
+
+def _count(what: str, low: int = 1, high: int = 1_000_000) -> ReadValue:
+    return lambda node, reading: reading.count(node, what, low, high)
+
+
+def _seconds(what: str, low: float = 0.001) -> ReadValue:
+    return lambda node, reading: reading.number(node, f"{what} [s]", low, 1e6)
+
+
+def _text(what: str) -> ReadValue:
+    def read(node: Node, reading: Reading) -> str | None:
+        return "" if isinstance(node, Scalar) and node.value == "" else reading.text(node, what)
+
+    return read
+
+
+def _truth(what: str) -> ReadValue:
+    return lambda node, reading: reading.truth(node, what)
+
+
+def _success(allowed: Mapping[str, float]) -> ReadValue:
+    """Returns a reader of what has to hold for success: numbers of at least 0, and the name of an object."""
+    keys = (*allowed, "object")
+
+    def read(node: Node, reading: Reading) -> dict[str, Any] | None:
+        mapping = reading.mapping(node, "success", "{lifted: 0.10, hold_time: 2.0}")
+        result: dict[str, Any] = {}
+        for key, value in mapping.entries.items() if mapping is not None else ():
+            if key not in keys:
+                reading.faults.add_unknown(mapping.keys[key], "the key of success", key, keys)  # type: ignore[union-attr]
+            else:
+                found = reading.text(value, key) if key == "object" else reading.number(value, key, 0.0, allowed[key])
+                result[key] = found
+        return result
+
+    return read
+
+
+def _parameters(node: Node, reading: Reading) -> dict[str, Any] | None:
+    mapping = reading.mapping(node, "parameters", "{/planner_name: RRTConnect}")
+    if mapping is None:
+        return None
+    for name, location in mapping.keys.items():
+        if not name.startswith("/") or name != "/" + "/".join(part for part in name.split("/") if part):
+            reading.faults.add(location, f"the parameter '{name}' must be a whole name from /, such as /planner_name")
+    return {name: json_value(value) for name, value in mapping.entries.items()}
+
+
+def _planner_parameters(node: Node, reading: Reading) -> dict[str, Any] | None:
+    mapping = reading.mapping(node, "planner_parameters", "{range: 0.5}")
+    return None if mapping is None else {name: json_value(value) for name, value in mapping.entries.items()}
+
+
+def _robot(node: Node, reading: Reading) -> Any:
+    """Reads a MoveIt configuration package, or the files of a description."""
+    if isinstance(node, Node_Mapping):
+        return _robot_files(node, reading)
+    package = reading.text(node, "robot")
+    if package is not None:
+        try:
+            reading.surroundings.package(package)
+        except NotThere as error:
+            reading.faults.add(node.location, str(error))
+    return package
+
+
+def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str]:
+    files: dict[str, str] = {}
+    for key, value in node.entries.items():
+        if key not in ("urdf", "srdf"):
+            reading.faults.add_unknown(node.keys[key], "the key of robot", key, ("urdf", "srdf"))
+            continue
+        text = reading.text(value, key)
+        path = reading.path(text) if text is not None else None
+        if path is not None and not path.is_file():
+            reading.faults.add(value.location, f"there is no file {path}; name the {key} file of the robot")
+        files[key] = str(path)
+    if "urdf" not in node.entries:
+        reading.faults.add(node.location, "robot has no urdf; allowed: a package, or {urdf: FILE, srdf: FILE}")
+    return files
+
+
+def _as_read(node: Node_Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
+    return values
+
+
+_LAUNCH_KEYS = {
+    "launch": SettingKey(launch_settings.read_launch, launch_settings.DEFAULT_LAUNCH),
+    "arguments": SettingKey(launch_settings.read_arguments, {}),
+    "parameters": SettingKey(_parameters, {}),
+    "objects": SettingKey(read_objects, []),
+    "warm": SettingKey(_truth("warm"), True),
+}
+MODES: Mapping[str, Mode] = {
+    "task": Mode(
+        {
+            **_LAUNCH_KEYS,
+            "task": SettingKey(launch_settings.read_task, launch_settings.DEFAULT_TASK),
+            "success": SettingKey(_success({"lifted": 10.0, "hold_time": 3600.0}), {}),
+        },
+        launch_settings.finish,
+    ),
+    "planning": Mode(
+        {
+            "robot": SettingKey(_robot, required=True),
+            "problems": SettingKey(problem_sets.read_problems, required=True),
+            "planner": SettingKey(_text("planner"), ""),
+            "planner_parameters": SettingKey(_planner_parameters, {}),
+            "pipeline": SettingKey(_text("pipeline"), "ompl"),
+            "group": SettingKey(_text("group"), ""),
+            "planning_time": SettingKey(_seconds("planning_time"), 5.0),
+            "attempts": SettingKey(_count("attempts", 1, 1000), 1),
+            "parameters": SettingKey(_parameters, {}),
+        },
+        _as_read,
+    ),
+    "kinematics": Mode(
+        {
+            "robot": SettingKey(_robot, required=True),
+            "group": SettingKey(_text("group"), ""),
+            "solver": SettingKey(_text("solver"), ""),
+            "poses": SettingKey(_count("poses"), 100),
+            "timeout": SettingKey(_seconds("timeout"), 0.05),
+            "parameters": SettingKey(_parameters, {}),
+        },
+        _as_read,
+    ),
+    "grasps": Mode(
+        {
+            **_LAUNCH_KEYS,
+            "success": SettingKey(_success({"lifted": 10.0, "hold_time": 3600.0, "shake": 100.0}), {}),
+        },
+        launch_settings.finish,
+    ),
+}
+
+
+def model_files(settings: Mapping[str, Any]) -> list[Path]:
+    """Returns the files of a combination whose content decides its episodes."""
+    objects = [found.file for found in settings.get("objects", ())]
+    task = [Path(settings["task"])] if settings.get("task") else []
+    problems = [Path(problem[key]) for problem in settings.get("problems", ()) for key in ("scene", "request")]
+    return [*objects, *task, *problems]

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds motion planning problems in MotionBenchMaker's layout: sceneNNNN.yaml beside requestNNNN.yaml."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_core.files.located_yaml import Node, Sequence
+
+
+def read_problems(node: Node, reading: Reading) -> list[dict[str, str]] | None:
+    """Returns the problems of a folder, or of several, in the order of their names.
+
+    Args:
+        node: Path of a folder, or a list of them.
+        reading: Where faults are noted.
+
+    Returns:
+        {name, scene, request} for each: FAMILY/NUMBER, and absolute paths.
+    """
+    problems: list[dict[str, str]] = []
+    for item in node.items if isinstance(node, Sequence) else (node,):
+        text = reading.text(item, "problems")
+        if text is None:
+            continue
+        folder = reading.path(text)
+        found = _problems_in(folder, item, reading) if folder.is_dir() else []
+        if not folder.is_dir():
+            reading.faults.add(item.location, f"there is no folder {folder}; name one with scene and request files")
+        elif not found:
+            reading.faults.add(
+                item.location, f"{folder} has no problem; allowed: sceneNNNN.yaml beside requestNNNN.yaml, at any depth"
+            )
+        problems += found
+    if isinstance(node, Sequence) and not node.items:
+        reading.faults.add(node.location, "problems is an empty list; name at least one folder")
+    return problems
+
+
+def _problems_in(folder: Path, item: Node, reading: Reading) -> list[dict[str, str]]:
+    problems = []
+    for scene in sorted(folder.rglob("scene*.yaml")):
+        number = scene.stem.removeprefix("scene")
+        request = scene.with_name(f"request{number}.yaml")
+        if not request.is_file():
+            reading.faults.add(
+                item.location, f"{scene} has no {request.name} beside it; add it, or take the scene away"
+            )
+            continue
+        name = f"{scene.parent.name}/{number}"
+        problems.append({"name": name, "scene": str(scene), "request": str(request)})
+    return problems

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads single values of an experiment file: each function returns the value, or notes a fault and returns None."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.experiments.surroundings import Surroundings
+from modular_framework_core.files.faults import Fault, FaultList, TaskFault
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+MAX_SEED = 2**31 - 1
+
+
+class ExperimentFault(Exception):
+    """An experiment file cannot be used. Carries every fault that was found in it."""
+
+    def __init__(self, faults: Collection[Fault]) -> None:
+        self.faults: tuple[Fault, ...] = tuple(sorted(set(faults)))
+        lines = "\n".join(f"  {fault}" for fault in self.faults)
+        count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
+        super().__init__(f"{count} in the experiment:\n{lines}")
+
+    @classmethod
+    def of(cls, error: TaskFault) -> ExperimentFault:
+        """Returns the fault of a file that is no readable YAML."""
+        return cls(error.faults)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What reading a value needs beside the value.
+
+    Attributes:
+        folder: Folder of the experiment file, from which relative paths count.
+        surroundings: What there is to refer to.
+        faults: Where faults are noted.
+    """
+
+    folder: Path
+    surroundings: Surroundings
+    faults: FaultList
+
+    def text(self, node: Node, what: str) -> str | None:
+        """Returns a text that is not empty."""
+        if isinstance(node, Scalar) and isinstance(node.value, str) and node.value:
+            return node.value
+        self.faults.add(node.location, f"{what} must be a text, found {kind_of(node)}")
+        return None
+
+    def name(self, node: Node, what: str) -> str | None:
+        """Returns a text that can be the name of a file or a column."""
+        name = self.text(node, what)
+        if name is None or _NAME.fullmatch(name):
+            return name
+        self.faults.add(node.location, f"{what} '{name}' must be letters, digits, _ and -, and start with a letter")
+        return None
+
+    def choice(self, node: Node, what: str, allowed: Collection[str]) -> str | None:
+        """Returns one of some texts."""
+        text = self.text(node, what)
+        if text is None or text in allowed:
+            return text
+        self.faults.add_unknown(node.location, what, text, allowed)
+        return None
+
+    def truth(self, node: Node, what: str) -> bool | None:
+        """Returns true or false."""
+        if isinstance(node, Scalar) and isinstance(node.value, bool):
+            return node.value
+        self.faults.add(node.location, f"{what} must be true or false, found {kind_of(node)}")
+        return None
+
+    def number(self, node: Node, what: str, low: float = -math.inf, high: float = math.inf) -> float | None:
+        """Returns a finite number from a range, both ends included."""
+        value = node.value if isinstance(node, Scalar) else None
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if is_number and math.isfinite(value) and low <= value <= high:  # type: ignore[arg-type, operator]
+            return float(value)  # type: ignore[arg-type]
+        self.faults.add(node.location, f"{what} must be {_range_text('a number', low, high)}, found {kind_of(node)}")
+        return None
+
+    def count(self, node: Node, what: str, low: int = 1, high: int = MAX_SEED) -> int | None:
+        """Returns a whole number from a range, both ends included."""
+        value = node.value if isinstance(node, Scalar) else None
+        if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
+            return value
+        self.faults.add(
+            node.location, f"{what} must be {_range_text('a whole number', low, high)}, found {kind_of(node)}"
+        )
+        return None
+
+    def items(self, node: Node, what: str, example: str) -> tuple[Node, ...] | None:
+        """Returns the items of a list that is not empty."""
+        if isinstance(node, Sequence) and node.items:
+            return node.items
+        found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
+        self.faults.add(node.location, f"{what} must be a list such as {example}, found {found}")
+        return None
+
+    def mapping(self, node: Node, what: str, example: str) -> Mapping | None:
+        """Returns a mapping; nothing counts as an empty one."""
+        if isinstance(node, Mapping):
+            return node
+        if isinstance(node, Scalar) and node.value is None:
+            return Mapping({}, {}, node.location)
+        self.faults.add(node.location, f"{what} must be a mapping such as {example}, found {kind_of(node)}")
+        return None
+
+    def path(self, text: str) -> Path:
+        """Returns a path of the file: relative ones count from its folder, `~` is the home folder."""
+        return (self.folder / Path(text).expanduser()).resolve()
+
+
+def json_value(node: Node) -> Any:
+    """Returns a value as the parameter server and JSON take it."""
+    return node.plain()
+
+
+def _range_text(what: str, low: float, high: float) -> str:
+    if math.isinf(low) and math.isinf(high):
+        return what
+    if math.isinf(high):
+        return f"{what} of at least {low:g}"
+    return f"{what} from {low:g} to {high:g}"

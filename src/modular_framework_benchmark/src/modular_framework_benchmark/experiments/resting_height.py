@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How deep a model reaches below its frame: what puts it on a surface."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import load_mesh
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_reader import read_model_text
+from modular_framework_simulation.models.sdf_resources import Resources, no_packages
+from modular_framework_urdf.rotations import rotate_vector
+
+GAP_M = 0.001
+"""Room left between an object and what it is put on, so that they do not touch before time starts [m]."""
+
+
+def resting_height(model: Path, surface_m: float, roll_rad: float, pitch_rad: float) -> float:
+    """Returns the height at which the frame of a model has to be for it to stand on a surface [m].
+
+    Args:
+        model: Its .sdf file.
+        surface_m: Height of the horizontal surface [m].
+        roll_rad: Its orientation [rad].
+        pitch_rad: Its orientation [rad].
+
+    Raises:
+        DescriptionError: The file cannot be used, or has no collision shape.
+    """
+    return round(surface_m + GAP_M - lowest_point(model, roll_rad, pitch_rad), 6)
+
+
+@lru_cache(maxsize=4096)
+def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
+    """Returns the height of the lowest point of a model's collision shapes above its frame [m], mostly negative.
+
+    Raises:
+        DescriptionError: As `resting_height`.
+    """
+    turned = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0))
+    lowest = [
+        _lowest_of(turned @ link.pose @ collision.pose, collision.geometry)
+        for link in _read(model).links
+        for collision in link.collisions
+    ]
+    if not lowest:
+        raise DescriptionError(str(model), "got no <collision>", "allowed: a model with one; give z instead of on")
+    return min(lowest)
+
+
+@lru_cache(maxsize=64)
+def _read(model: Path) -> specs.Model:
+    try:
+        text = model.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(
+            str(model), f"got a file that cannot be read ({error})", "allowed: an SDF file"
+        ) from error
+    return read_model_text(text, str(model), Resources((model.parent.parent,), no_packages))
+
+
+def _lowest_of(pose: Pose, shape: specs.Geometry) -> float:
+    """Returns the lowest height of a shape: that of its frame less its reach downwards [m]."""
+    down = [rotate_vector(pose.quaternion, axis)[2] for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+    match shape:
+        case specs.Sphere():
+            reach = shape.radius
+        case specs.Box():
+            reach = sum(abs(share) * size / 2 for share, size in zip(down, shape.size, strict=True))
+        case specs.Cylinder():
+            reach = abs(down[2]) * shape.length / 2 + shape.radius * math.sqrt(max(0.0, 1 - down[2] ** 2))
+        case specs.Mesh():
+            reach = -float(np.min(np.asarray(load_mesh(shape).vertices) @ np.asarray(down)))
+        case _:
+            raise DescriptionError(
+                "<collision>", "got a plane", "allowed: a shape of limited size; give z instead of on"
+            )
+    return pose.position[2] - reach

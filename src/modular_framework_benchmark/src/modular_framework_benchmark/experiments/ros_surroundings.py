@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Looks up in the ROS packages what an experiment file refers to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+
+import roslaunch.core
+import roslaunch.substitution_args
+import rospkg
+
+from modular_framework_benchmark.experiments.surroundings import NotThere
+from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
+from modular_framework_core.files.faults import listing, nearest
+from modular_framework_core.launching.launch_arguments import argument_values, check_arguments, known_arguments
+
+
+class RosSurroundings:
+    """Looks things up by ROS_PACKAGE_PATH; implements `Surroundings`."""
+
+    def __init__(self) -> None:
+        self._packages = rospkg.RosPack()
+
+    def package(self, name: str) -> Path:
+        """Returns the folder of a package."""
+        try:
+            return Path(self._packages.get_path(name))
+        except rospkg.ResourceNotFound as error:
+            hint = nearest(name, self._packages.list())
+            raise NotThere(
+                f"there is no package '{name}'{hint}; build and source the workspace that has it, or correct the name"
+            ) from error
+
+    def launch_file(self, name: str) -> Path:
+        """Returns the path of PACKAGE/FILE, or of a file from /."""
+        if name.startswith("/"):
+            if Path(name).is_file():
+                return Path(name)
+            raise NotThere(f"there is no launch file {name}; allowed: PACKAGE/FILE, or a path from /")
+        package, _, file = name.partition("/")
+        if not file:
+            raise NotThere(
+                f"'{name}' is no launch file; allowed: PACKAGE/FILE such as {API_PACKAGE}/start_framework.launch"
+            )
+        folder = self.package(package) / "launch"
+        if (folder / file).is_file():
+            return folder / file
+        files = sorted(found.name for found in folder.glob("*.launch"))
+        raise NotThere(
+            f"package {package} has no launch file '{file}'; {listing(files, 'it has none')}{nearest(file, files)}"
+        )
+
+    def launch_arguments(self, launch: str) -> Mapping[str, str | None]:
+        """Returns the arguments of a launch file, with their defaults."""
+        return _known(str(self.launch_file(launch)))
+
+    def check_launch(self, launch: str, arguments: Mapping[str, str]) -> None:
+        """Checks the values of arguments."""
+        path = str(self.launch_file(launch))
+        problem = _problem(path, tuple(f"{name}:={value}" for name, value in arguments.items()))
+        if problem:
+            raise NotThere(problem.removeprefix(f"{path}: "))
+        for name, kind in (("world_file", "worlds"), ("scene_file", "scenes")):
+            if arguments.get(name) and name in self.launch_arguments(launch):
+                self._check_file(launch, arguments, kind, arguments[name])
+
+    def _check_file(self, launch: str, arguments: Mapping[str, str], kind: str, name: str) -> None:
+        folder = self._description(launch, arguments) / kind
+        there = sorted(found.name for found in folder.glob("*"))
+        if name not in there:
+            allowed = listing(there, "the folder is empty")
+            raise NotThere(f"argument '{kind[:-1]}_file' is '{name}', not in {folder}; {allowed}{nearest(name, there)}")
+
+    def task(self, name: str, folder: Path) -> str:
+        """Returns the path of a task of the API package, or of one's own."""
+        own = (folder / Path(name).expanduser()).resolve()
+        if own.is_file():
+            return str(own)
+        scripts = self.package(API_PACKAGE) / SCRIPTS_FOLDER
+        if name == Path(name).name and (scripts / name).is_file():
+            return str(scripts / name)
+        there = sorted(found.name for found in scripts.glob("*.yaml"))
+        raise NotThere(f"there is no task '{name}'; {listing(there)}, or the path of a file{nearest(name, there)}")
+
+    def model(self, name: str, launch: str, arguments: Mapping[str, str], folder: Path) -> Path:
+        """Returns the .sdf file of a model."""
+        if "/" in name or name.endswith(".sdf"):
+            own = (folder / Path(name).expanduser()).resolve()
+            if own.is_file():
+                return own
+            raise NotThere(f"there is no model file {own}; give the path of an .sdf file")
+        models = self._description(launch, arguments) / "models"
+        if (models / name / "model.sdf").is_file():
+            return models / name / "model.sdf"
+        there = sorted(found.parent.name for found in models.glob("*/model.sdf"))
+        raise NotThere(f"there is no model '{name}'; {listing(there)}{nearest(name, there)}")
+
+    def _description(self, launch: str, arguments: Mapping[str, str]) -> Path:
+        path = str(self.launch_file(launch))
+        values = _values(path, tuple(f"{name}:={value}" for name, value in arguments.items() if ":=" not in value))
+        package = values.get("description_package", "")
+        if not package:
+            raise NotThere(
+                f"{launch} has no argument description_package, so models are not found by name; give a path"
+            )
+        return self.package(package)
+
+
+@lru_cache(maxsize=256)
+def _known(path: str) -> dict[str, str | None]:
+    try:
+        return {name: default for name, (_, default) in known_arguments(path).items()}
+    except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException) as error:
+        raise NotThere(f"{path} is no launch file that can be used: {error}") from error
+
+
+@lru_cache(maxsize=4096)
+def _problem(path: str, arguments: tuple[str, ...]) -> str:
+    try:
+        check_arguments(path, list(arguments))
+    except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, ValueError) as error:
+        return str(error)
+    return ""
+
+
+@lru_cache(maxsize=4096)
+def _values(path: str, arguments: tuple[str, ...]) -> dict[str, str]:
+    try:
+        return argument_values(path, list(arguments))
+    except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, ValueError) as error:
+        raise NotThere(f"{path} cannot be read with these arguments: {error}") from error

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Puts together what the base and the levels of an experiment file set; every value keeps its line and column."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from collections.abc import Mapping as Map
+
+from modular_framework_core.files.faults import FaultList, listing, nearest
+from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
+
+_REFERENCE = re.compile(r"\$(\$|[A-Za-z_][A-Za-z0-9_-]*)")
+
+
+def references(node: Node) -> Iterator[tuple[str, Scalar]]:
+    """Yields each `$NAME` in the texts of a value, with the text it is in."""
+    match node:
+        case Scalar(value=str(text)):
+            for found in _REFERENCE.findall(text):
+                if found != "$":
+                    yield found, node
+        case Scalar():
+            return
+        case Sequence():
+            for item in node.items:
+                yield from references(item)
+        case Mapping():
+            for value in node.entries.values():
+                yield from references(value)
+
+
+def check_references(node: Node, factors: Map[str, object], faults: FaultList) -> None:
+    """Notes a fault for each `$NAME` that is no factor."""
+    for name, text in references(node):
+        if name not in factors:
+            faults.add(
+                text.location,
+                f"'${name}' names no factor; {listing(factors)}{nearest(name, factors)}; write $$ for a dollar sign",
+            )
+
+
+def substituted(node: Node, levels: Map[str, Scalar]) -> Node:
+    """Returns a value in which each `$NAME` is the level of that factor.
+
+    Args:
+        node: The value.
+        levels: Level of each factor. A text that is nothing but `$NAME` becomes the level itself, with its type.
+    """
+    match node:
+        case Scalar(value=str(text)):
+            whole = text[1:]
+            if text.startswith("$") and whole in levels:
+                return Scalar(levels[whole].value, node.location)
+            return Scalar(_REFERENCE.sub(lambda found: _text_of(found[1], levels), text), node.location)
+        case Scalar():
+            return node
+        case Sequence():
+            return Sequence(tuple(substituted(item, levels) for item in node.items), node.location)
+        case Mapping():
+            entries = {key: substituted(value, levels) for key, value in node.entries.items()}
+            return Mapping(entries, node.keys, node.location)
+
+
+def _text_of(name: str, levels: Map[str, Scalar]) -> str:
+    if name == "$":
+        return "$"
+    return level_label(levels[name]) if name in levels else f"${name}"
+
+
+def level_label(level: Scalar) -> str:
+    """Returns the label of a level."""
+    return str(level.value).lower() if isinstance(level.value, bool) else str(level.value)
+
+
+def merged(base: Mapping, over: Mapping) -> Mapping:
+    """Returns a mapping with the entries of two; where both have mappings, these are merged, else the second wins."""
+    entries, keys = dict(base.entries), base.keys | over.keys
+    for key, value in over.entries.items():
+        before = entries.get(key)
+        both = isinstance(before, Mapping) and isinstance(value, Mapping)
+        entries[key] = merged(before, value) if both else value  # type: ignore[arg-type]
+    return Mapping(entries, keys, over.location if over.entries else base.location)
+
+
+def leaves(node: Mapping, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Node]]:
+    """Yields each value of a mapping and of the mappings in it, with the keys that lead to it."""
+    for key, value in node.entries.items():
+        if isinstance(value, Mapping) and value.entries:
+            yield from leaves(value, (*above, key))
+        else:
+            yield (*above, key), value

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An experiment file is read and checked before anything starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from experiment_texts import PICK, faults_of, read
+
+from modular_framework_benchmark.experiments.experiment import StoppingKind
+from modular_framework_benchmark.experiments.experiment_file import load_experiment
+from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.records.experiment import Direction, MetricKind
+
+
+def test_every_combination_has_the_settings_of_the_base_and_of_its_levels(tmp_path: Path) -> None:
+    experiment = read(PICK, tmp_path)
+    assert len(experiment.combinations) == 8
+    found = {tuple(one.configuration.values()): one.settings for one in experiment.combinations}
+    settings = found["aside", "PRM", "ball"]
+    assert settings["arguments"] == {"world_file": "table.world", "method_launch_file": "b/aside.launch"}
+    assert settings["parameters"] == {"/planner_name": "PRM"}
+    assert settings["objects"][0].model == "ball"
+    assert settings["launch"] == "modular_framework_api/start_framework.launch"
+
+
+def test_a_value_that_is_only_a_level_keeps_its_type(tmp_path: Path) -> None:
+    text = PICK.replace("planner: [RRTConnect, PRM]", "planner: [0.5, true, 3, word]").replace(
+        "{/planner_name: $planner}", "{/a: $planner, /b: with $planner and $$}"
+    )
+    found = [one.settings["parameters"] for one in read(text, tmp_path).combinations[::2]][:4]
+    assert [one["/a"] for one in found] == [0.5, True, 3, "word"]
+    assert [one["/b"] for one in found] == ["with 0.5 and $", "with true and $", "with 3 and $", "with word and $"]
+
+
+def test_a_listed_design_runs_only_what_it_lists(tmp_path: Path) -> None:
+    listed = "\ndesign: [{method: above, planner: PRM, object: cube}, {object: cube, method: aside, planner: PRM}]\n"
+    experiment = read(PICK + listed, tmp_path)
+    assert [one.configuration["method"] for one in experiment.combinations] == ["above", "aside"]
+    twice = faults_of(PICK + listed.replace("aside", "above"), tmp_path)
+    assert any("this combination is listed twice; remove one of them" in one for one in twice)
+
+
+def test_a_listed_method_without_another_one_to_compare_with_is_a_fault(tmp_path: Path) -> None:
+    listed = (
+        "\ndesign: [{method: above, planner: PRM, object: cube}, {method: aside, planner: PRM, object: ball},"
+        " {method: above, planner: PRM, object: ball}]\n"
+    )
+    (fault,) = faults_of(PICK + listed, tmp_path)
+    assert "object cube, planner PRM has only method 'above'; list another one, to compare it with" in fault
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "at", "fault"),
+    [
+        ("mode: task", "mode: tsk", "tsk", "mode 'tsk' is unknown; allowed: task, planning"),
+        ("trials: 6", "trails: 6", "trails", "the key 'trails' is unknown; allowed: experiment, mode"),
+        ("trials: 6", "trials: 0", "0", "trials must be a whole number from 1 to"),
+        ("trials: 6", "trials: six", "six", "trials must be a whole number from 1"),
+        ("time_limit: 60", "time_limit: true", "true", "time_limit must be a number"),
+        ("{world_file:", "{wrld_file:", "wrld_file", "the argument of modular_framework_api"),
+        ("{world_file:", "{gui: perhaps, world_file:", "gui", "argument 'gui' is 'perhaps', allowed are"),
+        ("{world_file:", "{end_with_task: true, world_file:", "end_with_task", "the argument 'end_with_task' cannot"),
+        ("[cube, ball]", "[cube, bal]", "$object", "there is no model 'bal'; allowed: cube, ball, can"),
+        ("$object", "$objct", "$objct", "'$objct' names no factor; allowed: method"),
+        ("on: 0.8", "on: 0.8, z: 1", "{model", "an object has both z and on"),
+        (", on: 0.8", "", "{model", "an object has neither z nor on"),
+        ("[-0.2, 0.2]", "[0.2, -0.2]", "[0.2", "the range of x goes down from 0.2 to -0.2"),
+        ("{normal: [0, 1]}", "{normal: [0, -1]}", "[0", "normal of yaw must be [MEAN, DEVIATION]"),
+        ("{normal: [0, 1]}", "{gauss: [0, 1]}", "{gauss", "yaw must be a number, [LOW, HIGH], {normal"),
+        ("lifted: 0.1", "lift: 0.1", "lift", "the key of success 'lift' is unknown; allowed: lifted"),
+        ("lifted: 0.1", "lifted: -1", "-1", "lifted must be a number from 0 to 10, found the number -1"),
+        ("compare: method", "compare: metod", "metod", "compare 'metod' is unknown"),
+        ("compare: method", "", "experiment", "the experiment has no 'compare'; add it"),
+        ("planner: [RRTConnect, PRM]", "planner: [RRTConnect, RRTConnect]", "RRTConnect", "factor 'planner' has"),
+        ("planner: [RRTConnect, PRM]", "planner: []", "[", "factor 'planner' has no levels"),
+        ("/planner_name: $planner", "planner_name: $planner", "planner_name", "the parameter 'planner_name' must"),
+        ("/planner_name: $planner", "/planner_name: x", "planner", "factor 'planner' changes nothing"),
+        ("[success, task_time]", "[succes]", "succes", "the metric 'succes' is unknown; allowed: success"),
+        ("[success, task_time]", "[success, Success.py:f]", "Success.py", "there is no file"),
+        ("[success, task_time]", "[success, success]", "success", "metrics has 'success' twice"),
+        ("time_limit: 60", "stopping: {rule: sequental}", "sequental", "rule 'sequental' is unknown; allowed: fixed"),
+        ("time_limit: 60", "stopping: {rule: sequential, metric: task_time}", "task_time", "the metric of stopping"),
+        ("time_limit: 60", "stopping: {error_rate: 0.05}", "{error_rate", "stopping has no rule; allowed: fixed"),
+        ("time_limit: 60", "record: {vido: true}", "vido", "the key of record 'vido' is unknown; allowed: log"),
+        ("mode: task", "mode: task\nmode: task", "mode", "the key 'mode' is given twice; first in line 3"),
+    ],
+)  # fmt: skip
+def test_a_fault_says_where_it_is_what_was_found_and_what_is_allowed(
+    old: str, new: str, at: str, fault: str, tmp_path: Path
+) -> None:
+    assert old in PICK
+    text = PICK.replace(old, new, 1)
+    (found,) = faults_of(text, tmp_path)
+    line, column, message = found.split(":", 2)
+    assert text.splitlines()[int(line) - 1][int(column) - 1 :].startswith(at)
+    assert message.strip().startswith(fault)
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+    text = PICK.replace("trials: 6", "trials: x").replace("lifted", "lift").replace("compare: method", "compare: m")
+    assert [one.split(":")[0] for one in faults_of(text, tmp_path)] == ["8", "15", "16"]
+
+
+def test_two_factors_that_set_the_same_value_are_a_fault(tmp_path: Path) -> None:
+    text = PICK.replace(
+        "planner: [RRTConnect, PRM]", "planner: {RRTConnect: {arguments: {method_launch_file: x}}, P: }"
+    )
+    (fault,) = (one for one in faults_of(text, tmp_path) if "sets" in one)
+    assert "factor 'planner' sets arguments.method_launch_file, as factor 'method' does" in fault
+
+
+def test_a_file_that_is_missing_empty_or_no_yaml_is_refused(tmp_path: Path) -> None:
+    from experiment_texts import METRICS, FakeSurroundings
+
+    with pytest.raises(ExperimentFault, match="there is no such file"):
+        load_experiment(tmp_path / "none.yaml", FakeSurroundings(tmp_path / "m"), METRICS)
+    assert "the file is empty" in faults_of("# nothing\n", tmp_path)[0]
+    assert "this is not valid YAML" in faults_of("experiment: [", tmp_path)[0]
+    assert "the file must be a mapping" in faults_of("[1, 2]", tmp_path)[0]
+
+
+def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "raise SystemExit\ndef swing(episode):\n    return 1.0\ndef two(a, b):\n    pass\n"
+    )
+    entry = "{function: mine.py:swing, better: lower, unit: rad, kind: time}"
+    experiment = read(PICK.replace("[success, task_time]", f"[success, {entry}]"), tmp_path)
+    own = experiment.metrics[1]
+    assert (own.name, own.better, own.unit, own.kind) == ("swing", Direction.LOWER, "rad", MetricKind.TIME)
+    assert experiment.measures == ("success", {"name": "swing", "function": f"{tmp_path / 'mine.py'}:swing"})
+    assert (
+        "'swng' is unknown; allowed: swing, two; did you mean 'swing'"
+        in faults_of(PICK.replace("[success, task_time]", "[mine.py:swng]"), tmp_path)[0]
+    )
+    assert "must take one argument" in faults_of(PICK.replace("[success, task_time]", "[mine.py:two]"), tmp_path)[0]
+
+
+def test_a_duration_is_limited_by_the_time_of_an_episode_unless_the_file_says_otherwise(tmp_path: Path) -> None:
+    assert [one.limit for one in read(PICK, tmp_path).metrics] == [None, 60.0]
+    text = PICK.replace("task_time]", "{metric: task_time, limit: 12}]")
+    assert read(text, tmp_path).metrics[1].limit == 12.0
+
+
+def test_a_sequential_rule_is_read(tmp_path: Path) -> None:
+    stopping = read(PICK + "stopping: {rule: sequential, error_rate: 0.01, min_trials: 3}\n", tmp_path).stopping
+    assert (stopping.kind, stopping.error_rate, stopping.min_trials) == (StoppingKind.SEQUENTIAL, 0.01, 3)
+
+
+def test_a_planning_experiment_takes_its_problems_in_turn(tmp_path: Path) -> None:
+    from modular_framework_benchmark.experiments.design import lay_out
+
+    text = """
+experiment: plans
+mode: planning
+robot: some_moveit_config
+problems: problems
+planner: $planner
+factors: {planner: [RRTConnect, PRM]}
+compare: planner
+trials: 5
+"""
+    assert "there is no folder" in faults_of(text, tmp_path)[0]
+    for family, number in (("box", 1), ("box", 2), ("cage", 1)):
+        (tmp_path / "problems" / family).mkdir(parents=True, exist_ok=True)
+        for kind in ("scene", "request"):
+            (tmp_path / "problems" / family / f"{kind}{number:04}.yaml").write_text("{}")
+    episodes = lay_out(read(text, tmp_path))
+    names = {one.trial: one.settings["problem"]["name"] for one in episodes}
+    assert [names[trial] for trial in range(5)] == ["box/0001", "box/0002", "cage/0001", "box/0001", "box/0002"]
+    assert len({one.seed for one in episodes if one.settings["problem"]["name"] == "box/0001"}) == 2
+    (tmp_path / "problems" / "box" / "request0002.yaml").unlink()
+    assert "has no request0002.yaml beside it" in faults_of(text, tmp_path)[0]
