@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The columns that an experiment adds to Planner Arena's tables: metrics to `runs`, factors to `experiments`."""
+
+from __future__ import annotations
+
+import math
+
+from sqlalchemy import Boolean, Column, Connection, Insert, String, inspect
+from sqlalchemy.schema import CreateColumn
+
+from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric, MetricKind
+from modular_framework_benchmark.results.errors import DescriptionError
+from modular_framework_benchmark.results.schema import EXPERIMENTS, REAL_NUMBER, RESERVED_COLUMNS, RUNS
+
+SUCCESS = "success"
+
+
+def check_names(description: ExperimentDescription) -> None:
+    """Checks that metrics and factors can be columns, of Planner Arena's tables and of the result table.
+
+    Raises:
+        DescriptionError: Says every name that cannot.
+    """
+    faults: list[str] = []
+    factors = [factor.name for factor in description.factors]
+    taken = set(RESERVED_COLUMNS)
+    for metric in description.metrics:
+        lower = metric.name.lower()
+        if not metric.name.isidentifier():
+            faults.append(f"metric {metric.name!r} is no identifier")
+        elif lower in taken:
+            faults.append(f"metric {metric.name!r}: the name is taken (upper and lower case count as one)")
+        elif lower == SUCCESS and (metric.name != SUCCESS or metric.kind is not MetricKind.RATE):
+            faults.append(f"metric {metric.name!r}: `success` is a rate, in lower case")
+        taken.add(lower)
+    faults += [f"factor {name!r}: the name is taken" for name in factors if name.lower() in taken]
+    faults += [
+        f"factor {name!r} is there twice" for name in sorted({each for each in factors if factors.count(each) > 1})
+    ]
+    if description.compared not in factors:
+        faults.append(f"compared factor {description.compared!r}: allowed are {', '.join(factors) or 'none'}")
+    if faults:
+        allowed = "a free name that Python would take as a variable's; taken by the tables: "
+        raise DescriptionError(
+            f"experiment {description.name!r} cannot be stored: {'; '.join(faults)}; "
+            f"allowed: {allowed}{', '.join(sorted(RESERVED_COLUMNS))}; rename what is named here"
+        )
+
+
+def metric_column(metric: Metric) -> Column[bool] | Column[float]:
+    """Returns the column of a metric in `runs`."""
+    if metric.kind is MetricKind.RATE:
+        return Column(metric.name, Boolean)
+    return Column(metric.name, REAL_NUMBER)
+
+
+def add_metric_columns(connection: Connection, description: ExperimentDescription) -> None:
+    """Adds the columns of the metrics that `runs` lacks.
+
+    Raises:
+        DescriptionError: A metric was a rate in another experiment of this database and is none here, or the reverse.
+    """
+    present = {each["name"].lower(): each for each in inspect(connection).get_columns(RUNS.name)}
+    for metric in description.metrics:
+        old = present.get(metric.name.lower())
+        if old is None:
+            _add_column(connection, RUNS.name, metric_column(metric))
+        elif old["name"] != metric.name or isinstance(old["type"], Boolean) is not (metric.kind is MetricKind.RATE):
+            was = "a rate" if isinstance(old["type"], Boolean) else "a number"
+            raise DescriptionError(
+                f"experiment {description.name!r}: the metric {metric.name!r} is in this database already "
+                f"as {old['name']!r}, {was}; rename the metric, or use another database"
+            )
+
+
+def factor_columns(connection: Connection, description: ExperimentDescription) -> dict[str, str]:
+    """Adds the columns of the factors that `experiments` lacks; the compared factor is in `plannerConfigs` instead.
+
+    A factor whose levels are all numbers gets a column of numbers, for Planner Arena compares what looks like a number
+    as one. A factor whose name is taken by another column gets one with `_level` at its end.
+
+    Returns:
+        The column of each factor, by the factor's name.
+    """
+    present = {each["name"].lower(): each for each in inspect(connection).get_columns(EXPERIMENTS.name)}
+    taken = {column.name for column in EXPERIMENTS.columns} | {"experiment", "planner"}
+    columns: dict[str, str] = {}
+    for factor in description.factors:
+        if factor.name == description.compared:
+            continue
+        name = factor.name
+        numbers = is_numeric(factor)
+        while name.lower() in taken or (
+            name.lower() in present and isinstance(present[name.lower()]["type"], String) is numbers
+        ):
+            name += "_level"
+        if name.lower() not in present:
+            column = Column(name, REAL_NUMBER) if numbers else Column(name, String(512))
+            _add_column(connection, EXPERIMENTS.name, column)
+        taken.add(name.lower())
+        columns[factor.name] = name
+    return columns
+
+
+def insert_row(connection: Connection, row: Insert) -> int:
+    """Inserts a row whose number the database chooses, and returns the number."""
+    key = connection.execute(row).inserted_primary_key
+    assert key is not None  # every insert of one row has one
+    return int(key[0])
+
+
+def is_numeric(factor: Factor) -> bool:
+    """Returns whether all levels of a factor are finite numbers."""
+    try:
+        return all(math.isfinite(float(level)) for level in factor.levels)
+    except ValueError:
+        return False
+
+
+def _add_column(connection: Connection, table: str, column: Column[bool] | Column[float] | Column[str]) -> None:
+    quoted = connection.dialect.identifier_preparer.quote(table)
+    definition = CreateColumn(column).compile(dialect=connection.dialect)
+    connection.exec_driver_sql(f"ALTER TABLE {quoted} ADD COLUMN {definition}")

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Opens the engine of a result database: a SQLite file, or a server that SQLAlchemy knows by a URL."""
+
+from __future__ import annotations
+
+import sqlite3
+import urllib.parse
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy import URL, Connection, Engine, NullPool, create_engine, event, make_url
+from sqlalchemy.exc import ArgumentError, NoSuchModuleError
+
+from modular_framework_benchmark.results.errors import DatabaseMissingError, ResultsError
+
+BUSY_TIMEOUT_S = 30.0
+"""How long a write waits for another process: far longer than a report takes to read 100,000 episodes."""
+BEGIN = "sqlite_begin"
+
+
+@dataclass(frozen=True, slots=True)
+class DatabaseAddress:
+    """Where a result database is.
+
+    Attributes:
+        label: How to name it to a user, without a password.
+        path: The SQLite file; None for a server.
+        url: URL of a server; None for a SQLite file.
+    """
+
+    label: str
+    path: Path | None
+    url: URL | None
+
+
+def parse_address(target: str | Path) -> DatabaseAddress:
+    """Reads what a user names as database.
+
+    Args:
+        target: Path of a SQLite file, or a URL of SQLAlchemy, such as `postgresql+psycopg://user@host/name`.
+
+    Raises:
+        ResultsError: It is a URL that SQLAlchemy cannot read, or a database in memory.
+    """
+    if "://" not in str(target):
+        path = Path(target).expanduser().absolute()
+        return DatabaseAddress(str(path), path, None)
+    try:
+        url = make_url(str(target))
+    except ArgumentError as error:
+        raise ResultsError(
+            f"{target}: no URL of a database ({error}); name a file, or DIALECT://USER@HOST/NAME"
+        ) from error
+    if url.get_backend_name() != "sqlite":
+        return DatabaseAddress(url.render_as_string(hide_password=True), None, url)
+    if not url.database or url.database == ":memory:":
+        raise ResultsError(f"{target}: a database in memory is lost with the process; name a file")
+    path = Path(url.database).expanduser().absolute()
+    return DatabaseAddress(str(path), path, None)
+
+
+def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool) -> Engine:
+    """Makes the engine; connects to nothing yet.
+
+    Args:
+        address: Where the database is.
+        create: Makes the SQLite file if there is none.
+        read_only: Refuses every write.
+
+    Raises:
+        DatabaseMissingError: The SQLite file, or the folder it would be made in, is not there.
+        ResultsError: The driver of the server's database is not installed.
+    """
+    if address.path is None:
+        try:
+            return create_engine(address.url or "", pool_pre_ping=True)
+        except (NoSuchModuleError, ImportError) as error:
+            raise ResultsError(f"{address.label}: {error}; install the driver that the URL names") from error
+    path = address.path
+    if not path.parent.is_dir():
+        raise DatabaseMissingError(f"{path}: there is no folder {path.parent}; make it, or name another file")
+    if not create and not path.is_file():
+        raise DatabaseMissingError(
+            f"{path}: there is no such file; name a result database, or run the experiment first"
+        )
+    return _sqlite_engine(path, create, read_only)
+
+
+def _sqlite_engine(path: Path, create: bool, read_only: bool) -> Engine:
+    """Connections are opened for each use, so that no file handle is shared by threads or forked processes.
+
+    A reader too opens the file for writing where it may, for only so is a write undone that a killed process left.
+    """
+    uri = f"file:{urllib.parse.quote(str(path))}?mode={'rwc' if create else 'rw'}"
+
+    def connect() -> sqlite3.Connection:
+        connection = sqlite3.connect(
+            uri, uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
+        )
+        connection.execute("PRAGMA foreign_keys = ON")
+        connection.execute("PRAGMA synchronous = FULL")
+        if read_only:
+            connection.execute("PRAGMA query_only = ON")
+        return connection
+
+    engine = create_engine("sqlite://", creator=connect, poolclass=NullPool)
+
+    @event.listens_for(engine, "begin")
+    def begin(connection: Connection) -> None:
+        connection.exec_driver_sql(connection.get_execution_options().get(BEGIN, "BEGIN"))
+
+    return engine

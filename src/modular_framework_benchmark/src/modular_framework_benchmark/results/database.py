@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The database of results: one SQLite file by default, any server of SQLAlchemy for a team.
+
+Each finished episode is written in one transaction, exactly once. A killed run loses no finished episode: what the
+database holds is enough to resume it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import logging
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import pandas as pd
+from sqlalchemy import Connection, Engine, func, insert, inspect, select
+from sqlalchemy.exc import DBAPIError, IntegrityError
+
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
+from modular_framework_benchmark.records.experiment import ExperimentDescription
+from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.results import result_tables
+from modular_framework_benchmark.results.connection import BEGIN, DatabaseAddress, make_engine, parse_address
+from modular_framework_benchmark.results.errors import (
+    DatabaseCorruptError,
+    RecordNotStoredError,
+    RecordRefusedError,
+    ResultsError,
+    SchemaVersionError,
+    StorageError,
+    UnknownExperimentError,
+    storage_error,
+)
+from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES, read_record, read_spec, store_record
+from modular_framework_benchmark.results.json_records import description_from_json, record_to_json
+from modular_framework_benchmark.results.planned_episodes import store_experiment
+from modular_framework_benchmark.results.schema import (
+    DESCRIPTIONS,
+    ENUMS,
+    EPISODES,
+    METADATA,
+    RUNS,
+    SCHEMA,
+    SCHEMA_VERSION,
+)
+from modular_framework_benchmark.results.unwritten_records import keep_record, waiting_records
+
+_LOG = logging.getLogger(__name__)
+_ATTEMPTS = 10
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True, slots=True)
+class StoredExperiment:
+    """An experiment of a database.
+
+    Attributes:
+        id: Its identifier in this database.
+        description: What it compares.
+        planned: Number of its episodes, finished or not.
+        finished: Number of those that have a record.
+        added: When it was added [s since 1970].
+    """
+
+    id: int
+    description: ExperimentDescription
+    planned: int
+    finished: int
+    added: float
+
+
+def open_database(target: str | Path, *, create: bool = False, read_only: bool = False) -> ResultDatabase:
+    """Opens a result database, checks it, and takes in the records that wait beside it.
+
+    Args:
+        target: Path of a SQLite file, or a URL of SQLAlchemy.
+        create: Makes the database if there is none.
+        read_only: Writes nothing, and leaves waiting records where they are.
+
+    Raises:
+        StorageError: It is not there, damaged, locked or cannot be written.
+        SchemaVersionError: Its tables are those of another version, or of another program.
+    """
+    address = parse_address(target)
+    database = ResultDatabase(address, make_engine(address, create=create, read_only=read_only))
+    try:
+        database.prepare(read_only=read_only)
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
+class ResultDatabase:
+    """An open result database; made by `open_database`. Each process opens its own."""
+
+    def __init__(self, address: DatabaseAddress, engine: Engine) -> None:
+        """Stores the arguments; connects to nothing."""
+        self._address = address
+        self._engine = engine
+        self._descriptions: dict[int, ExperimentDescription] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the connections; may be called twice."""
+        self._engine.dispose()
+
+    @property
+    def label(self) -> str:
+        """Returns the name of the database for messages."""
+        return self._address.label
+
+    @property
+    def folder(self) -> Path:
+        """Returns the folder that the folders of episodes are relative to: the file's, or the working folder."""
+        return self._address.path.parent if self._address.path else Path.cwd()
+
+    def prepare(self, *, read_only: bool) -> None:
+        """Checks the database, makes its tables if it is new, and takes in waiting records; see `open_database`."""
+        self._check_integrity()
+        if read_only:
+            with self._reading() as connection:
+                self._check_version(connection)
+            return
+        with self._writing() as connection:
+            if not inspect(connection).get_table_names():
+                METADATA.create_all(connection)
+                connection.execute(insert(SCHEMA).values(version=SCHEMA_VERSION))
+                connection.execute(
+                    insert(ENUMS),
+                    [
+                        {"name": "status", "value": value, "description": status.value}
+                        for status, value in STATUS_VALUES.items()
+                    ],
+                )
+            self._check_version(connection)
+        self._take_in_waiting()
+
+    def add_experiment(self, description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> int:
+        """Adds an experiment, or finds it there: then the run resumes, and episodes that are new are added.
+
+        Args:
+            description: What it compares.
+            episodes: All its episodes.
+
+        Returns:
+            Its identifier in this database.
+
+        Raises:
+            DescriptionError: A name cannot be a column, or the episodes do not fit the description.
+            ExperimentChangedError: An experiment of this name is there, and its episodes are others.
+            StorageError: It cannot be written.
+        """
+        number = self._transact(lambda connection: store_experiment(connection, description, episodes))
+        self._descriptions[number] = description
+        return number
+
+    def experiments(self) -> list[StoredExperiment]:
+        """Returns the experiments in the order in which they were added."""
+        with self._reading() as connection:
+            counts: dict[int, int] = dict(
+                connection.execute(
+                    select(EPISODES.c.descriptionid, func.count()).group_by(EPISODES.c.descriptionid)
+                ).all()
+            )
+            finished: dict[int, int] = dict(
+                connection.execute(
+                    select(EPISODES.c.descriptionid, func.count())
+                    .join_from(EPISODES, RUNS, RUNS.c.id == EPISODES.c.id)
+                    .group_by(EPISODES.c.descriptionid)
+                ).all()
+            )
+            rows = connection.execute(select(DESCRIPTIONS).order_by(DESCRIPTIONS.c.id)).all()
+        return [
+            StoredExperiment(
+                row.id, description_from_json(row.content), counts.get(row.id, 0), finished.get(row.id, 0), row.added
+            )
+            for row in rows
+        ]
+
+    def find(self, name: str) -> int:
+        """Returns the identifier of an experiment.
+
+        Raises:
+            UnknownExperimentError: There is none of this name; names those there are.
+        """
+        with self._reading() as connection:
+            known = dict(connection.execute(select(DESCRIPTIONS.c.name, DESCRIPTIONS.c.id)).all())
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            raise UnknownExperimentError(
+                f"{self.label} has no experiment {name!r}; allowed: {', '.join(sorted(known)) or 'none, it is empty'}"
+                + (f"; do you mean {near[0]!r}?" if near else "")
+            )
+        return int(known[name])
+
+    def pending(self, number: int) -> list[EpisodeSpec]:
+        """Returns the episodes of an experiment that are not finished, in the order of the run."""
+        with self._reading() as connection:
+            self._description(connection, number)
+            statement = (
+                select(EPISODES)
+                .outerjoin(RUNS, RUNS.c.id == EPISODES.c.id)
+                .where(EPISODES.c.descriptionid == number, RUNS.c.id.is_(None))
+                .order_by(EPISODES.c.number)
+            )
+            return [read_spec(row) for row in connection.execute(statement)]
+
+    def finished_keys(self, number: int) -> frozenset[str]:
+        """Returns the keys of an experiment's finished episodes."""
+        with self._reading() as connection:
+            self._description(connection, number)
+            statement = (
+                select(EPISODES.c.key).join(RUNS, RUNS.c.id == EPISODES.c.id).where(EPISODES.c.descriptionid == number)
+            )
+            return frozenset(connection.execute(statement).scalars())
+
+    def write(self, number: int, record: EpisodeRecord) -> bool:
+        """Writes what an episode gave, in one transaction.
+
+        Args:
+            number: Identifier of the experiment.
+            record: The record.
+
+        Returns:
+            True if it was stored; False if the episode had a record already, which stays, whoever wrote it.
+
+        Raises:
+            RecordNotStoredError: The database could not be written; the record is kept in a file that is taken in when
+                the database is opened next.
+            RecordRefusedError: The record does not fit the experiment.
+            UnknownExperimentError: There is no such experiment.
+        """
+        try:
+            content = record_to_json(record)
+        except TypeError as error:
+            raise RecordRefusedError(f"episode {record.spec.key!r}: {error}") from error
+        try:
+            return self._transact(
+                lambda connection: store_record(connection, number, self._description(connection, number), record)
+            )
+        except StorageError as error:
+            saved = keep_record(self._address, number, record)
+            raise RecordNotStoredError(error, record.spec.key, saved, content) from error
+
+    def record(self, number: int, episode: int) -> EpisodeRecord:
+        """Returns the whole record of an episode.
+
+        Args:
+            number: Identifier of the experiment.
+            episode: Number of the episode in it.
+
+        Raises:
+            UnknownExperimentError: There is no such experiment.
+            ResultsError: There is no such episode, or it is not finished.
+        """
+        with self._reading() as connection:
+            description = self._description(connection, number)
+            row = connection.execute(
+                select(EPISODES).where(EPISODES.c.descriptionid == number, EPISODES.c.number == episode)
+            ).one_or_none()
+            record = None if row is None else read_record(connection, row, description)
+        if record is None:
+            state = "is not finished" if row is not None else "is none of its episodes"
+            raise ResultsError(f"{self.label}: episode {episode} of {description.name!r} {state}; name a finished one")
+        return record
+
+    def load(self, number: int, *, spans: bool = True) -> ExperimentResults:
+        """Reads the finished episodes of an experiment, also while it runs.
+
+        Args:
+            number: Identifier of the experiment.
+            spans: Whether to read the spans too; without, their table is empty.
+
+        Raises:
+            UnknownExperimentError: There is no such experiment.
+        """
+        with self._reading() as connection:
+            return result_tables.load_results(connection, number, self._description(connection, number), spans=spans)
+
+    def spans(self, number: int, episodes: Collection[int]) -> pd.DataFrame:
+        """Reads the spans of some episodes, by their numbers; the columns are those of `ExperimentResults.spans`."""
+        with self._reading() as connection:
+            self._description(connection, number)
+            return result_tables.load_spans(connection, number, episodes)
+
+    def span_totals(self, number: int) -> pd.DataFrame:
+        """Adds up the spans of an experiment by kind, name and method; see `result_tables.span_totals`."""
+        with self._reading() as connection:
+            return result_tables.span_totals(connection, number, self._description(connection, number))
+
+    def snapshot_values(self, number: int) -> dict[str, list[tuple[Any, int]]]:
+        """Returns the different values of each part of the snapshots, with the number of episodes that had each."""
+        with self._reading() as connection:
+            self._description(connection, number)
+            return result_tables.snapshot_values(connection, number)
+
+    def _description(self, connection: Connection, number: int) -> ExperimentDescription:
+        if number not in self._descriptions:
+            row = connection.execute(select(DESCRIPTIONS.c.content).where(DESCRIPTIONS.c.id == number)).one_or_none()
+            if row is None:
+                raise UnknownExperimentError(f"{self.label} has no experiment number {number}; see experiments()")
+            self._descriptions[number] = description_from_json(row.content)
+        return self._descriptions[number]
+
+    def _transact(self, action: Callable[[Connection], _Result]) -> _Result:
+        """Runs an action in a transaction, again if another process wrote the same row at the same moment."""
+        for attempt in range(_ATTEMPTS):
+            try:
+                with self._writing() as connection:
+                    return action(connection)
+            except IntegrityError as error:
+                if attempt + 1 == _ATTEMPTS:
+                    raise storage_error(error, self.label) from error
+        raise AssertionError("not reached")
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[Connection]:
+        with self._translating(), self._engine.connect() as connection:
+            writer = connection.execution_options(**{BEGIN: "BEGIN IMMEDIATE"})
+            with writer.begin():
+                yield writer
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator[Connection]:
+        with self._translating(), self._engine.connect() as connection, connection.begin():
+            yield connection
+
+    @contextlib.contextmanager
+    def _translating(self) -> Iterator[None]:
+        try:
+            yield
+        except IntegrityError:
+            raise
+        except DBAPIError as error:
+            raise storage_error(error, self.label) from error
+
+    def _check_integrity(self) -> None:
+        if self._address.path is None:
+            return
+        with self._reading() as connection:
+            found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one()
+        if found != "ok":
+            raise DatabaseCorruptError(
+                f"{self.label}: it is damaged ({found}); restore a copy, or save what can be read with sqlite3 .recover"
+            )
+
+    def _check_version(self, connection: Connection) -> None:
+        tables = inspect(connection).get_table_names()
+        if SCHEMA.name not in tables:
+            raise SchemaVersionError(
+                f"{self.label} is no result database: its tables are {', '.join(tables) or 'none'}; name another file"
+            )
+        version = connection.execute(select(SCHEMA.c.version)).scalar_one()
+        if version != SCHEMA_VERSION:
+            age = "older" if version < SCHEMA_VERSION else "newer"
+            raise SchemaVersionError(
+                f"{self.label} has tables of version {version}, of an {age} release; allowed: {SCHEMA_VERSION}; "
+                "open it with that release, and export it there as Parquet or for Planner Arena"
+            )
+
+    def _take_in_waiting(self) -> None:
+        for waiting in waiting_records(self._address):
+            try:
+                self.write(waiting.experiment, waiting.record)
+            except (UnknownExperimentError, RecordRefusedError) as error:
+                _LOG.warning("%s: the record waits on: %s", waiting.path, error)
+                continue
+            waiting.path.unlink(missing_ok=True)
+            _LOG.info("%s: its record is in %s now", waiting.path, self.label)

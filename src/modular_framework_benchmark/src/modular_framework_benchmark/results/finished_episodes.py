@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Stores what a finished episode gave, exactly once, and reads it again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from typing import Any
+
+from sqlalchemy import Connection, Row, column, insert, select, table, update
+
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.experiment import ExperimentDescription, MetricKind
+from modular_framework_benchmark.results.columns import SUCCESS, insert_row
+from modular_framework_benchmark.results.errors import RecordRefusedError
+from modular_framework_benchmark.results.json_records import to_json
+from modular_framework_benchmark.results.planned_episodes import UNKNOWN_VERSION
+from modular_framework_benchmark.results.schema import EPISODES, EXPERIMENTS, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
+
+STATUS_VALUES = {status: value for value, status in enumerate(EpisodeStatus)}
+"""How Planner Arena's `enums` number the statuses."""
+
+
+def store_record(
+    connection: Connection, number: int, description: ExperimentDescription, record: EpisodeRecord
+) -> bool:
+    """Stores the record of an episode, unless it has one.
+
+    Returns:
+        Whether it was stored; False: the episode had a record already, which stays.
+
+    Raises:
+        RecordRefusedError: The experiment has no such episode, or a value cannot be stored.
+    """
+    episode = find_episode(connection, number, record.spec.key)
+    if episode is None:
+        raise RecordRefusedError(
+            f"episode {record.spec.key!r} is none of experiment {description.name!r}; add it with add_experiment first"
+        )
+    if connection.execute(select(RUNS.c.id).where(RUNS.c.id == episode.id)).one_or_none() is not None:
+        return False
+    run = {
+        "id": episode.id,
+        "experimentid": episode.experimentid,
+        "plannerid": episode.plannerid,
+        "status": STATUS_VALUES[record.status],
+        "success": record.succeeded,
+        "wall_s": float(record.wall_s),
+        "simulated_s": _number(record.simulated_s),
+        **metric_values(description, record),
+    }
+    connection.execute(insert(table(RUNS.name, *map(column, run))).values(run))
+    snapshot = {name: _snapshot_value(connection, name, value) for name, value in record.snapshot.items()}
+    texts = {name: getattr(record, name) for name in ("outcome", "cause", "folder", "worker")}
+    connection.execute(
+        insert(RECORDS).values(runid=episode.id, begun=float(record.begun), snapshot=to_json(snapshot), **texts)
+    )
+    if record.spans:
+        connection.execute(
+            insert(SPANS), [_span_row(episode.id, place, span) for place, span in enumerate(record.spans)]
+        )
+    _update_condition(connection, episode.experimentid, record)
+    return True
+
+
+def find_episode(connection: Connection, number: int, key: str) -> Row[Any] | None:
+    """Finds the row of a planned episode; None if there is none."""
+    return connection.execute(
+        select(EPISODES).where(EPISODES.c.descriptionid == number, EPISODES.c.key == key)
+    ).one_or_none()
+
+
+def metric_values(description: ExperimentDescription, record: EpisodeRecord) -> dict[str, float | bool | None]:
+    """Returns the metrics of a record as `runs` keeps them.
+
+    Raises:
+        RecordRefusedError: A metric is none of the experiment's, or a rate is neither true nor false.
+    """
+    kinds = {metric.name: metric.kind for metric in description.metrics}
+    unknown = sorted(set(record.metrics) - set(kinds) - {SUCCESS})
+    if unknown:
+        raise RecordRefusedError(
+            f"episode {record.spec.key!r} has the metrics {', '.join(unknown)}, which experiment {description.name!r} "
+            f"has not; allowed: {', '.join(sorted(kinds))}; add them to the experiment"
+        )
+    values: dict[str, float | bool | None] = {}
+    for name, value in record.metrics.items():
+        if name == SUCCESS:
+            continue  # the status says it
+        values[name] = _number(value)
+        if kinds[name] is MetricKind.RATE and values[name] is not None:
+            if values[name] not in (0.0, 1.0):
+                raise RecordRefusedError(
+                    f"episode {record.spec.key!r}: the rate {name!r} is {value!r}; allowed: 0, 1 or none; "
+                    "make it a metric of kind value"
+                )
+            values[name] = bool(value)
+    return values
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or math.isnan(value) else float(value)
+
+
+def _span_row(run: int, place: int, span: Span) -> dict[str, Any]:
+    return {
+        "runid": run,
+        "place": place,
+        "kind": span.kind,
+        "name": span.name,
+        "started_s": float(span.started_s),
+        "ended_s": _number(span.ended_s),
+        "outcome": span.outcome,
+        "failed": bool(span.failed),
+        "reason": span.reason,
+    }
+
+
+def _snapshot_value(connection: Connection, name: str, value: Any) -> int:
+    """Returns the row of a value of a snapshot; equal values of all episodes share one."""
+    text = to_json(value)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    columns = SNAPSHOT_VALUES.c
+    known = connection.execute(
+        select(columns.id).where(columns.name == name, columns.digest == digest)
+    ).scalar_one_or_none()
+    if known is not None:
+        return int(known)
+    row = insert(SNAPSHOT_VALUES).values(name=name, digest=digest, value=text)
+    return insert_row(connection, row)
+
+
+def _update_condition(connection: Connection, experiment: int, record: EpisodeRecord) -> None:
+    """Adds the episode's time to Planner Arena's experiment, and its version to the first that has one."""
+    columns = EXPERIMENTS.c
+    row = update(EXPERIMENTS).where(columns.id == experiment)
+    connection.execute(row.values(totaltime=columns.totaltime + float(record.wall_s)))
+    version = record.snapshot.get("version")
+    if isinstance(version, str) and version:
+        connection.execute(row.where(columns.version == UNKNOWN_VERSION).values(version=version[:128]))
+
+
+def read_spec(row: Row[Any]) -> EpisodeSpec:
+    """Returns the planned episode of a row of `episodes`."""
+    return EpisodeSpec(row.number, json.loads(row.configuration), row.trial, row.seed, json.loads(row.settings))
+
+
+def read_record(connection: Connection, row: Row[Any], description: ExperimentDescription) -> EpisodeRecord | None:
+    """Returns what a planned episode gave; None when it is not finished.
+
+    Args:
+        connection: The database.
+        row: Row of `episodes`.
+        description: Its experiment.
+    """
+    names = [metric.name for metric in description.metrics]
+    runs = table(RUNS.name, *map(column, dict.fromkeys([*RUNS.columns.keys(), *names])))
+    run = connection.execute(select(runs).where(runs.c.id == row.id)).mappings().one_or_none()
+    if run is None:
+        return None
+    rest = connection.execute(select(RECORDS).where(RECORDS.c.runid == row.id)).one()
+    spans = connection.execute(select(SPANS).where(SPANS.c.runid == row.id).order_by(SPANS.c.place))
+    status = next(each for each, value in STATUS_VALUES.items() if value == run["status"])
+    return EpisodeRecord(
+        spec=read_spec(row),
+        status=status,
+        outcome=rest.outcome,
+        cause=rest.cause,
+        begun=rest.begun,
+        wall_s=run["wall_s"],
+        simulated_s=run["simulated_s"],
+        metrics={name: None if run[name] is None else float(run[name]) for name in names},
+        spans=tuple(
+            Span(each.kind, each.name, each.started_s, each.ended_s, each.outcome, bool(each.failed), each.reason)
+            for each in spans
+        ),
+        snapshot=_read_snapshot(connection, json.loads(rest.snapshot)),
+        folder=rest.folder,
+        worker=rest.worker,
+    )
+
+
+def _read_snapshot(connection: Connection, numbers: dict[str, int]) -> dict[str, Any]:
+    columns = SNAPSHOT_VALUES.c
+    rows = connection.execute(select(columns.name, columns.value).where(columns.id.in_(numbers.values())))
+    return {name: json.loads(value) for name, value in rows}

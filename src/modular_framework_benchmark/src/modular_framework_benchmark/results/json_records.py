@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Descriptions and records as JSON text and back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from enum import Enum
+from pathlib import PurePath
+from typing import Any
+
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.experiment import Direction, ExperimentDescription, Factor, Metric, MetricKind
+
+
+def to_json(value: Any) -> str:
+    """Writes a value as JSON with sorted keys, so that equal values have equal texts.
+
+    Raises:
+        TypeError: A value in it is none of JSON's, of NumPy's, an enumeration or a path.
+    """
+    return json.dumps(value, sort_keys=True, default=_plain, separators=(",", ":"))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    if hasattr(value, "tolist"):  # arrays and scalars of NumPy
+        return value.tolist()
+    raise TypeError(
+        f"{value!r} of type {type(value).__name__} cannot be stored; use numbers, texts, lists and mappings"
+    )
+
+
+def description_to_json(description: ExperimentDescription) -> str:
+    """Writes a description as JSON."""
+    return to_json(asdict(description))
+
+
+def description_from_json(text: str) -> ExperimentDescription:
+    """Reads what `description_to_json` wrote."""
+    content = json.loads(text)
+    factors = tuple(Factor(each["name"], tuple(each["levels"])) for each in content.pop("factors"))
+    metrics = tuple(
+        Metric(**{**each, "kind": MetricKind(each["kind"]), "better": Direction(each["better"])})
+        for each in content.pop("metrics")
+    )
+    return ExperimentDescription(**content, factors=factors, metrics=metrics)
+
+
+def record_to_json(record: EpisodeRecord) -> str:
+    """Writes a record, with what was run, as JSON."""
+    spec = record.spec
+    return to_json(
+        {
+            "spec": {name: getattr(spec, name) for name in ("number", "configuration", "trial", "seed", "settings")},
+            "status": record.status,
+            "outcome": record.outcome,
+            "cause": record.cause,
+            "begun": record.begun,
+            "wall_s": record.wall_s,
+            "simulated_s": record.simulated_s,
+            "metrics": record.metrics,
+            "spans": [asdict(span) for span in record.spans],
+            "snapshot": record.snapshot,
+            "folder": record.folder,
+            "worker": record.worker,
+        }
+    )
+
+
+def record_from_json(text: str) -> EpisodeRecord:
+    """Reads what `record_to_json` wrote.
+
+    Raises:
+        ValueError: It is no JSON, or a status is unknown.
+        KeyError, TypeError: A field is missing or unknown.
+    """
+    content = json.loads(text)
+    return EpisodeRecord(
+        **{
+            **content,
+            "spec": EpisodeSpec(**content["spec"]),
+            "status": EpisodeStatus(content["status"]),
+            "spans": tuple(Span(**span) for span in content["spans"]),
+        }
+    )

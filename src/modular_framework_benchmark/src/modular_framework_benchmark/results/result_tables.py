@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the finished episodes of an experiment into tables, a column at a time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from typing import Any
+
+import pandas as pd
+from sqlalchemy import Connection, Select, column, func, select, table
+
+from modular_framework_benchmark.records.experiment import ExperimentDescription
+from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.results.columns import SUCCESS
+from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES
+from modular_framework_benchmark.results.schema import EPISODES, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
+
+SPAN_COLUMNS = ("number", "kind", "name", "started_s", "ended_s", "outcome", "failed", "reason")
+_TEXTS = ("outcome", "cause", "folder", "worker")
+
+
+def load_results(
+    connection: Connection, number: int, description: ExperimentDescription, *, spans: bool = True
+) -> ExperimentResults:
+    """Reads an experiment's finished episodes.
+
+    Args:
+        connection: The database.
+        number: Identifier of the experiment.
+        description: Its description.
+        spans: Whether to read the spans too; an empty table otherwise.
+    """
+    planned = connection.execute(select(func.count()).where(EPISODES.c.descriptionid == number)).scalar_one()
+    episodes = load_episodes(connection, number, description)
+    return ExperimentResults(description, episodes, load_spans(connection, number, None if spans else ()), planned)
+
+
+def load_episodes(connection: Connection, number: int, description: ExperimentDescription) -> pd.DataFrame:
+    """Reads the table of episodes that `ExperimentResults` describes."""
+    metrics = [metric.name for metric in description.metrics if metric.name != SUCCESS]
+    runs = table(RUNS.name, *map(column, [*RUNS.columns.keys(), *metrics]))
+    planned = EPISODES.c
+    statement = (
+        select(planned.number, planned.trial, planned.seed)
+        .add_columns(runs.c.status, runs.c.success, RECORDS.c.outcome, RECORDS.c.cause, RECORDS.c.begun)
+        .add_columns(runs.c.wall_s, runs.c.simulated_s, RECORDS.c.folder, RECORDS.c.worker)
+        .add_columns(planned.configuration, *(runs.c[name] for name in metrics))
+        .join_from(EPISODES, runs, runs.c.id == planned.id)
+        .join(RECORDS, RECORDS.c.runid == planned.id)
+        .where(planned.descriptionid == number)
+        .order_by(planned.number)
+    )
+    columns = _read_columns(connection, statement)
+    names = {value: status.value for status, value in STATUS_VALUES.items()}
+    frame = {name: pd.Series(columns[name], dtype="int64") for name in ("number", "trial", "seed")}
+    frame["status"] = pd.Series([names[value] for value in columns["status"]], dtype="str")
+    frame["success"] = pd.Series(columns["success"], dtype="bool")
+    frame |= {name: pd.Series(columns[name], dtype="str") for name in ("outcome", "cause")}
+    frame |= {name: pd.Series(columns[name], dtype="float64") for name in ("begun", "wall_s", "simulated_s")}
+    frame |= {name: pd.Series(columns[name], dtype="str") for name in ("folder", "worker")}
+    frame |= _levels(columns["configuration"], description)
+    frame |= {name: pd.Series(columns[name], dtype="float64") for name in metrics}
+    return pd.DataFrame(frame)
+
+
+def load_spans(connection: Connection, number: int, numbers: Collection[int] | None = None) -> pd.DataFrame:
+    """Reads the table of spans that `ExperimentResults` describes.
+
+    Args:
+        connection: The database.
+        number: Identifier of the experiment.
+        numbers: Numbers of the episodes whose spans are read; None for all.
+    """
+    statement = (
+        select(EPISODES.c.number, *(SPANS.c[name] for name in SPAN_COLUMNS[1:]))
+        .join_from(EPISODES, SPANS, SPANS.c.runid == EPISODES.c.id)
+        .where(EPISODES.c.descriptionid == number)
+        .order_by(EPISODES.c.number, SPANS.c.place)
+    )
+    if numbers is not None:
+        statement = statement.where(EPISODES.c.number.in_(sorted(numbers)))
+    columns = _read_columns(connection, statement)
+    kinds = {"number": "int64", "started_s": "float64", "ended_s": "float64", "failed": "bool"}
+    return pd.DataFrame({name: pd.Series(columns[name], dtype=kinds.get(name, "str")) for name in SPAN_COLUMNS})
+
+
+def span_totals(connection: Connection, number: int, description: ExperimentDescription) -> pd.DataFrame:
+    """Adds the spans up in the database, for experiments whose spans are too many to read.
+
+    Returns:
+        A row for each kind, name and method, with the columns `kind`, `name`, the compared factor's name, `count`,
+        `ended` (how many have an end), `failed` and `total_s` (sum of the durations of those that ended).
+    """
+    ended = SPANS.c.ended_s.is_not(None)
+    statement = (
+        select(SPANS.c.kind, SPANS.c.name, EPISODES.c.configuration)
+        .add_columns(func.count().label("count"), func.count(SPANS.c.ended_s).label("ended"))
+        .add_columns(func.count().filter(SPANS.c.failed).label("failed"))
+        .add_columns(func.sum(SPANS.c.ended_s - SPANS.c.started_s).filter(ended).label("total_s"))
+        .join_from(EPISODES, SPANS, SPANS.c.runid == EPISODES.c.id)
+        .where(EPISODES.c.descriptionid == number)
+        .group_by(SPANS.c.kind, SPANS.c.name, EPISODES.c.configuration)
+    )
+    columns = _read_columns(connection, statement)
+    columns[description.compared] = [json.loads(each)[description.compared] for each in columns.pop("configuration")]
+    names = ["kind", "name", description.compared]
+    sums = pd.DataFrame(columns).fillna({"total_s": 0.0})
+    return sums.groupby(names, as_index=False, sort=True)[["count", "ended", "failed", "total_s"]].sum()
+
+
+def snapshot_values(connection: Connection, number: int) -> dict[str, list[tuple[Any, int]]]:
+    """Reads what the episodes ran with.
+
+    Returns:
+        For each name of the snapshots, its different values, each with the number of episodes that had it, the most
+        frequent first.
+    """
+    rows = connection.execute(
+        select(RECORDS.c.snapshot, func.count())
+        .join_from(EPISODES, RECORDS, RECORDS.c.runid == EPISODES.c.id)
+        .where(EPISODES.c.descriptionid == number)
+        .group_by(RECORDS.c.snapshot)
+    )
+    counts: dict[int, int] = {}
+    for text, count in rows:
+        for value in json.loads(text).values():
+            counts[value] = counts.get(value, 0) + count
+    found: dict[str, list[tuple[Any, int]]] = {}
+    for value in connection.execute(select(SNAPSHOT_VALUES).order_by(SNAPSHOT_VALUES.c.id)):
+        if value.id in counts:
+            found.setdefault(value.name, []).append((json.loads(value.value), counts[value.id]))
+    return {name: sorted(values, key=lambda each: -each[1]) for name, values in sorted(found.items())}
+
+
+def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, Any]:
+    result = connection.execute(statement)
+    names = list(result.keys())
+    rows = result.all()
+    return dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
+
+
+def _levels(configurations: tuple[str, ...], description: ExperimentDescription) -> dict[str, Any]:
+    known = {text: json.loads(text) for text in set(configurations)}
+    return {
+        factor.name: pd.Series([known[text][factor.name] for text in configurations], dtype="str")
+        for factor in description.factors
+    }
