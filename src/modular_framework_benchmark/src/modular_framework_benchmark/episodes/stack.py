@@ -19,14 +19,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from modular_framework_benchmark.episodes.task_settings import TaskSettings
 from modular_framework_core.files.default_folders import framework_home
 from modular_framework_core.launching.launch_session import Launch, LaunchSession
 
 LAUNCHER = "modular_framework_benchmark.episodes.ros_stack_launcher"
 RECORDER = "modular_framework_benchmark.episodes.ros_episode_recorder"
 POLL_S = 0.02
-FIXED_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
 SHARED_FOLDERS = ("convex_parts",)
 """Folders of the framework's home that sessions share: what is computed once for all."""
 
@@ -52,15 +50,23 @@ def write_parameters(path: Path, parameters: Mapping[str, Any]) -> None:
 class Stack:
     """A launched stack and the recorder beside it."""
 
-    def __init__(self, settings: TaskSettings, parameters: Mapping[str, Any], folder: Path) -> None:
+    def __init__(
+        self,
+        package: str,
+        launch_file: str,
+        arguments: Mapping[str, str],
+        parameters: Mapping[str, Any],
+        folder: Path,
+    ) -> None:
         """Starts both; does not wait for them.
 
         Args:
-            settings: What to launch.
-            parameters: ROS parameters over those of the launch files.
-            folder: Folder for the log of the launch and of the recorder.
+            package: Package of the launch file.
+            launch_file: Its name.
+            arguments: Launch arguments.
+            parameters: ROS parameters over those of the launch files, by absolute name.
+            folder: Folder for the logs of the launch and of the recorder.
         """
-        self.begun = time.monotonic()
         self._session = LaunchSession()
         home = Path(self._session.env["ROS_HOME"]) / "modular_framework"
         home.mkdir(parents=True)
@@ -69,11 +75,10 @@ class Stack:
             (home / name).symlink_to(framework_home() / name)
         self._session.env.pop("DISPLAY", None)
         parameters_file = self._session.folder / "parameters.launch"
-        write_parameters(parameters_file, {**parameters, "/task/wait_for_start": True})
-        arguments = {**settings.arguments, **FIXED_ARGUMENTS}
+        write_parameters(parameters_file, parameters)
         self._launch = self._session.start(
             [
-                *(sys.executable, "-m", LAUNCHER, settings.package, settings.launch_file, str(parameters_file)),
+                *(sys.executable, "-m", LAUNCHER, package, launch_file, str(parameters_file)),
                 *(f"{name}:={value}" for name, value in arguments.items()),
             ],
             folder / "log.txt",

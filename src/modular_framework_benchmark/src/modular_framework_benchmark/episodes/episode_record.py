@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Makes the record of an episode from how it ended and from the files it left."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.episodes.snapshot import machine, machine_load, versions
+from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
+from modular_framework_benchmark.metrics.recording_files import (
+    grasped_at,
+    objects_of,
+    read_joints,
+    read_recording,
+    read_tracking,
+    reports_of,
+)
+from modular_framework_benchmark.metrics.registry import measure
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+
+TASK_RECORDS = "task_records"
+PARTS = (("start", "ready"), ("task", "task"), ("check", "recorded"))
+"""Parts of an episode in their order, and the moment at which each ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeEnd:
+    """How an episode ended.
+
+    Attributes:
+        spec: What was run.
+        folder: Folder with its files.
+        begun: When it started [s since 1970].
+        begun_monotonic: The same by the machine's monotonic clock [s].
+        load: Load of the machine at its start, see `machine_load`.
+        status: How it ended.
+        cause: Why it did not succeed.
+        answer: What the recorder answered.
+        stop_s: How long it took to stop the stack [s].
+    """
+
+    spec: EpisodeSpec
+    folder: Path
+    begun: float
+    begun_monotonic: float
+    load: Mapping[str, float]
+    status: EpisodeStatus = EpisodeStatus.BROKEN
+    cause: str = ""
+    answer: Mapping[str, Any] = field(default_factory=dict)
+    stop_s: float = 0.0
+
+    def broken(self, cause: str) -> EpisodeEnd:
+        """Returns the end of an episode that could not be run."""
+        return replace(self, status=EpisodeStatus.BROKEN, cause=cause)
+
+    def ended(self, status: EpisodeStatus, cause: str, answer: Mapping[str, Any]) -> EpisodeEnd:
+        """Returns the end of an episode that ran."""
+        return replace(self, status=status, cause=cause, answer=answer)
+
+    def stopped(self, stop_s: float) -> EpisodeEnd:
+        """Returns it with the time that stopping took [s]."""
+        return replace(self, stop_s=stop_s)
+
+
+def make_record(end: EpisodeEnd) -> EpisodeRecord:
+    """Returns the record of an episode; to be called when nothing of it runs any more."""
+    wall_s = time.monotonic() - end.begun_monotonic
+    recording = read_recording(end.folder)
+    states = _states(end)
+    answer = end.answer
+    measurements = EpisodeMeasurements(
+        settings=end.spec.settings,
+        status=end.status,
+        outcome=str(answer.get("outcome", "")),
+        cause=end.cause,
+        states=states,
+        task_s=answer.get("task_s"),
+        task_wall_s=answer.get("task_wall_s"),
+        reports=reports_of(recording),
+        joints=read_joints(end.folder),
+        tracking=read_tracking(end.folder),
+        objects=objects_of(recording),
+        target=recording.get("target", ""),
+        grasped_at_s=grasped_at(recording),
+        held=bool(answer.get("held", False)),
+        folder=end.folder,
+    )
+    measured = measure(end.spec.settings.get("metrics") or (), measurements)
+    spans = (*_parts(end, wall_s), *states, *_components(end, recording))
+    return EpisodeRecord(
+        spec=end.spec,
+        status=end.status,
+        outcome=measurements.outcome,
+        cause=end.cause,
+        begun=end.begun,
+        wall_s=wall_s,
+        simulated_s=answer.get("simulated_s"),
+        metrics=measured.values,
+        spans=tuple(sorted(spans, key=lambda span: span.started_s)),
+        snapshot=_snapshot(end, measured.faults),
+        folder=str(end.folder),
+    )
+
+
+def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
+    after = machine_load()
+    return {
+        **versions(),
+        "machine": machine(),
+        "load_before": end.load["load_1_min"],
+        "load_after": after["load_1_min"],
+        "stolen_s": round(after["stolen_s"] - end.load["stolen_s"], 2),
+        "busy_s": round(after["busy_s"] - end.load["busy_s"], 2),
+        "seed": end.spec.seed,
+        "settings": dict(end.spec.settings),
+        "parameters": end.answer.get("parameters_digest", ""),
+        "final_objects": end.answer.get("final", {}),
+        **({"metric_faults": dict(faults)} if faults else {}),
+    }
+
+
+def _parts(end: EpisodeEnd, wall_s: float) -> list[Span]:
+    """Returns the parts of the episode: start of the stack, task, check and recording, stop."""
+    moments, spans, since = end.answer.get("parts", {}), [], 0.0
+    for name, moment in PARTS:
+        if moment in moments:
+            spans.append(Span("episode", name, since, float(moments[moment])))
+            since = float(moments[moment])
+    if end.stop_s:
+        spans.append(Span("episode", "stop", max(wall_s - end.stop_s, 0.0), wall_s))
+    return spans
+
+
+def _states(end: EpisodeEnd) -> tuple[Span, ...]:
+    """Returns what the states of the task did, from the record that the task's node writes."""
+    files = sorted((end.folder / TASK_RECORDS).glob("*.json"))
+    if not files:
+        return ()
+    record = json.loads(files[-1].read_text())
+    zero = float(record["begun"]) - end.begun
+    return tuple(
+        Span(
+            "state",
+            state["path"],
+            zero + state["started_s"],
+            None if state["ended_s"] is None else zero + state["ended_s"],
+            state["outcome"] or "",
+            state["failed"],
+            state["reason"],
+        )
+        for state in record["states"]
+    )
+
+
+def _components(end: EpisodeEnd, recording: Mapping[str, Any]) -> list[Span]:
+    return [
+        Span(
+            "component",
+            entry["component"],
+            entry["wall_begin"] - end.begun_monotonic,
+            entry["wall_begin"] - end.begun_monotonic + entry["wall_s"],
+            "",
+            not entry["succeeded"],
+            entry["reason"],
+        )
+        for entry in recording.get("reports", ())
+    ]

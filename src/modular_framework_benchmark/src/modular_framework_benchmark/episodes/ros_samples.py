@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Collects what the nodes of a stack say on the wire while an episode runs."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rosgraph
+import roslib.message
+import rospy
+from control_msgs.msg import JointTrajectoryControllerState
+from gazebo_msgs.msg import ModelStates
+from moveit_msgs.msg import DisplayTrajectory
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+ACTIONS = {"moveit_msgs/ExecuteTrajectoryActionGoal": "execution", "modular_framework_core/GraspActionGoal": "grasp"}
+"""Component that an action belongs to, by the type of its goal."""
+
+CONTROLLER_STATE = "control_msgs/JointTrajectoryControllerState"
+SUCCEEDED = 3
+"""Number of actionlib_msgs/GoalStatus."""
+
+
+class Samples:
+    """Messages of an episode, each with the real and the simulated time at which it came.
+
+    Subscribers: ``joint_states``, ``/gazebo/model_states``, ``/gazebo/grasped_object``, ``component_reports``,
+    ``/move_group/planning_report``, ``/move_group/display_planned_path``, the states of all trajectory controllers,
+    goals and results of the actions in `ACTIONS`.
+
+    Attributes:
+        joints: Joint states.
+        models: (simulated time [s], gazebo_msgs/ModelStates).
+        grasped: (simulated time [s], name of the held objects).
+        controllers: (name of the controller, its state).
+        planning: (real time [s], report of move_group).
+        paths: Motions that move_group shows.
+        components: (real time [s], report of a component).
+        actions: Goals that ended, see `_on_result`.
+    """
+
+    def __init__(self) -> None:
+        """Connects to nothing yet."""
+        self._lock = threading.Lock()
+        self._subscribers: dict[str, Any] = {}
+        self._goals: dict[str, dict[str, Any]] = {}
+        self._last_grasped = ""
+        self.clear()
+
+    def clear(self) -> None:
+        """Forgets what was collected; what is held stays known."""
+        with self._lock:
+            self.joints: list[Any] = []
+            self.models: list[tuple[float, Any]] = []
+            self.grasped: list[tuple[float, str]] = (
+                [(rospy.get_time(), self._last_grasped)] if self._subscribers else []
+            )
+            self.controllers: list[tuple[str, Any]] = []
+            self.planning: list[tuple[float, dict[str, Any]]] = []
+            self.paths: list[Any] = []
+            self.components: list[tuple[float, dict[str, Any]]] = []
+            self.actions: list[dict[str, Any]] = []
+            self._goals.clear()
+
+    def connect(self) -> None:
+        """Subscribes to everything that is there now; may be called again."""
+        for topic, kind, callback in (
+            ("joint_states", JointState, lambda message: self.joints.append(message)),
+            ("/gazebo/model_states", ModelStates, lambda message: self.models.append((rospy.get_time(), message))),
+            ("/gazebo/grasped_object", String, self._on_grasped),
+            ("component_reports", String, lambda message: self.components.append(_report(message))),
+            ("/move_group/planning_report", String, lambda message: self.planning.append(_report(message))),
+            ("/move_group/display_planned_path", DisplayTrajectory, lambda message: self.paths.append(message)),
+        ):
+            self._subscribe(topic, kind, callback)
+        for topic, type_name in rosgraph.Master(rospy.get_name()).getTopicTypes():
+            if type_name == CONTROLLER_STATE:
+                name = topic.strip("/").rpartition("/")[0]
+                self._subscribe(topic, JointTrajectoryControllerState, self._controller(name))
+            elif type_name in ACTIONS:
+                self._subscribe_action(topic, type_name)
+
+    def _subscribe(self, topic: str, kind: Any, callback: Callable[[Any], None]) -> None:
+        if topic not in self._subscribers:
+            self._subscribers[topic] = rospy.Subscriber(topic, kind, callback, tcp_nodelay=True)
+
+    def _controller(self, name: str) -> Callable[[Any], None]:
+        return lambda message: self.controllers.append((name, message))
+
+    def _subscribe_action(self, topic: str, type_name: str) -> None:
+        name, component = topic.rpartition("/")[0], ACTIONS[type_name]
+        goal = roslib.message.get_message_class(type_name)
+        result = roslib.message.get_message_class(type_name.removesuffix("Goal") + "Result")
+        self._subscribe(topic, goal, lambda message: self._on_goal(component, message))
+        self._subscribe(f"{name}/result", result, self._on_result)
+
+    def _on_grasped(self, message: String) -> None:
+        self._last_grasped = message.data
+        self.grasped.append((rospy.get_time(), message.data))
+
+    def _on_goal(self, component: str, message: Any) -> None:
+        begin = {"component": component, "wall": time.monotonic(), "ros": rospy.get_time(), "goal": message.goal}
+        with self._lock:
+            self._goals[message.goal_id.id] = begin
+
+    def _on_result(self, message: Any) -> None:
+        """Keeps a goal that ended with `component`, `goal`, begin and end, `succeeded` and `reason`."""
+        with self._lock:
+            begin = self._goals.pop(message.status.goal_id.id, None)
+            if begin is None:
+                return
+            code = getattr(getattr(message.result, "error_code", None), "val", 1)
+            succeeded = message.status.status == SUCCEEDED and code == 1
+            reason = "" if succeeded else message.status.text or f"error code {code}"
+            self.actions.append(
+                begin
+                | {"wall_end": time.monotonic(), "ros_end": rospy.get_time(), "succeeded": succeeded, "reason": reason}
+            )
+
+
+def _report(message: String) -> tuple[float, dict[str, Any]]:
+    return time.monotonic(), json.loads(message.data)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the files that are recorded of an episode.
+
+| file | contents |
+|---|---|
+| `trajectory.parquet` | a row a sample: `time_s`, `<joint>/position|velocity|effort|command`, poses of moving objects |
+| `tracking.parquet` | `time_s`, `controller`, `joint`, `desired`, `actual` |
+| `recording.json` | objects, grasps, and what the components reported |
+
+`time_s` is simulated time since the recording began.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from modular_framework_benchmark.metrics.measurements import (
+    Array,
+    ComponentReport,
+    JointSamples,
+    Motion,
+    ObjectTrack,
+    TrackingSamples,
+)
+
+TRAJECTORY, TRACKING, RECORDING = "trajectory.parquet", "tracking.parquet", "recording.json"
+
+
+def read_recording(folder: Path) -> dict[str, Any]:
+    """Returns the contents of `recording.json`; nothing if there is no such file."""
+    path = folder / RECORDING
+    return dict(json.loads(path.read_text())) if path.is_file() else {}
+
+
+def reports_of(recording: Mapping[str, Any]) -> tuple[ComponentReport, ...]:
+    """Returns what the components reported, in the order they ended."""
+    entries = sorted(recording.get("reports", ()), key=lambda entry: entry["wall_begin"] + entry["wall_s"])
+    return tuple(
+        ComponentReport(
+            **{
+                key: entry[key]
+                for key in ("component", "name", "succeeded", "reason", "started_s", "ended_s", "wall_s")
+            },
+            figures=entry["figures"],
+            motion=_motion(entry["motion"]),
+        )
+        for entry in entries
+    )
+
+
+def _motion(entry: Mapping[str, Any] | None) -> Motion | None:
+    if entry is None:
+        return None
+    return Motion(tuple(entry["joints"]), np.array(entry["times_s"]), np.array(entry["positions"]))
+
+
+def objects_of(recording: Mapping[str, Any]) -> dict[str, ObjectTrack]:
+    """Returns the tracks of the objects, by name."""
+    return {
+        name: ObjectTrack(
+            name,
+            np.array(rows["time_s"]),
+            np.column_stack([rows[axis] for axis in ("x", "y", "z")]),
+            np.column_stack([rows[axis] for axis in ("qx", "qy", "qz", "qw")]),
+        )
+        for name, rows in recording.get("objects", {}).items()
+    }
+
+
+def grasped_at(recording: Mapping[str, Any]) -> float | None:
+    """Returns when the target was held first [s]; None if never."""
+    target = recording.get("target", "")
+    times = [time_s for time_s, names in recording.get("grasped", ()) if target and target in names.split(",")]
+    return float(times[0]) if times else None
+
+
+def read_joints(folder: Path) -> JointSamples | None:
+    """Returns the measured joints; None if none were recorded."""
+    path = folder / TRAJECTORY
+    if not path.is_file():
+        return None
+    frame = pd.read_parquet(path)
+    joints = tuple(name.removesuffix("/position") for name in frame.columns if name.endswith("/position"))
+
+    def columns(kind: str) -> Array:
+        wanted = [f"{joint}/{kind}" for joint in joints]
+        return np.asarray(frame.reindex(columns=wanted).to_numpy(dtype=float))
+
+    times = np.asarray(frame["time_s"].to_numpy(dtype=float))
+    return JointSamples(joints, times, *(columns(kind) for kind in ("position", "velocity", "effort", "command")))
+
+
+def read_tracking(folder: Path) -> tuple[TrackingSamples, ...]:
+    """Returns what the trajectory controllers wanted and got."""
+    path = folder / TRACKING
+    if not path.is_file():
+        return ()
+    found = []
+    for controller, rows in pd.read_parquet(path).groupby("controller", sort=True):
+        tables = {
+            kind: rows.pivot_table(index="time_s", columns="joint", values=kind) for kind in ("desired", "actual")
+        }
+        desired, actual = tables["desired"], tables["actual"]
+        found.append(
+            TrackingSamples(
+                str(controller),
+                tuple(map(str, desired.columns)),
+                np.asarray(desired.index.to_numpy(dtype=float)),
+                np.asarray(desired.to_numpy(dtype=float)),
+                np.asarray(actual.to_numpy(dtype=float)),
+            )
+        )
+    return tuple(found)
