@@ -10,11 +10,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
 from modular_framework_benchmark.episodes.snapshot import machine, machine_load, versions
-from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
+from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack
 from modular_framework_benchmark.metrics.recording_files import (
     grasped_at,
     objects_of,
+    read_descriptions,
     read_joints,
     read_recording,
     read_tracking,
@@ -73,6 +75,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
     recording = read_recording(end.folder)
     states = _states(end)
     answer = end.answer
+    joints = read_joints(end.folder)
     measurements = EpisodeMeasurements(
         settings=end.spec.settings,
         status=end.status,
@@ -82,7 +85,8 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         task_s=answer.get("task_s"),
         task_wall_s=answer.get("task_wall_s"),
         reports=reports_of(recording),
-        joints=read_joints(end.folder),
+        joints=joints,
+        hand=_hand(end.folder, joints) if answer.get("held") else None,
         tracking=read_tracking(end.folder),
         objects=objects_of(recording),
         target=recording.get("target", ""),
@@ -105,6 +109,12 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         snapshot=_snapshot(end, measured.faults),
         folder=str(end.folder),
     )
+
+
+def _hand(folder: Path, joints: JointSamples | None) -> ObjectTrack | None:
+    urdf, srdf = read_descriptions(folder)
+    link = hand_link(srdf) if srdf else ""
+    return hand_track(urdf, link, joints) if urdf and link and joints is not None else None
 
 
 def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:

@@ -19,16 +19,18 @@ from typing import Any
 
 import rosgraph
 import rospy
+from controller_manager_msgs.srv import ListControllers
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from modular_framework_benchmark.episodes.ros_recording import write_recording
+from modular_framework_benchmark.episodes.ros_recording import write_parameters, write_recording
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, WorldError, spawn
 from modular_framework_ros.calls import CallError, request_service
 
 POLL_S = 0.02
 START_SERVICE = "/task/start"
+LIST_CONTROLLERS = "/controller_manager/list_controllers"
 GENERATION_SIGNAL = "/grasp_generated"
 
 
@@ -46,6 +48,7 @@ class EpisodeRequest:
         target: Object that success is about; "" for none.
         hold_s: Simulated time after the end of the task when the world is looked at [s].
         method: Whether the launch has a method that generates grasps.
+        controllers: Names of the controllers that must run before the task starts.
         parameters: ROS parameters to set before.
         begun: When the episode began, by the machine's monotonic clock [s].
     """
@@ -55,6 +58,7 @@ class EpisodeRequest:
     target: str
     hold_s: float
     method: bool
+    controllers: list[str]
     parameters: dict[str, Any]
     begun: float
 
@@ -99,6 +103,7 @@ class EpisodeRecorder:
         except EpisodeAbortedError:
             answer["aborted"] = True
         answer |= write_recording(Path(request.folder), self._samples, request, zero)
+        answer["parameters_digest"] = write_parameters(Path(request.folder))
         parts["recorded"] = time.monotonic() - request.begun
         return answer
 
@@ -123,6 +128,7 @@ class EpisodeRecorder:
     def _wait_for_stack(self, request: EpisodeRequest) -> None:
         master = rosgraph.Master(rospy.get_name())
         wanted = [START_SERVICE, *([SPAWN_SERVICE] if request.objects else [])]
+        wanted += [LIST_CONTROLLERS] if request.controllers else []
 
         def is_up() -> bool:
             publishers, _, services = master.getSystemState()
@@ -131,6 +137,7 @@ class EpisodeRecorder:
             return signals and all(name in names for name in wanted)
 
         self._wait(is_up)
+        self._wait(lambda: set(request.controllers) <= _running_controllers())
 
     def _next_end(self) -> dict[str, Any]:
         self._wait(lambda: not self._ends.empty())
@@ -145,6 +152,11 @@ class EpisodeRecorder:
         while not condition():
             if self._aborted.wait(POLL_S):
                 raise EpisodeAbortedError
+
+
+def _running_controllers() -> set[str]:
+    answer = request_service(LIST_CONTROLLERS, ListControllers, ListControllers._request_class(), timeout_s=30.0)
+    return {controller.name for controller in answer.controller if controller.state == "running"}
 
 
 def _has_clock_parameter() -> bool:

@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import rospy
 
 from modular_framework_benchmark.episodes.ros_samples import Samples
-from modular_framework_benchmark.metrics.recording_files import RECORDING, TRACKING, TRAJECTORY
+from modular_framework_benchmark.metrics.recording_files import PARAMETERS, RECORDING, TRACKING, TRAJECTORY
+
+OF_A_RUN = ("run_id", "roslaunch", "seed")
+"""Parameters that differ between episodes of the same configuration."""
 
 POSE_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
@@ -45,6 +50,20 @@ def write_recording(folder: Path, samples: Samples, request: Any, zero: float) -
     }
     (folder / RECORDING).write_text(json.dumps(content))
     return _final(poses, grasped, request.target)
+
+
+def write_parameters(folder: Path) -> str:
+    """Writes all parameters of the parameter server; returns their SHA-256, hexadecimal.
+
+    Args:
+        folder: Where to write `parameters.json`.
+    """
+    parameters = rospy.get_param("/")
+    text = json.dumps(parameters, sort_keys=True, indent=1)
+    (folder / PARAMETERS).write_text(text)
+    for name in OF_A_RUN:
+        parameters.pop(name, None)
+    return hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()
 
 
 def _final(poses: dict[str, pd.DataFrame], grasped: list[list[Any]], target: str) -> dict[str, Any]:

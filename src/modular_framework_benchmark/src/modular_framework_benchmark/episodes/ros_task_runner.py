@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,8 @@ from modular_framework_benchmark.episodes.snapshot import machine_load
 from modular_framework_benchmark.episodes.stack import Stack, StackError
 from modular_framework_benchmark.episodes.task_settings import SettingsError, TaskSettings, read_settings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_core.launching.launch_arguments import METHOD, argument_values, known_arguments
+from modular_framework_core.launching.launch_arguments import METHOD, argument_values, check_arguments, known_arguments
+from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
 
 OWN_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
 """Launch arguments that every episode sets, where the launch file has them."""
@@ -42,12 +43,18 @@ class TaskEpisodeRunner:
         end = EpisodeEnd(spec, folder, time.time(), time.monotonic(), machine_load())
         try:
             settings = read_settings(spec)
-            arguments, has_method = _launch_arguments(settings)
-        except (SettingsError, roslaunch.core.RLException, rospkg.ResourceNotFound, OSError) as error:
+            launch = _resolved_launch(settings)
+        except (
+            ControllerFileError,
+            SettingsError,
+            roslaunch.core.RLException,
+            rospkg.ResourceNotFound,
+            OSError,
+        ) as error:
             return make_record(end.broken(str(error)))
-        stack = Stack(settings.package, settings.launch_file, arguments, self._parameters(settings), folder)
+        stack = Stack(settings.package, settings.launch_file, launch.arguments, self._parameters(settings), folder)
         try:
-            end = self._run_on(stack, settings, has_method, end)
+            end = self._run_on(stack, settings, launch, end)
         finally:
             stop = time.monotonic()
             stack.stop()
@@ -59,13 +66,14 @@ class TaskEpisodeRunner:
     def _parameters(self, settings: TaskSettings) -> dict[str, Any]:
         return {"/task/wait_for_start": True, **settings.parameters}
 
-    def _run_on(self, stack: Stack, settings: TaskSettings, has_method: bool, end: EpisodeEnd) -> EpisodeEnd:
+    def _run_on(self, stack: Stack, settings: TaskSettings, launch: ResolvedLaunch, end: EpisodeEnd) -> EpisodeEnd:
         request = {
             "folder": str(end.folder),
             "objects": [asdict(placed) for placed in settings.objects],
             "target": settings.success.object,
             "hold_s": settings.success.hold_s,
-            "method": has_method,
+            "method": launch.has_method,
+            "controllers": list(launch.controllers),
             "parameters": {"/seed": end.spec.seed, "/task/record_directory": str(end.folder / "task_records")},
             "begun": end.begun_monotonic,
         }
@@ -85,13 +93,33 @@ class TaskEpisodeRunner:
         return end.ended(EpisodeStatus.FAILED if cause else EpisodeStatus.SUCCEEDED, cause, answer)
 
 
-def _launch_arguments(settings: TaskSettings) -> tuple[dict[str, str], bool]:
-    """Returns the launch arguments of an episode, and whether the launch has a method that generates grasps."""
+@dataclass(frozen=True, slots=True)
+class ResolvedLaunch:
+    """What a launch file and its arguments say of the stack.
+
+    Attributes:
+        arguments: All arguments to give.
+        has_method: Whether there is a method that generates grasps.
+        controllers: Names of the controllers it starts.
+    """
+
+    arguments: Mapping[str, str]
+    has_method: bool
+    controllers: tuple[str, ...]
+
+
+def _resolved_launch(settings: TaskSettings) -> ResolvedLaunch:
     path = roslaunch.rlutil.resolve_launch_arguments([settings.package, settings.launch_file])[0]
     known = known_arguments(path)
     arguments = {**settings.arguments, **{name: value for name, value in OWN_ARGUMENTS.items() if name in known}}
-    values = argument_values(path, [f"{name}:={value}" for name, value in arguments.items() if name in known])
-    return arguments, bool(values.get(METHOD, ""))
+    given = [f"{name}:={value}" for name, value in arguments.items()]
+    check_arguments(path, given)
+    values = argument_values(path, given)
+    controllers: tuple[str, ...] = ()
+    if values.get("robot_package") and values.get("controller_file"):
+        folder = Path(rospkg.RosPack().get_path(values["robot_package"])) / "controllers"
+        controllers = read_controller_file(folder / values["controller_file"]).controllers
+    return ResolvedLaunch(arguments, bool(values.get(METHOD, "")), controllers)
 
 
 def _failure(settings: TaskSettings, answer: Mapping[str, Any]) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 
 Array = npt.NDArray[np.float64]
 
@@ -41,10 +42,9 @@ def motion_duration(times_s: npt.ArrayLike) -> float:
 def smoothness(times_s: npt.ArrayLike, positions: npt.ArrayLike) -> float | None:
     """Returns the log dimensionless jerk of a motion through joint space; nearer to zero is smoother.
 
-    The formula is -ln(T^3 / v^2 * integral of |jerk|^2 dt), with the duration T and the greatest speed v
-    (Balasubramanian
-    et al., "On the analysis of movement smoothness", 2015). It does not depend on the size or the duration of the
-    motion. The derivatives are differences of positions resampled at equal steps.
+    The formula is -ln(T^3 / v^2 * integral of |jerk|^2 dt), with the duration T and the greatest speed v, from "On the
+    analysis of movement smoothness" (Balasubramanian and others, 2015). It does not depend on the size or the duration
+    of the motion. Between the points the motion is a cubic spline, whose jerk is constant from point to point.
 
     Args:
         times_s: Times of the points, strictly increasing, shape (n,) [s].
@@ -56,16 +56,11 @@ def smoothness(times_s: npt.ArrayLike, positions: npt.ArrayLike) -> float | None
     times, points = np.asarray(times_s, dtype=float), _points(positions)
     if len(times) != len(points):
         raise ValueError(f"there are {len(times)} times for {len(points)} points; give one for each")
-    if len(times) < 5 or motion_duration(times) <= 0.0:
+    if len(times) < 5 or motion_duration(times) <= 0.0 or not np.ptp(points, axis=0).any():
         return None
-    steps = np.linspace(times[0], times[-1], max(len(times), 100))
-    even = np.column_stack([np.interp(steps, times, column) for column in points.T])
-    velocity = np.gradient(even, steps, axis=0, edge_order=2)
-    jerk = np.gradient(np.gradient(velocity, steps, axis=0, edge_order=2), steps, axis=0, edge_order=2)
-    fastest = float(np.linalg.norm(velocity, axis=1).max())
-    total = float(np.trapezoid((jerk**2).sum(axis=1), steps))
-    if fastest <= 0.0 or total <= 0.0:
-        return None
+    spline = CubicSpline(times, points)
+    fastest = float(np.linalg.norm(spline(np.linspace(times[0], times[-1], 4 * len(times)), 1), axis=1).max())
+    total = float((spline(times[:-1], 3) ** 2).sum(axis=1) @ np.diff(times))
     return float(-np.log(motion_duration(times) ** 3 / fastest**2 * total))
 
 

@@ -5,6 +5,7 @@
 |---|---|
 | `trajectory.parquet` | a row a sample: `time_s`, `<joint>/position|velocity|effort|command`, poses of moving objects |
 | `tracking.parquet` | `time_s`, `controller`, `joint`, `desired`, `actual` |
+| `parameters.json` | all parameters of the parameter server |
 | `recording.json` | objects, grasps, and what the components reported |
 
 `time_s` is simulated time since the recording began.
@@ -30,12 +31,20 @@ from modular_framework_benchmark.metrics.measurements import (
 )
 
 TRAJECTORY, TRACKING, RECORDING = "trajectory.parquet", "tracking.parquet", "recording.json"
+PARAMETERS = "parameters.json"
 
 
 def read_recording(folder: Path) -> dict[str, Any]:
     """Returns the contents of `recording.json`; nothing if there is no such file."""
     path = folder / RECORDING
     return dict(json.loads(path.read_text())) if path.is_file() else {}
+
+
+def read_descriptions(folder: Path) -> tuple[str, str]:
+    """Returns the robot's URDF and SRDF, texts; empty where they were not recorded."""
+    path = folder / PARAMETERS
+    parameters = json.loads(path.read_text()) if path.is_file() else {}
+    return str(parameters.get("robot_description", "")), str(parameters.get("robot_description_semantic", ""))
 
 
 def reports_of(recording: Mapping[str, Any]) -> tuple[ComponentReport, ...]:

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Metrics of an episode whose values are known, and a user's own metric."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from modular_framework_benchmark.metrics.measurements import (
+    ComponentReport,
+    EpisodeMeasurements,
+    JointSamples,
+    Motion,
+    ObjectTrack,
+    Shake,
+    TrackingSamples,
+)
+from modular_framework_benchmark.metrics.registry import METRICS, MetricError, find_metric, load_metric, measure
+from modular_framework_benchmark.records.episode import EpisodeStatus, Span
+
+JOINTS = ("pan", "lift")
+TIMES = np.linspace(0.0, 4.0, 401)
+
+
+def planned(succeeded: bool, planning_time_s: float, length: float = 1.0, **figures: float) -> ComponentReport:
+    motion = Motion(JOINTS, np.array([0.0, 1.0, 2.0]), np.array([[0, 0], [length, 0], [length, length]], dtype=float))
+    return ComponentReport(
+        *("planning", "to_grasp", succeeded, "" if succeeded else "no path", 0.0, 0.0, planning_time_s),
+        figures={"planning_time_s": planning_time_s} | figures,
+        motion=motion if succeeded else None,
+    )
+
+
+def turned_track(name: str, offset: tuple[float, float, float], drift_m: float = 0.0) -> ObjectTrack:
+    """A body that turns about the world's z axis and goes up; an offset in its frame, which grows by a drift."""
+    turns = Rotation.from_euler("z", TIMES[:, None])
+    shift = np.array(offset) + drift_m * (TIMES / TIMES[-1])[:, None] * np.array([0.0, 1.0, 0.0])
+    return ObjectTrack(
+        name, TIMES, turns.apply(shift) + 0.1 * TIMES[:, None] * np.array([0.0, 0.0, 1.0]), turns.as_quat()
+    )
+
+
+def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasurements:
+    positions = np.column_stack([TIMES, np.zeros_like(TIMES)])
+    efforts = np.zeros((len(TIMES), 2))
+    efforts[5, 1] = -7.0
+    blank = np.full((len(TIMES), 2), np.nan)
+    moving = (TIMES >= 1.0) & (TIMES <= 3.0)
+    desired = positions + np.where(moving, 0.01, 5.0)[:, None] * np.array([1.0, -1.0])
+    return EpisodeMeasurements(
+        settings={},
+        status=status,
+        states=(Span("state", "A", 0.0, 1.0, "fail", True, "because"), Span("state", "B", 1.0, 2.0, "success")),
+        task_s=12.5,
+        task_wall_s=13.5,
+        reports=(
+            ComponentReport(
+                *("generation", "top_down", True, "", 0.0, 0.5, 0.25),
+                figures={"candidates": 40.0, "checked": 20.0, "reachable": 5.0},
+            ),
+            planned(True, 0.1, 1.0, clearance_m=0.03),
+            planned(False, 5.0),
+            planned(True, 0.3, 2.0, clearance_m=0.02),
+            ComponentReport("execution", "", True, "", 1.0, 3.0, 2.0, motion=Motion(("pan",), TIMES, positions[:, :1])),
+            ComponentReport("execution", "", False, "stopped", 3.5, 3.6, 0.1),
+        ),
+        joints=JointSamples(JOINTS, TIMES, positions, blank, efforts, blank),
+        tracking=(TrackingSamples("arm", JOINTS, TIMES, desired, positions),),
+        objects={"can": turned_track("can", (0.2, 0.0, 0.1), drift_m=0.004)},
+        hand=turned_track("palm", (0.0, 0.0, 0.0)),
+        target="can",
+        grasped_at_s=0.0,
+        held=True,
+        shake=Shake(5.0, 3.5),
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("success", 1.0),
+        ("task_time", 12.5),
+        ("task_wall_time", 13.5),
+        ("failed_states", 1.0),
+        ("generation_time", 0.25),
+        ("generation_success", 1.0),
+        ("candidates", 40.0),
+        ("reachable_share", 0.25),
+        ("planning_time", 0.2),
+        ("planning_success", 2 / 3),
+        ("path_length", 3.0),
+        ("motion_duration", 2.0),
+        ("clearance", 0.02),
+        ("attempts", 3.0),
+        ("execution_time", 2.0),
+        ("execution_success", 0.5),
+        ("tracking_error", 0.01),
+        ("greatest_tracking_error", 0.01),
+        ("executed_length", 2.0),
+        ("greatest_effort", 7.0),
+        ("lift", 0.4),
+        ("slip", 0.004),
+        ("grasp_time", 0.0),
+        ("hold_time", 3.5),
+    ],
+)
+def test_each_metric_of_a_known_episode_has_its_value(name: str, value: float) -> None:
+    assert METRICS[name].measure(episode()) == pytest.approx(value, abs=1e-9)
+
+
+def test_what_was_not_recorded_has_no_value_and_no_metric_raises() -> None:
+    nothing = EpisodeMeasurements(settings={}, status=EpisodeStatus.BROKEN)
+    measured = measure(METRICS, nothing)
+    assert measured.faults == {}
+    assert all(value is None for value in measured.values.values()), measured.values
+
+
+def test_a_failed_episode_has_no_task_time_and_counts_as_no_success() -> None:
+    failed = measure(["success", "task_time"], episode(EpisodeStatus.FAILED))
+    assert failed.values == {"success": 0.0, "task_time": None}
+
+
+def test_every_metric_says_in_its_first_line_what_it_is_and_has_a_unit_or_none() -> None:
+    for name, entry in METRICS.items():
+        assert entry.metric.name == name == entry.measure.__name__
+        assert entry.metric.description.endswith((".", ";")) or "[" in entry.metric.description or ":" in name, name
+        assert len(entry.metric.description) > 20, name
+
+
+def test_an_unknown_metric_is_named_with_the_nearest_one() -> None:
+    with pytest.raises(MetricError, match="no metric 'sucess'; did you mean 'success'"):
+        find_metric("sucess")
+
+
+def test_a_users_metric_is_one_function_in_one_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text("def height(episode):\n    return episode.objects['can'].positions[-1, 2]\n")
+    measured = measure([f"{file}:height", {"function": f"{file}:height", "name": "z"}], episode())
+    assert measured.values == pytest.approx({"height": 0.5, "z": 0.5})
+
+
+def test_a_users_metric_that_raises_costs_its_own_value_only(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text("def bad(episode):\n    return episode.nothing\n")
+    measured = measure([f"{file}:bad", "task_time"], episode())
+    assert measured.values == {"bad": None, "task_time": 12.5}
+    assert "AttributeError" in measured.faults["bad"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reference", "message"),
+    [
+        ("def a(e): pass\n", "mine.py:b", "has no function 'b'; it has a"),
+        ("import nothing_at_all\n", "mine.py:b", "cannot be imported: ModuleNotFoundError"),
+        ("", "other.py:b", "there is no file"),
+        ("", "mine.txt:b", "has not the form FILE.py:FUNCTION"),
+    ],
+)
+def test_a_users_metric_that_cannot_be_loaded_is_explained(
+    tmp_path: Path, text: str, reference: str, message: str
+) -> None:
+    (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(MetricError, match=message):
+        load_metric(str(tmp_path / reference))
+
+
+def test_a_value_that_is_no_number_is_a_fault(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text("def text(episode):\n    return 'much'\n")
+    assert "ValueError" in measure([f"{file}:text"], episode()).faults["text"]
+    assert math.isfinite(measure(["lift"], episode()).values["lift"] or math.nan)
