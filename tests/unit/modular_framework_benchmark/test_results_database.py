@@ -211,7 +211,7 @@ def test_one_database_holds_several_experiments(path: Path) -> None:
         ({"compared": "planner"}, "compared factor 'planner': allowed are grasp_method, object, speed"),
         (
             {"factors": (Factor("grasp_method", METHODS), Factor("Status", ("1",)))},
-            "factor 'Status': the name is taken",
+            "factor 'status': the name is taken",
         ),
     ],
 )

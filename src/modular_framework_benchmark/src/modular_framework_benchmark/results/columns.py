@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from sqlalchemy import Boolean, Column, Connection, Insert, String, inspect
 from sqlalchemy.schema import CreateColumn
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric, MetricKind
 from modular_framework_benchmark.results.errors import DescriptionError
-from modular_framework_benchmark.results.schema import EXPERIMENTS, REAL_NUMBER, RESERVED_COLUMNS, RUNS
+from modular_framework_benchmark.results.schema import ARENA_COLUMNS, EXPERIMENTS, REAL_NUMBER, RESULT_COLUMNS, RUNS
 
 SUCCESS = "success"
 
@@ -21,30 +22,34 @@ def check_names(description: ExperimentDescription) -> None:
     Raises:
         DescriptionError: Says every name that cannot.
     """
+    factors = [factor.name.lower() for factor in description.factors]
+    faults = _metric_faults(description.metrics)
+    taken = {metric.name.lower() for metric in description.metrics} | RESULT_COLUMNS | {SUCCESS}
+    faults += [f"factor {each!r}: the name is taken" for each in factors if each in taken]
+    faults += [f"factor {each!r} is there twice" for each in sorted(set(factors)) if factors.count(each) > 1]
+    if description.compared not in {factor.name for factor in description.factors}:
+        faults.append(f"compared factor {description.compared!r}: allowed are {', '.join(factors) or 'none'}")
+    if faults:
+        raise DescriptionError(
+            f"experiment {description.name!r} cannot be stored: {'; '.join(faults)}; allowed: names that differ in "
+            f"more than case, none of {', '.join(sorted(RESULT_COLUMNS))}, and for metrics none of "
+            f"{', '.join(sorted(ARENA_COLUMNS))}; rename what is named here"
+        )
+
+
+def _metric_faults(metrics: Sequence[Metric]) -> list[str]:
     faults: list[str] = []
-    factors = [factor.name for factor in description.factors]
-    taken = set(RESERVED_COLUMNS)
-    for metric in description.metrics:
+    taken = set(RESULT_COLUMNS | ARENA_COLUMNS)
+    for metric in metrics:
         lower = metric.name.lower()
         if not metric.name.isidentifier():
-            faults.append(f"metric {metric.name!r} is no identifier")
+            faults.append(f"metric {metric.name!r} is no identifier, such as planning_time")
         elif lower in taken:
-            faults.append(f"metric {metric.name!r}: the name is taken (upper and lower case count as one)")
+            faults.append(f"metric {metric.name!r}: the name is taken")
         elif lower == SUCCESS and (metric.name != SUCCESS or metric.kind is not MetricKind.RATE):
             faults.append(f"metric {metric.name!r}: `success` is a rate, in lower case")
         taken.add(lower)
-    faults += [f"factor {name!r}: the name is taken" for name in factors if name.lower() in taken]
-    faults += [
-        f"factor {name!r} is there twice" for name in sorted({each for each in factors if factors.count(each) > 1})
-    ]
-    if description.compared not in factors:
-        faults.append(f"compared factor {description.compared!r}: allowed are {', '.join(factors) or 'none'}")
-    if faults:
-        allowed = "a free name that Python would take as a variable's; taken by the tables: "
-        raise DescriptionError(
-            f"experiment {description.name!r} cannot be stored: {'; '.join(faults)}; "
-            f"allowed: {allowed}{', '.join(sorted(RESERVED_COLUMNS))}; rename what is named here"
-        )
+    return faults
 
 
 def metric_column(metric: Metric) -> Column[bool] | Column[float]:

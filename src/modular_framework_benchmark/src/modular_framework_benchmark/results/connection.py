@@ -59,13 +59,14 @@ def parse_address(target: str | Path) -> DatabaseAddress:
     return DatabaseAddress(str(path), path, None)
 
 
-def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool) -> Engine:
+def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool, busy_timeout_s: float) -> Engine:
     """Makes the engine; connects to nothing yet.
 
     Args:
         address: Where the database is.
         create: Makes the SQLite file if there is none.
         read_only: Refuses every write.
+        busy_timeout_s: How long to wait for another process that writes the SQLite file [s].
 
     Raises:
         DatabaseMissingError: The SQLite file, or the folder it would be made in, is not there.
@@ -83,10 +84,10 @@ def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool) -> E
         raise DatabaseMissingError(
             f"{path}: there is no such file; name a result database, or run the experiment first"
         )
-    return _sqlite_engine(path, create, read_only)
+    return _sqlite_engine(path, create, read_only, busy_timeout_s)
 
 
-def _sqlite_engine(path: Path, create: bool, read_only: bool) -> Engine:
+def _sqlite_engine(path: Path, create: bool, read_only: bool, busy_timeout_s: float) -> Engine:
     """Connections are opened for each use, so that no file handle is shared by threads or forked processes.
 
     A reader too opens the file for writing where it may, for only so is a write undone that a killed process left.
@@ -95,7 +96,7 @@ def _sqlite_engine(path: Path, create: bool, read_only: bool) -> Engine:
 
     def connect() -> sqlite3.Connection:
         connection = sqlite3.connect(
-            uri, uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
+            uri, uri=True, timeout=busy_timeout_s, isolation_level=None, check_same_thread=False
         )
         connection.execute("PRAGMA foreign_keys = ON")
         connection.execute("PRAGMA synchronous = FULL")

@@ -17,14 +17,20 @@ from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import pandas as pd
-from sqlalchemy import Connection, Engine, func, insert, inspect, select
+from sqlalchemy import Connection, Engine, func, insert, inspect, select, update
 from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
 from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results import result_tables
-from modular_framework_benchmark.results.connection import BEGIN, DatabaseAddress, make_engine, parse_address
+from modular_framework_benchmark.results.connection import (
+    BEGIN,
+    BUSY_TIMEOUT_S,
+    DatabaseAddress,
+    make_engine,
+    parse_address,
+)
 from modular_framework_benchmark.results.errors import (
     DatabaseCorruptError,
     RecordNotStoredError,
@@ -73,20 +79,24 @@ class StoredExperiment:
     added: float
 
 
-def open_database(target: str | Path, *, create: bool = False, read_only: bool = False) -> ResultDatabase:
+def open_database(
+    target: str | Path, *, create: bool = False, read_only: bool = False, busy_timeout_s: float = BUSY_TIMEOUT_S
+) -> ResultDatabase:
     """Opens a result database, checks it, and takes in the records that wait beside it.
 
     Args:
         target: Path of a SQLite file, or a URL of SQLAlchemy.
         create: Makes the database if there is none.
         read_only: Writes nothing, and leaves waiting records where they are.
+        busy_timeout_s: How long to wait for another process that writes the SQLite file [s].
 
     Raises:
         StorageError: It is not there, damaged, locked or cannot be written.
         SchemaVersionError: Its tables are those of another version, or of another program.
     """
     address = parse_address(target)
-    database = ResultDatabase(address, make_engine(address, create=create, read_only=read_only))
+    engine = make_engine(address, create=create, read_only=read_only, busy_timeout_s=busy_timeout_s)
+    database = ResultDatabase(address, engine)
     try:
         database.prepare(read_only=read_only)
     except BaseException:
@@ -145,6 +155,7 @@ class ResultDatabase:
                     ],
                 )
             self._check_version(connection)
+            connection.execute(update(SCHEMA).values(version=SCHEMA_VERSION))  # fails now if it cannot be written
         self._take_in_waiting()
 
     def add_experiment(self, description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> int:
@@ -350,7 +361,7 @@ class ResultDatabase:
         if self._address.path is None:
             return
         with self._reading() as connection:
-            found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one()
+            found = " ".join(connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one().split())
         if found != "ok":
             raise DatabaseCorruptError(
                 f"{self.label}: it is damaged ({found}); restore a copy, or save what can be read with sqlite3 .recover"

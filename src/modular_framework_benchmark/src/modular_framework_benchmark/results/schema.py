@@ -143,8 +143,9 @@ SNAPSHOT_VALUES = Table(
 )
 SCHEMA = Table("schema_version", METADATA, Column("version", Integer, nullable=False))
 
-RESERVED_COLUMNS = frozenset(
-    {column.name for table in (RUNS, RECORDS) for column in table.columns}
-    | {"number", "key", "trial", "seed", "runid", "experiment", "planner", "version"}
-) - {"success"}
-"""Names (in lower case) that no metric may have; a rate called `success` is the column `success`."""
+RESULT_COLUMNS = frozenset(
+    {"number", "trial", "seed", "status", "outcome", "cause", "begun", "wall_s", "simulated_s", "folder", "worker"}
+)
+"""Columns of the table of results that every experiment has: no factor and no metric may have these names."""
+ARENA_COLUMNS = frozenset({"id", "experimentid", "plannerid", "experiment", "planner", "version"})
+"""Columns that Planner Arena joins to every run: no metric may have these names."""
