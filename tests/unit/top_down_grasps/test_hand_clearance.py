@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-import math
-import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,39 +22,14 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
 from modular_framework_core.grasp_generation.surface_points import Surface
 from top_down_grasps.top_down import TopDownGrasp, TopDownSettings, top_down_grasps
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from two_finger_hands import GRIPPERS, PARALLEL_JAWS, Hand, jaws  # noqa: E402
+
 coal = pytest.importorskip("coal")
 pinocchio = pytest.importorskip("pinocchio")
 
 UP = np.array([0.0, 0.0, 1.0])
 SAMPLING_M = 0.003  # points on a surface are up to 4 mm apart, and a round side of 24 corners is 0.1 mm too wide
-PARALLEL_JAWS = """<robot name="jaws">
-  <link name="base"/>
-  <link name="housing"><collision><origin xyz="0 0 0.03"/><geometry><{housing}/></geometry></collision></link>
-  <joint name="mount" type="fixed"><parent link="base"/><child link="housing"/></joint>
-  <link name="left"><collision><origin xyz="0 0 0.095"/><geometry><box size="0.01 0.02 0.07"/></geometry></collision>
-  </link>
-  <joint name="slide" type="prismatic"><parent link="housing"/><child link="left"/><axis xyz="1 0 0"/>
-    <origin xyz="0.005 0 0"/><limit lower="0" upper="0.05" effort="1" velocity="1"/></joint>
-  <link name="right"><collision><origin xyz="0 0 0.095"/><geometry><box size="0.01 0.02 0.07"/></geometry></collision>
-  </link>
-  <joint name="slide_2" type="prismatic"><parent link="housing"/><child link="right"/><axis xyz="-1 0 0"/>
-    <origin xyz="-0.005 0 0"/><limit lower="0" upper="0.05" effort="1" velocity="1"/><mimic joint="slide"/></joint>
-  <link name="tool"/>
-  <joint name="tool_mount" type="fixed"><parent link="housing"/><child link="tool"/><origin xyz="0 0 0.115"/></joint>
-</robot>"""
-EZGRIPPER_XACRO = (
-    Path(__file__).parents[3] / "src" / "robots" / "ur5_ezgripper_robot" / "urdf" / "ur5_with_ezgripper.urdf.xacro"
-)
-
-
-def ezgripper() -> str:
-    from xacro_rospkg import expand
-
-    return str(expand(EZGRIPPER_XACRO, {}))
-
-
-def jaws() -> str:
-    return PARALLEL_JAWS.format(housing='cylinder radius="0.05" length="0.06"')
 
 
 @dataclass(frozen=True)
@@ -85,65 +59,27 @@ def block(width: float, depth: float, height: float) -> Thing:
     )
 
 
-class Hand:
-    """The hand as Pinocchio and Coal see it; the meshes of the arm are left out."""
+def clearances(hand: Hand, grasp: TopDownGrasp, height: float, joint: float, thing: Thing) -> dict[str, float]:
+    """Distance of each shape of the hand [m] from the object, the hand this far above the grasp."""
+    x, y, z, w = grasp.quaternion_xyzw
+    rotation = pinocchio.Quaternion(w, x, y, z).matrix()
+    shapes = hand.shapes(np.array(grasp.position) + height * UP, rotation, joint)
+    return {name: distance(shape, pose, thing) for name, (shape, pose) in shapes.items()}
 
-    def __init__(self, urdf: str, joint: str, frame: str) -> None:
-        urdf = re.sub(r"<collision>((?!</collision>).)*<mesh .*?</collision>", "", urdf, flags=re.DOTALL)
-        self._model = pinocchio.buildModelFromXML(urdf)
-        self._geometry = pinocchio.buildGeomFromUrdfString(self._model, urdf, pinocchio.GeometryType.COLLISION)
-        self._data, self._frame = self._model.createData(), self._model.getFrameId(frame)
-        self._joint = joint
 
-    def clearances(self, grasp: TopDownGrasp, height: float, joint: float, thing: Thing) -> dict[str, float]:
-        """Distance of each shape of the hand [m] from the object, the hand this far above the grasp."""
-        values = pinocchio.neutral(self._model)
-        self._set(values, self._joint, joint)
-        for follower, rule in FOLLOWERS.get(self._joint, {}).items():
-            self._set(values, follower, rule(joint))
-        pinocchio.framesForwardKinematics(self._model, self._data, values)
-        x, y, z, w = grasp.quaternion_xyzw
-        wanted = pinocchio.SE3(pinocchio.Quaternion(w, x, y, z).matrix(), np.array(grasp.position) + height * UP)
-        to_world = wanted * self._data.oMf[self._frame].inverse()
-        found: dict[str, float] = {}
-        for shape in self._geometry.geometryObjects:
-            name = self._model.frames[shape.parentFrame].name
-            if any(word in name for word in ("finger", "palm", "left", "right", "housing")):
-                pose = to_world * self._data.oMi[shape.parentJoint] * shape.placement
-                found[shape.name] = self._distance(shape.geometry, pose, thing)
-        return found
-
-    def _set(self, values: Any, name: str, value: float) -> None:
-        values[self._model.joints[self._model.getJointId(name)].idx_q] = value
-
-    @staticmethod
-    def _distance(shape: Any, pose: Any, thing: Thing) -> float:
-        result = coal.DistanceResult()
-        return float(
-            coal.distance(
-                shape,
-                coal.Transform3s(pose.rotation, pose.translation),
-                thing.shape,
-                coal.Transform3s(thing.pose.rotation, thing.pose.translation),
-                coal.DistanceRequest(),
-                result,
-            )
+def distance(shape: Any, pose: Any, thing: Thing) -> float:
+    return float(
+        coal.distance(
+            shape,
+            coal.Transform3s(pose.rotation, pose.translation),
+            thing.shape,
+            coal.Transform3s(thing.pose.rotation, thing.pose.translation),
+            coal.DistanceRequest(),
+            coal.DistanceResult(),
         )
+    )
 
 
-def _straight(angle: float) -> float:
-    return math.pi / 2 - angle
-
-
-FOLLOWERS: dict[str, dict[str, Callable[[float], float]]] = {
-    "ezgripper_knuckle_palm_L1_1": {
-        "ezgripper_knuckle_palm_L1_2": float,
-        "ezgripper_knuckle_L1_L2_1": _straight,
-        "ezgripper_knuckle_L1_L2_2": _straight,
-    },
-    "slide": {"slide_2": float},
-}
-GRIPPERS = [(ezgripper, "ezgripper_knuckle_palm_L1_1", "eg_manipulator"), (jaws, "slide", "tool")]
 THINGS = {
     "can": cylinder(0.066, 0.115),
     "tube": cylinder(0.04, 0.14),
@@ -162,11 +98,11 @@ def test_nothing_but_the_pads_comes_near_the_object(urdf: Callable[[], str], joi
     assert grasps, f"no grasp of {name}"
     for grasp in grasps[:6]:
         for height in np.linspace(0.0, settings.approach_distance_m, 6):
-            room = hand.clearances(grasp, float(height), grasp.pregrasp_joint, thing)
+            room = clearances(hand, grasp, float(height), grasp.pregrasp_joint, thing)
             assert min(room.values()) > settings.finger_clearance_m - SAMPLING_M, (name, grasp, height, room)
         touch = gripper.position_for(grasp.width + 0.001)
         for closing in np.linspace(grasp.pregrasp_joint, touch, 6):
-            room = hand.clearances(grasp, 0.0, float(closing), thing)
+            room = clearances(hand, grasp, 0.0, float(closing), thing)
             assert min(room.values()) > 0.0, (name, grasp, closing, room)
 
 

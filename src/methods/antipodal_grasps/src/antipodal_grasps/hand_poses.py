@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Places a two-finger hand on a pair of contacts: from which side, how deep, and how wide open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from antipodal_grasps.contact_pairs import ContactPair
+from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
+from modular_framework_core.grasp_generation.hand_clearance import (
+    CONTACT_DEPTH_M,
+    HEIGHT_ROUNDS,
+    HEIGHT_TOLERANCE_M,
+    Passage,
+    highest_points,
+    lowest_height,
+)
+from modular_framework_core.grasp_generation.surface_points import Surface
+
+Array = npt.NDArray[np.float64]
+
+DOWN = np.array([0.0, 0.0, -1.0])
+UPRIGHT = 1e-3
+LEAST_FACING = 0.3
+LEVEL = 0.05
+"""An approach of which less than this share leads down does not lift the hand when it is drawn back."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandSettings:
+    """Limits of a usable pose of the hand.
+
+    Attributes:
+        approach_step_rad: Step between approach directions around a closing axis [rad].
+        max_approach_angle_rad: Greatest angle between the approach and straight down [rad].
+        finger_clearance_m: Room between the hand and the object on each side when the hand advances [m].
+        min_finger_clearance_m: The least such room, with which a hand that opens no wider advances [m].
+        tip_clearance_m: Smallest distance of the hand from the support [m].
+        min_pad_overlap_m: Least length of the pads, along the approach, that must touch [m].
+        cone_cosine: Least cosine between the line of the contacts and the normals there: the friction cone.
+    """
+
+    approach_step_rad: float = math.radians(30.0)
+    max_approach_angle_rad: float = math.radians(95.0)
+    finger_clearance_m: float = 0.012
+    min_finger_clearance_m: float = 0.003
+    tip_clearance_m: float = 0.006
+    min_pad_overlap_m: float = 0.008
+    cone_cosine: float = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class HandPose:
+    """A pose at which the pads close on an object.
+
+    Attributes:
+        position: (3,) the grasp frame [m].
+        axes: (3, 3) axes of the hand, as columns: closing, across and approach.
+        contacts: (2, 3) middle of what each pad touches [m].
+        alignment: The lesser cosine between the line of the contacts and the surface's normal at each.
+        width: Distance between the pads when they touch [m].
+        opening: Free width between the pads while the hand advances [m].
+        overlap: Length of the pads, along the approach, that touches [m].
+    """
+
+    position: Array
+    axes: Array
+    contacts: Array
+    alignment: float
+    width: float
+    opening: float
+    overlap: float
+
+    @property
+    def approach_angle(self) -> float:
+        """Angle between the approach and straight down [rad]."""
+        return math.acos(float(np.clip(self.axes[:, 2] @ DOWN, -1.0, 1.0)))
+
+
+def hand_axes_for(axis: Array, settings: HandSettings) -> Iterator[Array]:
+    """Yields the axes of the hand (3, 3) for a closing axis (3,), the most downward approach first."""
+    across = np.cross(axis, DOWN)
+    if np.linalg.norm(across) < UPRIGHT:
+        across = np.array([1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    steepest = np.cross(across, axis)  # of the directions at right angles to the axis, the one that leads down most
+    count = int(math.pi / settings.approach_step_rad)
+    angles = [0.0, *(sign * step * settings.approach_step_rad for step in range(1, count + 1) for sign in (1.0, -1.0))]
+    for angle in angles:
+        if angle <= -math.pi + 1e-6:
+            continue
+        approach = math.cos(angle) * steepest + math.sin(angle) * across
+        if approach @ DOWN >= math.cos(settings.max_approach_angle_rad):
+            yield np.column_stack([axis, np.cross(approach, axis), approach])
+
+
+def place_hand(
+    pair: ContactPair,
+    axes: Array,
+    surface: Surface,
+    support_z: float,
+    gripper: GripperGeometry,
+    settings: HandSettings,
+) -> HandPose | None:
+    """Finds how far the hand can advance so that the pads close on a pair of contacts.
+
+    The pads are to touch around the pair, with nothing else of the hand near the object on the way or while it closes,
+    and nothing of the hand near the support. How wide the hand must open depends on how deep it goes, and how deep it
+    can go on how wide it is: a few rounds settle both, since the hand is only ever drawn back.
+
+    Args:
+        pair: Where the pads are to touch.
+        axes: (3, 3) axes of the hand, as columns: closing, across and approach.
+        surface: Points on the object.
+        support_z: Height of what the object stands on [m].
+        gripper: Geometry of the hand.
+        settings: What counts as usable.
+
+    Returns:
+        The pose; None when there is none.
+    """
+    view = _View.along(pair, axes, surface, gripper, settings)
+    pad_offset = gripper.pad_centre_at(pair.width)
+    farthest = pad_offset + gripper.pad_half_height - settings.min_pad_overlap_m / 2
+    height = pad_offset
+    for _ in range(HEIGHT_ROUNDS):
+        hold = _hold_at(view, height, pad_offset, gripper, settings)
+        if hold is None:
+            return None
+        needed = 2 * (hold.passage.half_width + hold.passage.clearance)
+        if _height_over_support(pair, axes, hold, needed, support_z, gripper, settings) > farthest:
+            return None
+        lowest, opening = lowest_height(view.top - [hold.middle, 0.0, 0.0], hold.passage, height, gripper)
+        lowest = max(lowest, _height_over_support(pair, axes, hold, opening, support_z, gripper, settings))
+        if lowest > farthest:
+            return None
+        if lowest <= height + HEIGHT_TOLERANCE_M:
+            return _pose(pair, axes, height, opening, hold, settings)
+        height = lowest
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    """The object as the hand sees it, from the middle of the pair: x closing, y across, z against the approach.
+
+    Attributes:
+        points: (n, 3) points that can come between the pads [m].
+        normals: (n, 3) outward normals there.
+        top: (m, 3) of all points, those that the hand meets first [m].
+    """
+
+    points: Array
+    normals: Array
+    top: Array
+
+    @classmethod
+    def along(
+        cls, pair: ContactPair, axes: Array, surface: Surface, gripper: GripperGeometry, settings: HandSettings
+    ) -> _View:
+        frame = axes * [1.0, -1.0, -1.0]
+        points = (surface.points - pair.middle) @ frame
+        between = (np.abs(points[:, 1]) <= gripper.pad_half_width) & (
+            np.abs(points[:, 0]) <= pair.width / 2 + settings.finger_clearance_m
+        )
+        return cls(points[between], surface.normals[between] @ frame, highest_points(points) * [1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class _Hold:
+    """What the pads touch at one height: the middle along x, each side's centre and normal, and what passes."""
+
+    middle: float
+    low: Array
+    high: Array
+    alignment: float
+    overlap: float
+    passage: Passage
+
+
+def _hold_at(
+    view: _View, height: float, pad_offset: float, gripper: GripperGeometry, settings: HandSettings
+) -> _Hold | None:
+    pad_z = height - pad_offset
+    points = view.points
+    touching = np.abs(points[:, 2] - pad_z) <= gripper.pad_half_height
+    if not touching.any():
+        return None
+    x = points[touching, 0]
+    middle = float(x.min() + x.max()) / 2
+    sides = [
+        _side(points[touching], view.normals[touching], x <= x.min() + CONTACT_DEPTH_M, -1.0),
+        _side(points[touching], view.normals[touching], x >= x.max() - CONTACT_DEPTH_M, 1.0),
+    ]
+    if sides[0] is None or sides[1] is None:
+        return None
+    (low, low_normal), (high, high_normal) = sides[0], sides[1]
+    line = (high - low) / np.linalg.norm(high - low)
+    alignment = min(float(-low_normal @ line), float(high_normal @ line))
+    z = points[touching, 2]
+    overlap = float(z.max() - z.min())
+    if alignment < settings.cone_cosine or overlap < settings.min_pad_overlap_m:
+        return None
+    passed = points[points[:, 2] >= pad_z - gripper.pad_half_height, 0]
+    half_width = max(float(passed.max()) - middle, middle - float(passed.min()))
+    clearance = min(settings.finger_clearance_m, gripper.max_opening / 2 - half_width)
+    if clearance < min(settings.min_finger_clearance_m, settings.finger_clearance_m):
+        return None
+    return _Hold(middle, low, high, alignment, overlap, Passage(float(np.ptp(x)), half_width, clearance))
+
+
+def _side(points: Array, normals: Array, outermost: npt.NDArray[np.bool_], sign: float) -> tuple[Array, Array] | None:
+    """Returns the centre and the mean normal of the outermost points of a side that face the pad."""
+    facing = outermost & (sign * normals[:, 0] > LEAST_FACING)
+    if not facing.any():
+        return None
+    normal = normals[facing].mean(axis=0)
+    low, high = points[facing].min(axis=0), points[facing].max(axis=0)
+    return (low + high) / 2, normal / np.linalg.norm(normal)
+
+
+def _height_over_support(
+    pair: ContactPair,
+    axes: Array,
+    hold: _Hold,
+    opening: float,
+    support_z: float,
+    gripper: GripperGeometry,
+    settings: HandSettings,
+) -> float:
+    """Returns the least height of the grasp frame, against the approach, at which it keeps off the support [m]."""
+    samples = np.flatnonzero((gripper.openings >= hold.passage.width) & (gripper.openings <= opening))
+    samples = samples if len(samples) else np.array([int(np.argmin(np.abs(gripper.openings - opening)))])
+    reach = min(float((part.corners[samples] @ axes[2]).min()) for part in gripper.parts)
+    missing = support_z + settings.tip_clearance_m - (float(pair.middle[2] + hold.middle * axes[2, 0]) + reach)
+    lift = -float(axes[2, 2])
+    if lift > LEVEL:
+        return missing / lift
+    return -math.inf if missing + max(0.0, -lift) * gripper.max_tip <= 0.0 else math.inf
+
+
+def _pose(
+    pair: ContactPair, axes: Array, height: float, opening: float, hold: _Hold, settings: HandSettings
+) -> HandPose:
+    frame = axes * [1.0, -1.0, -1.0]
+    position = pair.middle + frame @ [hold.middle, 0.0, height]
+    contacts = pair.middle + np.array([hold.low, hold.high]) @ frame.T
+    return HandPose(position, axes, contacts, hold.alignment, hold.passage.width, opening, hold.overlap)
