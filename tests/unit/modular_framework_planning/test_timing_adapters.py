@@ -76,7 +76,8 @@ def planned(
             scene,
             GROUP,
             (JointGoal(dict(zip(joints, GOAL, strict=True))),),
-            **{"velocity_scaling": 1.0, "acceleration_scaling": 1.0, **request},
+            # a slow motion is long to check on a busy machine
+            **{"velocity_scaling": 1.0, "acceleration_scaling": 1.0, "allowed_time_s": 60.0, **request},
         )
     )
 

@@ -92,34 +92,30 @@ class UnknownShape:
 Shape = Box | Sphere | Cylinder | Capsule | MeshFile | UnknownShape
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UrdfElement:
-    """Base of what is an element of the description; `line` is where it begins."""
-
-    line: int
-
-
 @dataclass(frozen=True, slots=True)
-class PlacedShapes(UrdfElement):
+class PlacedShapes:
     """A <visual> or <collision>: its shapes (one, in a correct description), and their pose in the link."""
 
     shapes: tuple[Shape, ...]
     origin: Origin
+    line: int
 
 
 @dataclass(frozen=True, slots=True)
-class Link(UrdfElement):
+class Link:
     """A link.
 
     Attributes:
         name: of the link.
         visuals: its <visual> elements.
         collisions: its <collision> elements.
+        line: of the description.
     """
 
     name: str
     visuals: tuple[PlacedShapes, ...]
     collisions: tuple[PlacedShapes, ...]
+    line: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,8 +123,7 @@ class Limit:
     """A <limit>; None is not given.
 
     Attributes:
-        lower: the least position [rad or m].
-        upper: the greatest position [rad or m].
+        lower, upper: positions [rad or m].
         effort: the largest [N m or N].
         velocity: the largest [rad/s or m/s].
     """
@@ -150,7 +145,7 @@ class SafetyController:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint(UrdfElement):
+class Joint:
     """A joint.
 
     Attributes:
@@ -163,6 +158,7 @@ class Joint(UrdfElement):
         limit: None without the element.
         safety: None without the element.
         mimic: the joint it follows directly; None when it follows none.
+        line: of the description.
     """
 
     name: str
@@ -174,6 +170,7 @@ class Joint(UrdfElement):
     limit: Limit | None
     safety: SafetyController | None
     mimic: Mimic | None
+    line: int
 
     @property
     def movable(self) -> bool:
@@ -189,7 +186,7 @@ class LocatedText(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class TransmissionPart(UrdfElement):
+class TransmissionPart:
     """A <joint> or <actuator> of a transmission; None is not given."""
 
     tag: str
@@ -198,16 +195,18 @@ class TransmissionPart(UrdfElement):
     reduction: LocatedText | None
     offset: LocatedText | None
     interfaces: tuple[LocatedText, ...]
+    line: int
 
 
 @dataclass(frozen=True, slots=True)
-class Transmission(UrdfElement):
+class Transmission:
     """A <transmission>, in the words of the file."""
 
     name: str
     kind: str
     joints: tuple[TransmissionPart, ...]
     actuators: tuple[TransmissionPart, ...]
+    line: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,12 @@ def planning_time(episode: EpisodeMeasurements) -> float | None:
     )
 
 
+def search_time(episode: EpisodeMeasurements) -> float | None:
+    """Mean time until a path was found, before it was shortened, timed and checked, where the planner says so [s]."""
+    reports = episode.of_component("planning")
+    return _mean([report.figures["search_time_s"] for report in reports if "search_time_s" in report.figures])
+
+
 def planning_success(episode: EpisodeMeasurements) -> float | None:
     """Share of the requests for plans that gave a motion, 0 to 1."""
     reports = episode.of_component("planning")

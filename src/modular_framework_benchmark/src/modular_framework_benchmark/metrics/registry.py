@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from modular_framework_benchmark.metrics import execution, generation, grasp, planning, task
+from modular_framework_benchmark.metrics import execution, generation, grasp, kinematics, planning, task
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 
@@ -56,12 +56,18 @@ _ALL = (
     _registered(generation.candidates, "generation", _VALUE, _HIGHER),
     _registered(generation.reachable_share, "generation", _VALUE, _HIGHER),
     _registered(planning.planning_time, "planning", _TIME, _LOWER, "s"),
+    _registered(planning.search_time, "planning", _TIME, _LOWER, "s"),
     _registered(planning.planning_success, "planning", _VALUE, _HIGHER),
     _registered(planning.path_length, "planning", _VALUE, _LOWER, "rad"),
     _registered(planning.motion_duration, "planning", _TIME, _LOWER, "s"),
     _registered(planning.smoothness, "planning", _VALUE, _HIGHER),
     _registered(planning.clearance, "planning", _VALUE, _HIGHER, "m"),
     _registered(planning.attempts, "planning", _VALUE, _LOWER),
+    _registered(kinematics.solved_share, "kinematics", _VALUE, _HIGHER),
+    _registered(kinematics.solving_time, "kinematics", _TIME, _LOWER, "s"),
+    _registered(kinematics.solutions, "kinematics", _VALUE, _HIGHER),
+    _registered(kinematics.position_error, "kinematics", _VALUE, _LOWER, "m"),
+    _registered(kinematics.rotation_error, "kinematics", _VALUE, _LOWER, "rad"),
     _registered(execution.execution_time, "execution", _TIME, _LOWER, "s"),
     _registered(execution.execution_success, "execution", _VALUE, _HIGHER),
     _registered(execution.tracking_error, "execution", _VALUE, _LOWER, "rad"),

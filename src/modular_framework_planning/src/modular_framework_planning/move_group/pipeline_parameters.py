@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import rospy
@@ -14,14 +14,13 @@ from modular_framework_planning.errors import ErrorCode, ModelError, PlanningErr
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.move_group.robot_parameters import load_planning_limits
 from modular_framework_planning.planning_interface.planning_request import (
-    PipelineSettings,
     PlanningAnswer,
     PlanningRequest,
     SamplingSettings,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
-from modular_framework_planning.planning_pipeline.plugins import DEFAULT_ADAPTERS, DEFAULT_PLANNER
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, read_pipeline_spec
+from modular_framework_planning.planning_pipeline.plugins import DEFAULT_PLANNER
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -106,24 +105,6 @@ def pipeline_parameters() -> tuple[dict[str, dict[str, Any]], str]:
     return pipelines, default
 
 
-def pipeline_settings(parameters: Mapping[str, Any]) -> PipelineSettings:
-    """Reads the settings of one pipeline; its own value comes before the node's, and that before the robot's."""
-    planning = load_planning_limits()
-    known = {item.name for item in fields(PipelineSettings)}
-    values: dict[str, Any] = {}
-    for source in (planning, rospy.get_param("~", {}) or {}, parameters):
-        for key, value in source.items():
-            if key in known and isinstance(value, int | float) and not isinstance(value, bool):
-                values[key] = value
-    values["planner_configs"] = {
-        name: item for name, item in (parameters.get("planner_configs") or {}).items() if isinstance(item, dict)
-    }
-    values["groups"] = {
-        name: item for name, item in parameters.items() if isinstance(item, dict) and name != "planner_configs"
-    }
-    return PipelineSettings(**values, parameters=parameters, robot_planning=planning)
-
-
 def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_detector: str) -> PipelineSet:
     """Builds every pipeline; one that cannot be built is left out, with its reason in the log.
 
@@ -169,15 +150,8 @@ def _start(seeded: SeededPlanning) -> None:
 
 
 def _spec(name: str, parameters: Mapping[str, Any], collision_detector: str) -> PipelineSpec:
-    given = parameters.get("request_adapters")
-    adapters = DEFAULT_ADAPTERS if given is None else " ".join(given) if isinstance(given, list) else str(given)
-    return PipelineSpec(
-        name,
-        str(parameters.get("planning_plugin") or DEFAULT_PLANNER),
-        adapters,
-        pipeline_settings(parameters),
-        collision_detector,
-    )
+    node = rospy.get_param("~", {}) or {}
+    return read_pipeline_spec(name, parameters, load_planning_limits(), node, collision_detector)
 
 
 def _build(spec: PipelineSpec, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.collision_detectors import (
@@ -49,3 +51,41 @@ class PipelineSpec:
             self.name,
             collision_detector(self.collision_detector),
         )
+
+
+def read_pipeline_spec(
+    name: str,
+    parameters: Mapping[str, Any],
+    planning: Mapping[str, Any],
+    node: Mapping[str, Any],
+    collision_detector: str = DEFAULT_COLLISION_DETECTOR,
+) -> PipelineSpec:
+    """Reads a pipeline's specification; its own value comes before the node's, and that before the robot's.
+
+    Args:
+        name: what `pipeline_id` calls it.
+        parameters: of the pipeline, as in ompl_planning.yaml.
+        planning: robot_description_planning.
+        node: parameters of the node that plans.
+        collision_detector: name of the collision checker.
+    """
+    known = {item.name for item in fields(PipelineSettings)}
+    values: dict[str, Any] = {}
+    for source in (planning, node, parameters):
+        for key, value in source.items():
+            if key in known and isinstance(value, int | float) and not isinstance(value, bool):
+                values[key] = value
+    values["planner_configs"] = {
+        key: item for key, item in (parameters.get("planner_configs") or {}).items() if isinstance(item, dict)
+    }
+    values["groups"] = {
+        key: item for key, item in parameters.items() if isinstance(item, dict) and key != "planner_configs"
+    }
+    given = parameters.get("request_adapters")
+    return PipelineSpec(
+        name,
+        str(parameters.get("planning_plugin") or DEFAULT_PLANNER),
+        DEFAULT_ADAPTERS if given is None else " ".join(given) if isinstance(given, list) else str(given),
+        PipelineSettings(**values, parameters=parameters, robot_planning=planning),
+        collision_detector,
+    )

@@ -25,13 +25,7 @@ OTHER, CHECKED = "Other", "checked"
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A position of a named state on the bar of a joint.
-
-    Attributes:
-        state: "group state".
-        position: [rad or m].
-        percent: place on the scale [%].
-    """
+    """A position of a named state on the bar of a joint."""
 
     state: str
     position: float
@@ -70,15 +64,7 @@ class JointRow:
 
 @dataclass(frozen=True, slots=True)
 class GroupRow:
-    """A planning group.
-
-    Attributes:
-        ends: its chains and the groups it is made of, for a reader.
-        active: joints a planner moves.
-        others: its further joints, sorted.
-        solver: of kinematics.yaml; empty when none is given.
-        states: names of its states.
-    """
+    """A planning group."""
 
     name: str
     ends: str
@@ -90,12 +76,7 @@ class GroupRow:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What is done with two links.
-
-    Attributes:
-        kind: one of REASONS, OTHER, CHECKED; empty for a link and itself.
-        text: the same for a reader, with the links' names.
-    """
+    """What is done with two links: one of REASONS, OTHER, CHECKED; empty for a link and itself."""
 
     kind: str
     text: str

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""ROS parameters that an episode sets, for modes that have no parameter server."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from modular_framework_benchmark.modes.errors import ModeError
+
+
+def parameters_below(parameters: Mapping[str, Any], parents: Sequence[str]) -> dict[str, Any]:
+    """Returns parameters by their names below a parent, nested where a name has slashes.
+
+    Args:
+        parameters: Values by whole name, such as `/move_group/planner_configs/RRTConnect/range`.
+        parents: Whole names with a slash at the end that a parameter may lie below; the longest that fits counts.
+
+    Raises:
+        ModeError: One lies below none of them, so it would have no effect.
+    """
+    result: dict[str, Any] = {}
+    for name, value in parameters.items():
+        fitting = [parent for parent in parents if name.startswith(parent)]
+        if not fitting:
+            raise ModeError(
+                f"parameter '{name}' has no effect in this mode; allowed are names below {' and '.join(parents)}"
+            )
+        *path, last = name.removeprefix(max(fitting, key=len)).split("/")
+        inner = result
+        for part in path:
+            inner = inner.setdefault(part, {})
+        inner[last] = value
+    return result
+
+
+def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns mappings merged key by key, at every depth; values of `changes` win."""
+    result = dict(base)
+    for key, value in changes.items():
+        old = result.get(key)
+        result[key] = merged(old, value) if isinstance(old, Mapping) and isinstance(value, Mapping) else value
+    return result

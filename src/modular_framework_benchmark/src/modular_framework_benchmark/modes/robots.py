@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot of the modes without simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot and its planning parameters.
+
+    Attributes:
+        model: Joints, groups, frames, geometry.
+        kinematics: Settings of inverse kinematics, by group.
+        planning: `robot_description_planning`: limits and default scaling factors.
+        pipelines: Parameters of each planning pipeline, by its name.
+    """
+
+    model: RobotModel
+    kinematics: Mapping[str, KinematicsSettings] = field(default_factory=dict)
+    planning: Mapping[str, Any] = field(default_factory=dict)
+    pipelines: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def solvers(self) -> KinematicsPool:
+        """Returns the inverse kinematics of its groups."""
+        return KinematicsPool(self.model, self.kinematics)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs inverse kinematics on random reachable poses of a robot, without simulation and without a ROS master.
+
+A pose is that of random joint values within bounds, so it can be reached; the search starts from the robot's default
+state, so the answer cannot be read off the seed. Each solution is checked by forward kinematics (Pinocchio).
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from modular_framework_benchmark.metrics.measurements import ComponentReport
+from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_benchmark.modes.measured_record import Stopwatch, broken_record, measured_record
+from modular_framework_benchmark.modes.parameters import parameters_below
+from modular_framework_benchmark.modes.robots import Robot
+from modular_framework_benchmark.modes.ros_robots import load_robot
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings, settings_from
+from modular_framework_planning.robot_model.robot_model import JointGroup
+
+POSITION_TOLERANCE_M = 1.0e-4
+ROTATION_TOLERANCE_RAD = 1.0e-3
+
+
+@dataclass(frozen=True, slots=True)
+class _PoseResult:
+    """What one pose gave; errors are those of the nearest solution, infinite without one."""
+
+    time_s: float
+    solutions: int
+    position_error_m: float
+    rotation_error_rad: float
+
+    @property
+    def is_solved(self) -> bool:
+        return self.position_error_m < POSITION_TOLERANCE_M and self.rotation_error_rad < ROTATION_TOLERANCE_RAD
+
+
+class KinematicsEpisodeRunner:
+    """Runs episodes of the mode `kinematics`; belongs to one process."""
+
+    def __init__(self) -> None:
+        """Starts nothing: robots are loaded for the first episode that needs them."""
+        self._robots: dict[str, Robot] = {}
+        self._solvers: dict[str, InverseKinematics] = {}
+
+    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
+        """Solves the poses of one trial.
+
+        Args:
+            spec: What to run; `docs/experiments.md` has the settings of the mode.
+            folder: Folder of the episode; nothing is written there, the figures are all there is.
+        """
+        watch = Stopwatch()
+        try:
+            robot, solver = self._prepare(spec.settings)
+            started_s = watch.elapsed_s()
+            results = _solve_poses(robot, solver, spec)
+        except (ModeError, ModelError, PlanningError) as error:
+            return broken_record(spec, str(error), watch)
+        unsolved, ended_s = [number for number, result in enumerate(results) if not result.is_solved], watch.elapsed_s()
+        report = ComponentReport(
+            component="kinematics",
+            name=solver.group.name,
+            succeeded=not unsolved,
+            reason=f"{len(unsolved)} of {len(results)} poses not solved, first number {unsolved[0]}"
+            if unsolved
+            else "",
+            started_s=started_s,
+            ended_s=ended_s,
+            wall_s=ended_s - started_s,
+            figures=_figures(results),
+        )
+        status = EpisodeStatus.FAILED if unsolved else EpisodeStatus.SUCCEEDED
+        return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)
+
+    def close(self) -> None:
+        """Ends nothing: there are no processes."""
+
+    def _prepare(self, settings: Mapping[str, Any]) -> tuple[Robot, InverseKinematics]:
+        robot_key = json.dumps(settings["robot"], sort_keys=True)
+        if robot_key not in self._robots:
+            self._robots[robot_key] = load_robot(settings["robot"])
+        robot = self._robots[robot_key]
+        keys = ("robot", "group", "solver", "timeout", "parameters")
+        key = json.dumps([settings.get(name) for name in keys], sort_keys=True)
+        if key not in self._solvers:
+            group = robot.model.group(str(settings["group"]))
+            if not group.is_chain:
+                chains = ", ".join(name for name, item in robot.model.groups.items() if item.is_chain)
+                raise ModeError(f"group '{group.name}' is no chain; inverse kinematics has {chains or 'none'}")
+            solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
+            solver.solutions(group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _home(robot))
+            self._solvers[key] = solver
+        return robot, self._solvers[key]
+
+
+def _solver_settings(robot: Robot, settings: Mapping[str, Any]) -> KinematicsSettings:
+    group = str(settings["group"])
+    result = robot.kinematics.get(group, KinematicsSettings())
+    parents = (f"/robot_description_kinematics/{group}/",)
+    given = parameters_below(settings.get("parameters") or {}, parents)
+    if given:
+        result = settings_from({group: {"kinematics_solver": result.solver, **given}})[group]
+    return replace(result, solver=str(settings["solver"])) if settings.get("solver") else result
+
+
+def _home(robot: Robot) -> Array:
+    return robot.model.default_positions()
+
+
+def _reachable_pose(robot: Robot, group: JointGroup, generator: np.random.Generator) -> Transform:
+    """Returns the tip's pose at random joint values, at most one turn from zero."""
+    model, positions = robot.model, _home(robot)
+    lower, upper = np.maximum(model.lower[group.indices], -np.pi), np.minimum(model.upper[group.indices], np.pi)
+    positions[group.indices] = generator.uniform(lower, upper)
+    return model.link_transforms(model.with_mimics(positions))[group.tip_link]
+
+
+def _solve_poses(robot: Robot, solver: InverseKinematics, spec: EpisodeSpec) -> list[_PoseResult]:
+    generator = np.random.default_rng(spec.seed)
+    timeout_s = spec.settings.get("timeout")
+    results = []
+    for _ in range(int(spec.settings.get("poses", 100))):
+        target = _reachable_pose(robot, solver.group, generator)
+        start = time.perf_counter()
+        found = solver.solutions(solver.group.tip_link, target, _home(robot), timeout_s)
+        results.append(_judge(robot, solver.group.tip_link, target, found, time.perf_counter() - start))
+    return results
+
+
+def _judge(robot: Robot, tip: str, target: Transform, found: list[Array], time_s: float) -> _PoseResult:
+    """Checks the solution that is used, the first one, by forward kinematics."""
+    if not found:
+        return _PoseResult(time_s, 0, np.inf, np.inf)
+    reached = robot.model.link_transforms(found[0])[tip]
+    model, values = robot.model, found[0]
+    inside = bool(((values >= model.lower - 1e-9) & (values <= model.upper + 1e-9)).all())
+    error = pin.log3(target.rotation.T @ reached.rotation)
+    position_error = float(np.linalg.norm(reached.translation - target.translation)) if inside else np.inf
+    return _PoseResult(time_s, len(found), position_error, float(np.linalg.norm(error)))
+
+
+def _figures(results: list[_PoseResult]) -> dict[str, float]:
+    """Returns the figures of `metrics.kinematics`; those of solutions only where there are some."""
+    solved = [result for result in results if result.is_solved]
+    figures = {
+        "solved_share": len(solved) / len(results),
+        "solving_time_s": float(np.median([result.time_s for result in results])),
+        "solutions": float(np.mean([result.solutions for result in results])),
+    }
+    if solved:
+        figures["position_error_m"] = max(result.position_error_m for result in solved)
+        figures["rotation_error_rad"] = max(result.rotation_error_rad for result in solved)
+    return figures

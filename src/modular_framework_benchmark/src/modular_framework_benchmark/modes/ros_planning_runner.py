@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs planners on sets of motion-planning problems, without simulation and without a ROS master.
+
+Each plan runs in a process of its own that starts from the same state, so that a seed repeats it bit for bit.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from modular_framework_benchmark.metrics.measurements import ComponentReport, Motion
+from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_benchmark.modes.measured_record import Stopwatch, broken_record, measured_record
+from modular_framework_benchmark.modes.parameters import merged, parameters_below
+from modular_framework_benchmark.modes.robots import Robot
+from modular_framework_benchmark.modes.ros_robots import load_robot
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
+from modular_framework_planning.planning_interface.motion_problems import MotionProblem, read_problem
+from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
+from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, read_pipeline_spec
+from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+
+MOTION_PERIOD_S = 0.01
+CLEARANCE_STATES = 25  # along a motion; the distances of one state cost about 0.1 s on detailed meshes
+
+
+FULL_SPEED = {"default_velocity_scaling_factor": 1.0, "default_acceleration_scaling_factor": 1.0}
+PLUGINS = {  # of pipelines that the robot's configuration does not have
+    "ompl": "ompl_interface/OMPLPlanner",
+    "pilz_industrial_motion_planner": "pilz_industrial_motion_planner/CommandPlanner",
+    "stomp": "stomp_moveit/StompPlannerManager",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    """What episodes with the same robot and pipeline share."""
+
+    model: RobotModel
+    pipeline: PlanningPipeline
+    seeded: SeededPlanning
+
+
+class PlanningEpisodeRunner:
+    """Runs episodes of the mode `planning`; belongs to one process."""
+
+    def __init__(self) -> None:
+        """Starts nothing: robots and processes are made for the first episode that needs them."""
+        self._robots: dict[str, Robot] = {}
+        self._prepared: dict[str, _Prepared] = {}
+
+    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
+        """Plans one problem.
+
+        Args:
+            spec: What to run; `docs/experiments.md` has the settings of the mode.
+            folder: Folder for the planned motion, `trajectory.parquet`.
+        """
+        watch = Stopwatch()
+        try:
+            prepared = self._prepare(spec.settings)
+            problem = _read_problem(spec.settings, prepared.model)
+        except (ModeError, PlanningError) as error:
+            return broken_record(spec, str(error), watch)
+        started_s, answer, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
+        try:
+            answer = prepared.seeded.plan(prepared.pipeline, problem.request, spec.seed)
+        except PlanningError as error:
+            code, reason = error.code, f"{problem.name}: {error.code.name}: {error.reason}"
+        ended_s = watch.elapsed_s()
+        if answer is not None and spec.settings.get("record", {}).get("trajectories", True):
+            write_motion(answer.trajectory, folder / "trajectory.parquet")
+        report = ComponentReport(
+            component="planning",
+            name=problem.name,
+            succeeded=answer is not None,
+            reason=reason,
+            started_s=started_s,
+            ended_s=ended_s,
+            wall_s=ended_s - started_s,
+            figures=_figures(problem, answer, spec.settings) if answer is not None else {},
+            motion=_motion(answer.trajectory) if answer is not None else None,
+        )
+        return measured_record(spec, _status(code), code.name, report, folder, watch)
+
+    def close(self) -> None:
+        """Ends the processes; may be called twice."""
+        for prepared in self._prepared.values():
+            prepared.seeded.close()
+        self._prepared.clear()
+
+    def _prepare(self, settings: Mapping[str, Any]) -> _Prepared:
+        """Returns the robot and the process that plans; made once for all episodes that need the same."""
+        keys = ("robot", "pipeline", "planner", "planner_parameters", "parameters")
+        key = json.dumps([settings.get(name) for name in keys], sort_keys=True)
+        if key not in self._prepared:
+            robot = self._robot(settings["robot"])
+            spec = _pipeline_spec(robot, settings)
+            pipeline = spec.build(robot.model, robot.solvers())
+            _check_planner(pipeline, str(settings["planner"]))
+            self._prepared[key] = _Prepared(robot.model, pipeline, SeededPlanning(robot.model, [spec]))
+        return self._prepared[key]
+
+    def _robot(self, robot: str | Mapping[str, Any]) -> Robot:
+        key = json.dumps(robot, sort_keys=True)
+        if key not in self._robots:
+            self._robots[key] = load_robot(robot)
+        return self._robots[key]
+
+
+def _pipeline_spec(robot: Robot, settings: Mapping[str, Any]) -> PipelineSpec:
+    """Returns the pipeline of the robot's configuration with the episode's parameters, at full speed.
+
+    Full speed, so that durations of motions compare planners and not scaling factors.
+    """
+    name, planner = str(settings.get("pipeline") or "ompl"), str(settings["planner"])
+    own = robot.pipelines.get(name) or {"planning_plugin": PLUGINS.get(name, name)}
+    parents = ("/move_group/", f"/move_group/planning_pipelines/{name}/")
+    parameters = merged({**own, **FULL_SPEED}, parameters_below(settings.get("parameters") or {}, parents))
+    if settings.get("planner_parameters"):
+        configurations = {planner: {"type": f"geometric::{planner}"}}
+        configurations = merged(configurations, parameters.get("planner_configs") or {})
+        configurations = merged(configurations, {planner: settings["planner_parameters"]})
+        parameters["planner_configs"] = configurations
+    return read_pipeline_spec(name, parameters, robot.planning, {})
+
+
+def _check_planner(pipeline: PlanningPipeline, planner: str) -> None:
+    """Raises ModeError where move_group would plan with a default instead."""
+    known = (*pipeline.planner_ids, *pipeline.configurations.names())
+    if not planner:
+        return  # the pipeline's default
+    if pipeline.planner_ids and planner not in known:
+        raise ModeError(
+            f"planner '{planner}': pipeline '{pipeline.name}' has none of that name; allowed are {', '.join(known)}"
+        )
+    faults = pipeline.parameter_faults(planner)
+    if faults:
+        raise ModeError(f"planner_parameters of '{planner}': {'; '.join(faults)}")
+
+
+def _read_problem(settings: Mapping[str, Any], model: RobotModel) -> MotionProblem:
+    named, time_s = settings["problem"], float(settings.get("planning_time", 5.0))
+    try:
+        problem = read_problem(model, Path(named["scene"]), Path(named["request"]), time_s)
+    except (PlanningError, KeyError, TypeError, ValueError) as error:
+        raise ModeError(f"{named['request']}: cannot be read: {type(error).__name__}: {error}") from error
+    request = replace(
+        problem.request,
+        planner_id=str(settings["planner"]),
+        group=str(settings.get("group") or problem.request.group),
+        attempts=int(settings.get("attempts", 1)),
+    )
+    return MotionProblem(str(named.get("name") or problem.name), request)
+
+
+def _status(code: ErrorCode) -> EpisodeStatus:
+    match code:
+        case ErrorCode.SUCCESS:
+            return EpisodeStatus.SUCCEEDED
+        case ErrorCode.TIMED_OUT:
+            return EpisodeStatus.TIMED_OUT
+        case ErrorCode.CRASH:
+            return EpisodeStatus.BROKEN
+        case _:
+            return EpisodeStatus.FAILED
+
+
+def _figures(problem: MotionProblem, answer: PlanningAnswer, settings: Mapping[str, Any]) -> dict[str, float]:
+    """Returns the figures of `metrics.planning`; the clearance only where it is asked for, because it takes seconds."""
+    figures = {"planning_time_s": answer.total_time_s, "search_time_s": answer.planning_time_s}
+    if "clearance" in settings.get("metrics", ()):
+        figures["clearance_m"] = _clearance(problem, answer)
+    return figures
+
+
+def _motion(trajectory: Trajectory) -> Motion:
+    """Returns the curve a controller makes of it, every 10 ms at most."""
+    times = trajectory.sample_times(MOTION_PERIOD_S)
+    return Motion(trajectory.joint_names, times, trajectory.positions_at(times))
+
+
+def _clearance(problem: MotionProblem, answer: PlanningAnswer) -> float:
+    """Returns the smallest distance of checked pairs along the motion [m]."""
+    motion, model = answer.trajectory, problem.request.scene.model
+    checker = DEFAULT_CHECKER(problem.request.scene, model.group(problem.request.group).indices)
+    times = np.linspace(0.0, motion.duration_s, min(CLEARANCE_STATES, len(motion.sample_times())))
+    positions = np.tile(answer.start, (len(times), 1))
+    positions[:, [model.index[name] for name in motion.joint_names]] = motion.positions_at(times)
+    return min(checker.distance(model.with_mimics(row)) for row in positions)
+
+
+def write_motion(motion: Trajectory, path: Path) -> None:
+    """Writes a motion as a Parquet file.
+
+    Its columns are `time_s`, and `<joint>/position`, `/velocity` and `/acceleration` [rad or m, per s, per s^2].
+    """
+    columns = {"time_s": motion.times}
+    for number, joint in enumerate(motion.joint_names):
+        for name in ("position", "velocity", "acceleration"):
+            values = {"position": motion.positions, "velocity": motion.velocities}.get(name, motion.accelerations)
+            columns[f"{joint}/{name}"] = values[:, number]
+    pq.write_table(pa.table(columns), path)

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Loads the robots of the modes without simulation from a MoveIt configuration package, or from URDF and SRDF files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_benchmark.modes.robots import Robot
+from modular_framework_planning.errors import GeometryError, ModelError, PlanningError
+from modular_framework_planning.kinematics.kinematics_settings import settings_from
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.urdf_document import directory_resolver, package_resolver
+
+
+@dataclass(frozen=True, slots=True)
+class _MeshesBeside:
+    """Finds meshes by their packages, else in a folder; can be sent to another process."""
+
+    folder: Path
+
+    def __call__(self, uri: str) -> str:
+        try:
+            return package_resolver(uri)
+        except ModelError:
+            return directory_resolver(self.folder)(uri)
+
+
+def load_robot(robot: str | Mapping[str, Any]) -> Robot:
+    """Loads a robot.
+
+    Args:
+        robot: Name of a MoveIt configuration package, or {urdf: FILE, srdf: FILE}; meshes of a package that is not on
+            ROS_PACKAGE_PATH are looked for beside the URDF.
+
+    Raises:
+        ModeError: A file is missing or wrong.
+    """
+    try:
+        return _from_package(robot) if isinstance(robot, str) else _from_files(robot)
+    except (ModelError, PlanningError, GeometryError, OSError) as error:
+        raise ModeError(f"robot {robot}: {error}") from error
+
+
+def _from_files(files: Mapping[str, Any]) -> Robot:
+    if set(files) != {"urdf", "srdf"}:
+        raise ModeError(f"robot: found {', '.join(map(str, files)) or 'nothing'}; give both urdf and srdf, and no more")
+    urdf, srdf = Path(str(files["urdf"])), Path(str(files["srdf"]))
+    return Robot(RobotModel(urdf.read_text(), srdf.read_text(), {}, _MeshesBeside(urdf.parent)))
+
+
+def _from_package(package: str) -> Robot:
+    from moveit_configs_utils import MoveItConfigsBuilder
+
+    try:
+        configs = MoveItConfigsBuilder(package.removesuffix("_moveit_config"), package_name=package).to_moveit_configs()
+    except Exception as error:  # noqa: BLE001 - the builder names the file; its kinds of errors are many
+        raise ModeError(f"robot: MoveIt configuration package '{package}' cannot be loaded: {error}") from error
+    (urdf,) = configs.robot_description.values()
+    (srdf,) = configs.robot_description_semantic.values()
+    planning = configs.joint_limits.get("robot_description_planning", {})
+    return Robot(
+        RobotModel(urdf, srdf, planning.get("joint_limits", {}), package_resolver),
+        settings_from(configs.robot_description_kinematics.get("robot_description_kinematics", {})),
+        {**planning, **configs.pilz_cartesian_limits.get("robot_description_planning", {})},
+        _pipelines(configs.planning_pipelines),
+    )
+
+
+def _pipelines(parameters: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    parent = parameters.get("planning_pipelines")
+    if isinstance(parent, Mapping):
+        return {name: item for name, item in parent.items() if isinstance(item, Mapping)}
+    return {
+        name.removeprefix("planning_pipelines/"): item
+        for name, item in parameters.items()
+        if name.startswith("planning_pipelines/") and isinstance(item, Mapping)
+    }
