@@ -56,6 +56,10 @@ class RecordRefusedError(ResultsError):
     """The record of an episode does not fit its experiment."""
 
 
+class ExportError(ResultsError):
+    """Results cannot be exported."""
+
+
 class RecordNotStoredError(ResultsError):
     """The database could not be written; the record is kept in a file.
 

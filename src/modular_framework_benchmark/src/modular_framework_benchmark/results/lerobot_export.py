@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Exports the recorded episodes of an experiment as a LeRobot dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from modular_framework_benchmark.records.episode import EpisodeRecord
+from modular_framework_benchmark.results.database import ResultDatabase
+from modular_framework_benchmark.results.errors import ExportError
+from modular_framework_benchmark.results.lerobot_dataset import LeRobotWriter
+from modular_framework_benchmark.results.lerobot_frames import TRAJECTORY_FILE, read_frames
+from modular_framework_benchmark.results.lerobot_videos import find_videos
+
+DEFAULT_RATE = 30
+
+
+@dataclass(frozen=True, slots=True)
+class LeRobotSummary:
+    """What an export gave.
+
+    Attributes:
+        episodes: Number of episodes in the dataset.
+        frames: Number of frames in it.
+        skipped: Why episodes are not in it, by their numbers.
+    """
+
+    episodes: int
+    frames: int
+    skipped: dict[int, str]
+
+
+def export_lerobot(
+    database: ResultDatabase,
+    number: int,
+    folder: Path,
+    *,
+    frames_per_second: int = DEFAULT_RATE,
+    chosen: Callable[[EpisodeRecord], bool] = lambda record: True,
+) -> LeRobotSummary:
+    """Writes the episodes that have a recorded trajectory as a LeRobot dataset.
+
+    Args:
+        database: The database; the episodes' files lie beside it.
+        number: Identifier of the experiment.
+        folder: The new dataset; not there yet, or empty.
+        frames_per_second: Rate of its frames.
+        chosen: Says which episodes are wanted.
+
+    Returns:
+        What is in the dataset, and what is not and why.
+
+    Raises:
+        ExportError: The folder is not empty, the rate is not positive, or no episode can be exported; says why not.
+    """
+    if frames_per_second < 1:
+        raise ExportError(
+            f"{frames_per_second} frames a second: allowed are whole numbers from 1 on; name another rate"
+        )
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ExportError(f"{folder}: there already; remove what is there, or name another folder")
+    skipped: dict[int, str] = {}
+    writer: LeRobotWriter | None = None
+    try:
+        for episode in database.load(number, spans=False).episodes["number"]:
+            record = database.record(number, int(episode))
+            if not chosen(record):
+                continue
+            writer = writer or LeRobotWriter(folder, frames_per_second, str(record.snapshot.get("robot", "unknown")))
+            try:
+                _add(writer, database, record, frames_per_second)
+            except ExportError as error:
+                skipped[record.spec.number] = str(error)
+    except OSError as error:
+        raise ExportError(f"{folder}: the export stopped ({error}); free space, or name another folder") from error
+    finally:
+        if writer is not None:
+            writer.close()
+    if writer is None or not writer.episodes:
+        reason = next(iter(skipped.values()), "the experiment has no finished episode that was chosen")
+        raise ExportError(f"{database.label}: no episode can be exported ({len(skipped)} skipped; first: {reason})")
+    return LeRobotSummary(writer.episodes, writer.frames, skipped)
+
+
+def _add(writer: LeRobotWriter, database: ResultDatabase, record: EpisodeRecord, frames_per_second: int) -> None:
+    if not record.folder:
+        raise ExportError("it was run without recording its files; run it with them")
+    folder = database.folder / record.folder
+    frames = read_frames(folder / TRAJECTORY_FILE, frames_per_second)
+    writer.add(frames, find_videos(folder), task_of(record), succeeded=record.succeeded)
+
+
+def task_of(record: EpisodeRecord) -> str:
+    """Returns the task of an episode in words: what its snapshot says, else the levels of its factors."""
+    task = record.snapshot.get("task")
+    if isinstance(task, str) and task:
+        return task
+    return ", ".join(f"{name} {level}" for name, level in sorted(record.spec.configuration.items()))
