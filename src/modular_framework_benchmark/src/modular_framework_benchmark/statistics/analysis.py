@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modular_framework_benchmark.records.experiment import Metric
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import sentences
 from modular_framework_benchmark.statistics.comparison import Analysis, Comparison, MethodSummary, Verdict
@@ -19,6 +18,7 @@ from modular_framework_benchmark.statistics.corrections import corrected, famili
 from modular_framework_benchmark.statistics.findings import Finding, compare_pair
 from modular_framework_benchmark.statistics.observations import (
     SUCCESS,
+    EpisodeTable,
     methods_of,
     metrics_of,
     other_factors,
@@ -68,21 +68,17 @@ def summarise_by_level(results: ExperimentResults, factor: str, *, seed: int = 0
     )
 
 
-def compare(
-    results: ExperimentResults, *, seed: int = 0, metrics: Sequence[Metric] | None = None
-) -> tuple[Comparison, ...]:
+def compare(results: ExperimentResults, *, seed: int = 0) -> tuple[Comparison, ...]:
     """Returns each pair of methods by each metric, over all levels of the other factors.
 
     Args:
         results: The finished episodes.
         seed: Of the bootstrap's resamples.
-        metrics: Only these; the correction is that of all metrics all the same. None: all of them.
 
     Raises:
         ValueError: The compared factor is none of the experiment's, or an episode is there twice.
     """
-    findings = _findings(results, "", seed, metrics_of(results) if metrics is None else metrics)
-    return _concluded(results, findings)
+    return _concluded(results, _findings(results, "", seed))
 
 
 def compare_by_level(results: ExperimentResults, factor: str, *, seed: int = 0) -> tuple[Comparison, ...]:
@@ -96,26 +92,26 @@ def compare_by_level(results: ExperimentResults, factor: str, *, seed: int = 0) 
     findings = [
         finding
         for level in _levels(results, factor)
-        for finding in _findings(restricted(results, factor, level), f"{factor}={level}", seed, metrics_of(results))
+        for finding in _findings(restricted(results, factor, level), f"{factor}={level}", seed)
     ]
     return _concluded(results, findings)
 
 
 def _summarise(results: ExperimentResults, levels: str, seed: int) -> tuple[MethodSummary, ...]:
-    generator = np.random.default_rng(seed)
+    generator, table = np.random.default_rng(seed), EpisodeTable(results)
     return tuple(
         dataclasses.replace(summary, levels=levels, sentence=sentences.join(levels, summary.sentence))
         for metric in metrics_of(results)
         for method in methods_of(results)
-        for summary in [summarise_method(results, metric, method, generator)]
+        for summary in [summarise_method(table, metric, method, generator)]
     )
 
 
-def _findings(results: ExperimentResults, levels: str, seed: int, metrics: Sequence[Metric]) -> list[Finding]:
-    generator = np.random.default_rng(seed)
+def _findings(results: ExperimentResults, levels: str, seed: int) -> list[Finding]:
+    generator, table = np.random.default_rng(seed), EpisodeTable(results)
     return [
-        dataclasses.replace(compare_pair(results, metric, first, second, generator), levels=levels)
-        for metric in metrics
+        dataclasses.replace(compare_pair(table, metric, first, second, generator), levels=levels)
+        for metric in metrics_of(results)
         for first, second in pairs_of_methods(results)
     ]
 
@@ -127,7 +123,9 @@ def _concluded(results: ExperimentResults, findings: Sequence[Finding]) -> tuple
     for of_success, share in zip((True, False), shares, strict=True):
         family = [number for number, found in enumerate(findings) if (found.metric.name == SUCCESS.name) == of_success]
         p_values = corrected([findings[number].p_value for number in family], share)
-        without = corrected([_p_without_broken(findings[number]) for number in family], share)
+        without = p_values
+        if any(findings[number].without_broken is not None for number in family):
+            without = corrected([_p_without_broken(findings[number]) for number in family], share)
         size = sum(value is not None for value in p_values)
         for number, p_value, p_without in zip(family, p_values, without, strict=True):
             comparisons[number] = conclude(results, findings[number], p_value, p_without, share / max(size, 1))

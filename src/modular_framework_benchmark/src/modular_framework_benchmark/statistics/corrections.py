@@ -35,5 +35,7 @@ def corrected(p_values: Sequence[float | None], share: float = 1.0) -> list[floa
     known = [value for value in p_values if value is not None]
     if not known:
         return list(p_values)
-    adjusted = iter(np.minimum(multipletests(known, method="holm")[1] / share, 1.0).tolist())
+    # A single value needs no correction; multipletests collects garbage in every call, which takes its time.
+    holm = multipletests(known, method="holm")[1] if len(known) > 1 else np.asarray(known)
+    adjusted = iter(np.minimum(holm / share, 1.0).tolist())
     return [None if value is None else float(next(adjusted)) for value in p_values]

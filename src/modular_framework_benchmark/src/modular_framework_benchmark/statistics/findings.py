@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from statsmodels.stats.proportion import proportion_effectsize
 
 from modular_framework_benchmark.records.experiment import Metric, MetricKind
-from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import rates, sequential, values
 from modular_framework_benchmark.statistics.comparison import Effect, Estimate, Interval, PairCounts
-from modular_framework_benchmark.statistics.observations import Observations, Pairs, observations, pairs
+from modular_framework_benchmark.statistics.observations import EpisodeTable, Observations, Pairs
 
 Floats = NDArray[np.float64]
 
@@ -79,23 +78,23 @@ def figure_name(metric: Metric) -> str:
 
 
 def compare_pair(
-    results: ExperimentResults, metric: Metric, first: str, second: str, generator: np.random.Generator
+    table: EpisodeTable, metric: Metric, first: str, second: str, generator: np.random.Generator
 ) -> Finding:
     """Returns the comparison of two methods by a metric: paired where there are pairs, otherwise unpaired.
 
     Args:
-        results: The finished episodes.
+        table: The finished episodes.
         metric: What is compared.
         first: One method.
         second: The other.
         generator: What resamples are drawn with.
     """
-    description = results.description
+    description = table.results.description
     settings = Settings(description.confidence, description.sequential, generator)
-    matched = pairs(results, metric, first, second)
+    matched = table.pairs(metric, first, second)
     if len(matched.first) or matched.missing:
         return _paired(metric, first, second, matched, settings)
-    seen = [observations(results, metric, method) for method in (first, second)]
+    seen = [table.observations(metric, method) for method in (first, second)]
     return _unpaired(metric, first, second, (seen[0], seen[1]), settings)
 
 

@@ -142,63 +142,115 @@ def restricted(results: ExperimentResults, factor: str, level: str) -> Experimen
     return dataclasses.replace(results, episodes=chosen, planned=len(chosen) if finished else results.planned)
 
 
-def observations(results: ExperimentResults, metric: Metric, method: str) -> Observations:
-    """Returns a metric in every finished episode of a method."""
-    table = _table(results, metric)
-    chosen = table[table["method"] == method]
-    return Observations(
-        chosen["value"].to_numpy(float), chosen["censored"].to_numpy(bool), chosen["broken"].to_numpy(bool)
-    )
+class EpisodeTable:
+    """The finished episodes of an experiment, laid out once for all metrics and pairs of methods."""
 
+    def __init__(self, results: ExperimentResults) -> None:
+        """Reads the columns of the episodes.
 
-def episode_counts(results: ExperimentResults, metric: Metric, method: str) -> EpisodeCounts:
-    """Returns how the episodes of a method ended and what became of them in the figures of a metric."""
-    of_method = results.episodes[results.description.compared] == method
-    statuses = results.episodes.loc[of_method, "status"].value_counts()
-    seen = observations(results, metric, method)
-    missing = int(np.isnan(seen.values).sum())
-    return EpisodeCounts(
-        episodes=int(of_method.sum()),
-        succeeded=int(statuses.get(EpisodeStatus.SUCCEEDED.value, 0)),
-        failed=int(statuses.get(EpisodeStatus.FAILED.value, 0)),
-        timed_out=int(statuses.get(EpisodeStatus.TIMED_OUT.value, 0)),
-        broken=int(statuses.get(EpisodeStatus.BROKEN.value, 0)),
-        counted=len(seen.values) - missing,
-        censored=int(seen.censored.sum()),
-        missing=missing,
-    )
+        Args:
+            results: The finished episodes.
+
+        Raises:
+            ValueError: The compared factor is none of the experiment's, or two episodes have the same method, levels
+                and trial.
+        """
+        methods_of(results)
+        self.results = results
+        episodes = results.episodes
+        self._succeeded = episodes["success"].to_numpy(bool)
+        self._statuses = episodes["status"].to_numpy()
+        self._broken = np.asarray(self._statuses == EpisodeStatus.BROKEN.value, dtype=bool)
+        self._seeds = episodes["seed"].to_numpy()
+        self._strata = _strata(results)
+        trials = episodes["trial"].to_numpy(np.int64)
+        self._keys = self._strata * (int(trials.max(initial=0)) + 1) + trials
+        of_method = episodes[results.description.compared].to_numpy()
+        self._rows = {method: np.flatnonzero(of_method == method) for method in methods_of(results)}
+        for method, rows in self._rows.items():
+            self._check_unique(method, rows)
+        self._values: dict[str, tuple[Floats, Flags]] = {}
+
+    def observations(self, metric: Metric, method: str) -> Observations:
+        """Returns a metric in every finished episode of a method."""
+        values, censored = self._column(metric)
+        rows = self._rows[method]
+        return Observations(values[rows], censored[rows], self._broken[rows])
+
+    def counts(self, metric: Metric, method: str) -> EpisodeCounts:
+        """Returns how the episodes of a method ended and what became of them in the figures of a metric."""
+        statuses = self._statuses[self._rows[method]]
+        seen = self.observations(metric, method)
+        missing = int(np.isnan(seen.values).sum())
+
+        def ended(status: EpisodeStatus) -> int:
+            return int(np.sum(statuses == status.value))
+
+        return EpisodeCounts(
+            episodes=len(statuses),
+            succeeded=ended(EpisodeStatus.SUCCEEDED),
+            failed=ended(EpisodeStatus.FAILED),
+            timed_out=ended(EpisodeStatus.TIMED_OUT),
+            broken=ended(EpisodeStatus.BROKEN),
+            counted=len(seen.values) - missing,
+            censored=int(seen.censored.sum()),
+            missing=missing,
+        )
+
+    def pairs(self, metric: Metric, first: str, second: str) -> Pairs:
+        """Returns a metric in the pairs of two methods: same trial, same levels of the other factors."""
+        rows = self._rows[first], self._rows[second]
+        _, *places = np.intersect1d(self._keys[rows[0]], self._keys[rows[1]], assume_unique=True, return_indices=True)
+        one, other = (side[place] for side, place in zip(rows, places, strict=True))
+        values, censored = self._column(metric)
+        complete = ~np.isnan(values[one]) & ~np.isnan(values[other])
+        kept, kept_other = one[complete], other[complete]
+        broken = np.stack([self._broken[kept], self._broken[kept_other]])
+        return Pairs(
+            first=values[kept],
+            second=values[kept_other],
+            units=np.unique(self._seeds[kept], return_inverse=True)[1].astype(np.int64),
+            strata=self._strata[kept],
+            broken=np.asarray(broken.any(axis=0)),
+            censored=int(censored[kept].sum() + censored[kept_other].sum()),
+            broken_episodes=int(broken.sum()),
+            missing=len(one) - len(kept),
+            unmatched=len(rows[0]) + len(rows[1]) - 2 * len(one),
+        )
+
+    def _column(self, metric: Metric) -> tuple[Floats, Flags]:
+        """Returns the value of a metric in every episode, and whether it counts at the limit, shape (episodes,)."""
+        if metric.name not in self._values:
+            self._values[metric.name] = self._read(metric)
+        return self._values[metric.name]
+
+    def _read(self, metric: Metric) -> tuple[Floats, Flags]:
+        if metric.name == SUCCESS.name:
+            return self._succeeded.astype(float), np.zeros(len(self._succeeded), dtype=bool)
+        values = np.full(len(self._succeeded), np.nan)
+        if metric.name in self.results.episodes:
+            values = pd.to_numeric(self.results.episodes[metric.name]).to_numpy(float).copy()
+        values[~np.isfinite(values) | self._broken] = np.nan
+        censored = _censored(values, self._succeeded, metric, self.results.description.mode)
+        if metric.limit is not None:
+            values[censored] = metric.limit
+        return values, censored
+
+    def _check_unique(self, method: str, rows: NDArray[np.int64]) -> None:
+        _, places = np.unique(self._keys[rows], return_index=True)
+        if len(places) == len(rows):
+            return
+        row = self.results.episodes.iloc[np.setdiff1d(rows, rows[places])[0]]
+        names = [factor.name for factor in other_factors(self.results)] + ["trial"]
+        found = ", ".join(f"{name}={row[name]}" for name in names)
+        raise ValueError(
+            f"two episodes of method {method} have {found}; an experiment has each combination and trial once"
+        )
 
 
 def pairs_of_methods(results: ExperimentResults) -> tuple[tuple[str, str], ...]:
     """Returns every pair of methods, as the experiment lists them."""
     return tuple(combinations(methods_of(results), 2))
-
-
-def pairs(results: ExperimentResults, metric: Metric, first: str, second: str) -> Pairs:
-    """Returns a metric in the pairs of two methods: same trial, same levels of the other factors.
-
-    Raises:
-        ValueError: Two episodes have the same method, levels and trial.
-    """
-    table = _table(results, metric)
-    key = [factor.name for factor in other_factors(results)] + ["trial"]
-    sides = [table[table["method"] == method] for method in (first, second)]
-    for side in sides:
-        _check_unique(side, key)
-    joined = sides[0].merge(sides[1], on=key, suffixes=("_first", "_second"), sort=True)
-    complete = joined[joined["value_first"].notna() & joined["value_second"].notna()]
-    broken = complete[["broken_first", "broken_second"]].to_numpy(bool)
-    return Pairs(
-        first=complete["value_first"].to_numpy(float),
-        second=complete["value_second"].to_numpy(float),
-        units=pd.factorize(complete["seed_first"])[0].astype(np.int64),
-        strata=_strata(complete, key[:-1]),
-        broken=broken.any(axis=1),
-        censored=int(complete[["censored_first", "censored_second"]].to_numpy(bool).sum()),
-        broken_episodes=int(broken.sum()),
-        missing=len(joined) - len(complete),
-        unmatched=len(sides[0]) + len(sides[1]) - 2 * len(joined),
-    )
 
 
 def _factor(results: ExperimentResults, name: str) -> Factor:
@@ -207,31 +259,6 @@ def _factor(results: ExperimentResults, name: str) -> Factor:
             return factor
     known = ", ".join(factor.name for factor in results.description.factors) or "none"
     raise ValueError(f"experiment '{results.description.name}' has no factor '{name}'; its factors are: {known}")
-
-
-def _table(results: ExperimentResults, metric: Metric) -> pd.DataFrame:
-    """Returns a row for each episode: what pairs are found by, `method`, `value`, `censored`, `broken`."""
-    episodes = results.episodes
-    succeeded = episodes["success"].to_numpy(bool)
-    broken = (episodes["status"] == EpisodeStatus.BROKEN.value).to_numpy(bool)
-    if metric.name == SUCCESS.name:
-        values = succeeded.astype(float)
-        censored = np.zeros(len(values), dtype=bool)
-    else:
-        column = pd.to_numeric(episodes[metric.name]) if metric.name in episodes else pd.Series(np.nan, episodes.index)
-        values = column.to_numpy(float).copy()
-        values[~np.isfinite(values)] = np.nan
-        values[broken] = np.nan
-        censored = _censored(values, succeeded, metric, results.description.mode)
-        if metric.limit is not None:
-            values[censored] = metric.limit
-    columns = [factor.name for factor in other_factors(results)] + ["trial", "seed"]
-    return episodes[columns].assign(
-        method=episodes[results.description.compared],
-        value=values,
-        censored=censored,
-        broken=broken,
-    )
 
 
 def _censored(values: Floats, succeeded: Flags, metric: Metric, mode: str) -> Flags:
@@ -243,14 +270,10 @@ def _censored(values: Floats, succeeded: Flags, metric: Metric, mode: str) -> Fl
     return np.isnan(values) | beyond | (~succeeded if whole_episode else False)
 
 
-def _check_unique(side: pd.DataFrame, key: list[str]) -> None:
-    repeated = side[side.duplicated(key)]
-    if len(repeated):
-        found = ", ".join(f"{name}={repeated.iloc[0][name]}" for name in ["method", *key])
-        raise ValueError(f"two episodes have {found}; an experiment has each combination and trial once")
-
-
-def _strata(table: pd.DataFrame, names: list[str]) -> NDArray[np.int64]:
-    if not names:
-        return np.zeros(len(table), dtype=np.int64)
-    return table.groupby(names, sort=True, observed=True).ngroup().to_numpy(np.int64)
+def _strata(results: ExperimentResults) -> NDArray[np.int64]:
+    """Returns the number of the combination of other factors' levels of each episode, shape (episodes,)."""
+    strata = np.zeros(len(results.episodes), dtype=np.int64)
+    for factor in other_factors(results):
+        codes, levels = pd.factorize(results.episodes[factor.name])
+        strata = strata * (len(levels) + 1) + codes
+    return strata

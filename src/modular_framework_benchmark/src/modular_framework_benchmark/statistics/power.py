@@ -30,10 +30,9 @@ def rate_power(pairs: int, difference: float, discordance: float, error_rate: fl
         error_rate: Two-sided, that of this comparison after the correction for many.
     """
     discordance = min(max(discordance, abs(difference)), 1.0)
-    differing = np.arange(pairs + 1)
+    least, most = stats.binom.ppf([1e-12, 1 - 1e-12], pairs, discordance)
+    differing = np.arange(int(least), int(most) + 1)
     likely = stats.binom.pmf(differing, pairs, discordance)
-    kept = likely > 1e-12
-    differing, likely = differing[kept], likely[kept]
     # Fewest wins that the test shows: it doubles the tail, so that the tail may have half the error rate.
     fewest = stats.binom.isf(error_rate / 2, differing, 0.5) + 1
     wins = (1 + abs(difference) / discordance) / 2 if discordance else 0.5

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_benchmark.records.experiment import Metric, MetricKind
-from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import sentences
 from modular_framework_benchmark.statistics.comparison import Estimate, MethodSummary
 from modular_framework_benchmark.statistics.findings import figure_name
-from modular_framework_benchmark.statistics.observations import episode_counts, observations
+from modular_framework_benchmark.statistics.observations import EpisodeTable
 from modular_framework_benchmark.statistics.rates import rate_interval
 from modular_framework_benchmark.statistics.values import (
     interquartile_mean,
@@ -22,23 +21,21 @@ from modular_framework_benchmark.statistics.values import (
 Floats = NDArray[np.float64]
 
 
-def summarise_method(
-    results: ExperimentResults, metric: Metric, method: str, generator: np.random.Generator
-) -> MethodSummary:
+def summarise_method(table: EpisodeTable, metric: Metric, method: str, generator: np.random.Generator) -> MethodSummary:
     """Returns the summary of a method by a metric.
 
     Args:
-        results: The finished episodes.
+        table: The finished episodes.
         metric: What is summarised.
         method: Level of the compared factor.
         generator: What resamples are drawn with.
     """
-    seen = observations(results, metric, method)
+    seen = table.observations(metric, method)
     present = ~np.isnan(seen.values)
-    confidence = results.description.confidence
+    confidence = table.results.description.confidence
     estimate = _estimate(metric, seen.values[present], confidence, generator)
     unbroken = seen.values[present & ~seen.broken]
-    counts = episode_counts(results, metric, method)
+    counts = table.counts(metric, method)
     summary = MethodSummary(
         method=method,
         metric=metric.name,
