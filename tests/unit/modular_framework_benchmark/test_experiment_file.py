@@ -81,8 +81,8 @@ def test_a_listed_method_without_another_one_to_compare_with_is_a_fault(tmp_path
         ("[success, task_time]", "[success, Success.py:f]", "Success.py", "there is no file"),
         ("[success, task_time]", "[success, success]", "success", "metrics has 'success' twice"),
         ("time_limit: 60", "stopping: {rule: sequental}", "sequental", "rule 'sequental' is unknown; allowed: fixed"),
-        ("time_limit: 60", "stopping: {rule: sequential, metric: task_time}", "task_time", "the metric of stopping"),
-        ("time_limit: 60", "stopping: {error_rate: 0.05}", "{error_rate", "stopping has no rule; allowed: fixed"),
+        ("time_limit: 60", "stopping: {rule: sequential, metric: lift}", "lift", "the metric of stopping"),
+        ("time_limit: 60", "stopping: {metric: success}", "{metric", "stopping has no rule; allowed: fixed"),
         ("time_limit: 60", "record: {vido: true}", "vido", "the key of record 'vido' is unknown; allowed: log"),
         ("mode: task", "mode: task\nmode: task", "mode", "the key 'mode' is given twice; first in line 3"),
     ],
@@ -144,8 +144,8 @@ def test_a_duration_is_limited_by_the_time_of_an_episode_unless_the_file_says_ot
 
 
 def test_a_sequential_rule_is_read(tmp_path: Path) -> None:
-    stopping = read(PICK + "stopping: {rule: sequential, error_rate: 0.01, min_trials: 3}\n", tmp_path).stopping
-    assert (stopping.kind, stopping.error_rate, stopping.min_trials) == (StoppingKind.SEQUENTIAL, 0.01, 3)
+    stopping = read(PICK + "stopping: {rule: sequential, smallest_difference: 0.1}\n", tmp_path).stopping
+    assert (stopping.kind, stopping.metric, stopping.smallest_difference) == (StoppingKind.SEQUENTIAL, "success", 0.1)
 
 
 def test_a_planning_experiment_takes_its_problems_in_turn(tmp_path: Path) -> None:

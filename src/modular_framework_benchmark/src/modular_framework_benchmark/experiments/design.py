@@ -14,7 +14,7 @@ from modular_framework_benchmark.experiments.experiment import Combination, Expe
 from modular_framework_benchmark.experiments.reading import MAX_SEED
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
-PER_TRIAL = ("objects", "problems")
+PER_TRIAL = ("objects", "problems", "problem")
 """Settings that differ between the trials of a combination; the others decide the stack that runs."""
 
 
@@ -42,9 +42,13 @@ def _groups(experiment: Experiment) -> list[list[Combination]]:
     """Returns the combinations, those together whose episodes can share a stack."""
     groups: dict[str, list[Combination]] = {}
     for item in experiment.combinations:
-        stack = {key: value for key, value in item.settings.items() if key not in PER_TRIAL}
-        groups.setdefault(_canonical(stack), []).append(item)
+        groups.setdefault(stack_of(item.settings), []).append(item)
     return list(groups.values())
+
+
+def stack_of(settings: Mapping[str, Any]) -> str:
+    """Returns what decides the running stack of an episode: those with the same text can share one."""
+    return _canonical({key: value for key, value in settings.items() if key not in PER_TRIAL})
 
 
 def _episode(experiment: Experiment, item: Combination, trial: int, number: int) -> EpisodeSpec:

@@ -16,7 +16,7 @@ class StoppingKind(Enum):
     """When an experiment ends."""
 
     FIXED = "fixed"  # after all trials
-    SEQUENTIAL = "sequential"  # as soon as the methods are told apart with the stated error rate, or after all trials
+    SEQUENTIAL = "sequential"  # as soon as the methods are told apart, or after all trials
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,15 +25,14 @@ class Stopping:
 
     Attributes:
         kind: The rule.
-        error_rate: Largest probability that a sequential rule sees a difference where there is none.
-        metric: Name of the metric it looks at: one that is a rate.
-        min_trials: Trials before which it does not stop.
+        metric: Name of the metric that a sequential rule looks at.
+        smallest_difference: Difference below which the methods count as alike, in the unit of the metric, for a rate
+            from 0 to 1; None: it stops for a shown difference only.
     """
 
     kind: StoppingKind = StoppingKind.FIXED
-    error_rate: float = 0.05
     metric: str = "success"
-    min_trials: int = 1
+    smallest_difference: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,10 +22,10 @@ from modular_framework_benchmark.experiments.mode_settings import (
     model_files,
     read_settings,
 )
-from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
+from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
 from modular_framework_benchmark.experiments.setting_trees import check_references
 from modular_framework_benchmark.experiments.surroundings import Surroundings
-from modular_framework_benchmark.records.experiment import Factor, Metric, MetricKind
+from modular_framework_benchmark.records.experiment import Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
 from modular_framework_core.files.located_yaml import Mapping, Scalar, loads
@@ -77,7 +77,7 @@ def read_experiment(text: str, path: Path, surroundings: Surroundings, known_met
         raise ExperimentFault.of(error) from error
     if not isinstance(root, Mapping):
         raise ExperimentFault([Fault(root.location, "the file must be a mapping, from keys such as experiment")])
-    reading = Reading(path.resolve().parent, surroundings, faults)
+    reading = Reading(faults, path.resolve().parent, surroundings)
     experiment = _Reader(root, text, path, reading, known_metrics).read()
     if experiment is None:
         raise ExperimentFault(faults.sorted())
@@ -246,7 +246,7 @@ class _Reader:
         )
 
 
-def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: Reading) -> Stopping:
+def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueReading) -> Stopping:
     """Reads the stopping rule.
 
     Args:
@@ -254,23 +254,49 @@ def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: Reading) 
         metrics: Of the experiment, for the name of the one it looks at.
         reading: Where faults are noted.
     """
-    known = spelt_as_meant(node, ("rule", "error_rate", "metric", "min_trials"), "the key of stopping", reading.faults)
+    keys = ("rule", "metric", "smallest_difference")
+    known = spelt_as_meant(node, keys, "the key of stopping", reading.faults)
     kinds = [kind.value for kind in StoppingKind]
     if "rule" not in known.entries:
         reading.faults.add(node.location, f"stopping has no rule; allowed: {', '.join(kinds)}")
         return Stopping()
     kind = StoppingKind(reading.choice(known.entries["rule"], "rule", kinds) or "fixed")
     values: dict[str, Any] = {}
-    if "error_rate" in known.entries:
-        values["error_rate"] = reading.number(known.entries["error_rate"], "error_rate", 0.0001, 0.5)
-    if "min_trials" in known.entries:
-        values["min_trials"] = reading.count(known.entries["min_trials"], "min_trials")
+    if "smallest_difference" in known.entries:
+        values["smallest_difference"] = reading.number(
+            known.entries["smallest_difference"], "smallest_difference", 1e-9
+        )
     if "metric" in known.entries:
-        rates = {metric.name for metric in metrics if metric.kind is MetricKind.RATE} | {"success"}
-        values["metric"] = reading.choice(known.entries["metric"], "the metric of stopping", sorted(rates))
+        names = dict.fromkeys(["success", *(metric.name for metric in metrics)])
+        values["metric"] = reading.choice(known.entries["metric"], "the metric of stopping", names)
     if kind is StoppingKind.FIXED and values:
         reading.faults.add(node.location, "the rule fixed looks at nothing; remove the other keys, or write sequential")
     return Stopping(kind, **{key: value for key, value in values.items() if value is not None})
+
+
+def read_run_settings(text: str, metrics: tuple[Metric, ...]) -> tuple[int, Stopping]:
+    """Reads from the text of an experiment, checked before, what does not decide its episodes.
+
+    Args:
+        text: The file.
+        metrics: Of the experiment.
+
+    Returns:
+        Number of workers, and the stopping rule.
+
+    Raises:
+        ExperimentFault: The text has changed, and cannot be used any more.
+    """
+    faults = FaultList()
+    root = loads(text, "the stored experiment", faults)
+    reading = ValueReading(faults)
+    entries = root.entries if isinstance(root, Mapping) else {}
+    workers = reading.count(entries["workers"], "workers") if "workers" in entries else 1
+    node = entries.get("stopping")
+    stopping = read_stopping(node, metrics, reading) if isinstance(node, Mapping) else Stopping()
+    if len(faults):
+        raise ExperimentFault(faults.sorted())
+    return workers or 1, stopping
 
 
 def _keys_of_all_modes() -> tuple[str, ...]:

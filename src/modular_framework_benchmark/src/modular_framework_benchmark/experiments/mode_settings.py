@@ -145,8 +145,9 @@ def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str]:
         if path is not None and not path.is_file():
             reading.faults.add(value.location, f"there is no file {path}; name the {key} file of the robot")
         files[key] = str(path)
-    if "urdf" not in node.entries:
-        reading.faults.add(node.location, "robot has no urdf; allowed: a package, or {urdf: FILE, srdf: FILE}")
+    for key in ("urdf", "srdf"):
+        if key not in node.entries:
+            reading.faults.add(node.location, f"robot has no {key}; allowed: a package, or {{urdf: FILE, srdf: FILE}}")
     return files
 
 

@@ -34,17 +34,13 @@ class ExperimentFault(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """What reading a value needs beside the value.
+class ValueReading:
+    """Reads values that refer to nothing outside the file.
 
     Attributes:
-        folder: Folder of the experiment file, from which relative paths count.
-        surroundings: What there is to refer to.
         faults: Where faults are noted.
     """
 
-    folder: Path
-    surroundings: Surroundings
     faults: FaultList
 
     def text(self, node: Node, what: str) -> str | None:
@@ -112,6 +108,19 @@ class Reading:
             return Mapping({}, {}, node.location)
         self.faults.add(node.location, f"{what} must be a mapping such as {example}, found {kind_of(node)}")
         return None
+
+
+@dataclass(frozen=True, slots=True)
+class Reading(ValueReading):
+    """Reads values that may refer to files and packages.
+
+    Attributes:
+        folder: Folder of the experiment file, from which relative paths count.
+        surroundings: What there is to refer to.
+    """
+
+    folder: Path
+    surroundings: Surroundings
 
     def path(self, text: str) -> Path:
         """Returns a path of the file: relative ones count from its folder, `~` is the home folder."""

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs an experiment of a database from where it is to its end, and says what came out."""
+
+from __future__ import annotations
+
+import shlex
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from modular_framework_benchmark.commands.mode_runners import runner_factory
+from modular_framework_benchmark.commands.stopping_rules import RunSettings, stopping_rule
+from modular_framework_benchmark.results.database import ResultDatabase
+from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
+from modular_framework_benchmark.scheduling.local_pool import LocalPool, Pool
+from modular_framework_benchmark.scheduling.progress import Progress
+
+EXIT_INTERRUPTED = 130
+COMMAND = "rosrun modular_framework_benchmark"
+
+
+@dataclass(frozen=True, slots=True)
+class SessionOptions:
+    """How the user wants an experiment to run.
+
+    Attributes:
+        target: The database, as it was named.
+        workers: Episodes at the same time; None: as the file says.
+        scheduler: Address of a Dask scheduler; None: workers on this machine.
+        runner: MODULE:NAME of the user's own runner; empty for that of the mode.
+    """
+
+    target: str
+    workers: int | None
+    scheduler: str | None
+    runner: str
+
+
+class ExperimentSession:
+    """One run of the pending episodes.
+
+    Args:
+        database: Where the experiment is.
+        number: Its identifier there.
+        run: Mark of the run's processes.
+        options: How it is to run.
+        settings: Workers and stopping rule of the experiment.
+    """
+
+    def __init__(
+        self, database: ResultDatabase, number: int, run: str, options: SessionOptions, settings: RunSettings
+    ) -> None:
+        (self._stored,) = (one for one in database.experiments() if one.id == number)
+        self._database, self._number, self._run_mark, self._options = database, number, run, options
+        description = self._stored.description
+        self._settings = settings
+        self._name = description.name
+        stem = self._name if "://" in options.target else Path(options.target).stem
+        self._folder = database.folder.resolve() / f"{stem}_episodes" / self._name
+
+    def run(self) -> int:
+        """Runs it and prints the results; returns the exit code."""
+        make_runner = runner_factory(self._stored.description.mode, self._options.runner)
+        rule = stopping_rule(self._settings.stopping)
+        run = ExperimentRun(self._database, self._number, self._folder, rule)
+        progress = Progress(self._stored.planned, self._stored.finished, sys.stderr)
+
+        def make_pool() -> Pool:
+            logs = self._folder / "workers"
+            if self._options.scheduler:
+                from modular_framework_benchmark.scheduling.dask_pool import DaskPool  # Dask takes a second to import
+
+                return DaskPool(self._options.scheduler, make_runner, self._run_mark, logs)
+            return LocalPool(make_runner, self._options.workers or self._settings.workers, self._run_mark, logs)
+
+        print(
+            f"{self._name}: {run.pending} of {self._stored.planned} episodes to run; results in {self._options.target}"
+        )
+        sys.stdout.flush()
+        with _Signals():
+            try:
+                end = run.run(make_pool, progress)
+            except KeyboardInterrupt:
+                return self._interrupted()
+        self._print_results(end)
+        return 0
+
+    def _interrupted(self) -> int:
+        resume = f"{COMMAND} resume {shlex.quote(self._options.target)} --experiment {self._name}"
+        if self._options.runner:
+            resume += f" --runner {self._options.runner}"
+        print(f"\nstopped; every episode that had ended is stored. To go on: {resume}", file=sys.stderr)
+        return EXIT_INTERRUPTED
+
+    def _print_results(self, end: RunEnd) -> None:
+        if end.stopped_because:
+            print(f"ended before all trials: {end.stopped_because}")
+        from modular_framework_benchmark.statistics.analysis import analyse  # takes seconds to import
+
+        for sentence in analyse(self._database.load(self._number, spans=False)).sentences:
+            print(sentence)
+        print(f"report: {COMMAND} report {shlex.quote(self._options.target)} --experiment {self._name}")
+
+
+class _Signals:
+    """Has SIGTERM and SIGHUP end a run as Ctrl-C does."""
+
+    def __enter__(self) -> None:
+        self._before = {kind: signal.signal(kind, _interrupt) for kind in (signal.SIGTERM, signal.SIGHUP)}
+
+    def __exit__(self, *_: object) -> None:
+        for kind, handler in self._before.items():
+            signal.signal(kind, handler)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt

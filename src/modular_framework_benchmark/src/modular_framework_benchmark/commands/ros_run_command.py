@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands `run_experiment` and `resume`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import rospkg
+
+from modular_framework_benchmark.commands.experiment_session import ExperimentSession, SessionOptions
+from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics
+from modular_framework_benchmark.commands.stopping_rules import settings_of
+from modular_framework_benchmark.experiments.design import digest_of, lay_out
+from modular_framework_benchmark.experiments.design_text import design_text
+from modular_framework_benchmark.experiments.experiment import Experiment
+from modular_framework_benchmark.experiments.experiment_file import load_experiment
+from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.results.database import ResultDatabase, open_database
+from modular_framework_benchmark.results.errors import RecordNotStoredError, ResultsError
+from modular_framework_benchmark.scheduling.local_pool import SchedulerError
+from modular_framework_benchmark.scheduling.run_lock import RunLock, RunLockError
+from modular_framework_benchmark.scheduling.worker_process import WorkerStartError
+from modular_framework_core.files.default_folders import API_PACKAGE
+
+EXIT_USER_ERROR, EXIT_FAILED, EXIT_INTERRUPTED = 2, 1, 130
+USER_ERRORS = (ExperimentFault, ResultsError, RunLockError, RunnerError, SchedulerError)
+
+
+class CommandError(Exception):
+    """The command cannot do what was asked for."""
+
+
+def run_experiment(arguments: Sequence[str]) -> int:
+    """Runs the command `run_experiment`."""
+    parser = argparse.ArgumentParser(
+        prog="run_experiment", description="Runs an experiment file, or goes on with it where it was ended."
+    )
+    parser.add_argument("file", type=Path, help=f"experiment file, or name of one in {API_PACKAGE}/experiments")
+    parser.add_argument("--database", help="SQLite file or SQLAlchemy URL for the results; default: EXPERIMENT.db here")
+    parser.add_argument("--dry-run", action="store_true", help="check the file and show its episodes, run nothing")
+    _add_run_options(parser)
+    return _guarded(_run, parser.parse_args(arguments))
+
+
+def resume(arguments: Sequence[str]) -> int:
+    """Runs the command `resume`."""
+    parser = argparse.ArgumentParser(prog="resume", description="Goes on with an experiment that was ended early.")
+    parser.add_argument("database", help="SQLite file or SQLAlchemy URL with its results")
+    parser.add_argument("--experiment", help="its name; default: the only one that is not finished")
+    _add_run_options(parser)
+    return _guarded(_resume, parser.parse_args(arguments))
+
+
+def _add_run_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--workers", type=int, help="episodes at the same time; default: that of the file")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
+    parser.add_argument(
+        "--runner", default="", metavar="MODULE:NAME", help="what runs the episodes; default: the mode's"
+    )
+
+
+def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
+    """Runs a command; turns errors into messages and exit codes."""
+    try:
+        if options.workers is not None and options.workers < 1:
+            raise CommandError(f"--workers is {options.workers}; allowed: 1 or more")
+        return command(options)
+    except (RecordNotStoredError, WorkerStartError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_FAILED
+    except (*USER_ERRORS, CommandError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_USER_ERROR
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        return EXIT_INTERRUPTED
+
+
+def _run(options: argparse.Namespace) -> int:
+    # imported where it is needed: `resume` does without roslaunch
+    from modular_framework_benchmark.experiments.ros_surroundings import RosSurroundings
+
+    experiment = load_experiment(experiment_path(options.file), RosSurroundings(), known_metrics())
+    episodes = lay_out(experiment)
+    if options.dry_run:
+        print(design_text(experiment, episodes))
+        return 0
+    target = options.database or f"{experiment.name}.db"
+    with RunLock(target) as lock, open_database(target, create=True) as database:
+        number = database.add_experiment(experiment.described(digest_of(experiment, episodes)), episodes)
+        return _session(database, number, target, lock, options, experiment).run()
+
+
+def _resume(options: argparse.Namespace) -> int:
+    with RunLock(options.database) as lock, open_database(options.database) as database:
+        number = _unfinished(database, options.experiment, options.database)
+        return _session(database, number, options.database, lock, options, None).run()
+
+
+def _session(
+    database: ResultDatabase,
+    number: int,
+    target: str,
+    lock: RunLock,
+    options: argparse.Namespace,
+    experiment: Experiment | None,
+) -> ExperimentSession:
+    if lock.ended_processes:
+        print(f"ended {lock.ended_processes} processes that an earlier run had left behind", file=sys.stderr)
+    chosen = SessionOptions(target, options.workers, options.scheduler, options.runner)
+    (description,) = (one.description for one in database.experiments() if one.id == number)
+    settings = settings_of(experiment, description)
+    return ExperimentSession(database, number, lock.run, chosen, settings)
+
+
+def _unfinished(database: ResultDatabase, name: str | None, target: str) -> int:
+    """Returns the experiment to go on with."""
+    if name is not None:
+        return database.find(name)
+    stored = database.experiments()
+    open_ones = [one for one in stored if one.finished < one.planned]
+    if len(open_ones) == 1:
+        return open_ones[0].id
+    if len(stored) == 1:
+        return stored[0].id
+    names = ", ".join(one.description.name for one in open_ones or stored)
+    count = f"{len(open_ones)} experiments that are not finished" if open_ones else "no experiment that is not finished"
+    raise CommandError(f"{target} has {count}; name one with --experiment; allowed: {names or 'none, it is empty'}")
+
+
+def experiment_path(given: Path) -> Path:
+    """Returns the path of an experiment file: as given, or in the API package when it is only the name of one."""
+    if given.exists() or given.name != str(given):
+        return given
+    try:
+        folder = Path(rospkg.RosPack().get_path(API_PACKAGE)) / "experiments"
+    except rospkg.ResourceNotFound:
+        return given
+    shipped = [folder / given.name, folder / f"{given.name}.yaml"]
+    return next((path for path in shipped if path.is_file()), given)

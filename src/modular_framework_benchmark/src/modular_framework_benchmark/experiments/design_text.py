@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows the episodes of an experiment before they are run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from modular_framework_benchmark.experiments.experiment import Experiment
+from modular_framework_benchmark.records.episode import EpisodeSpec
+
+SHOWN = 40
+"""Episodes that are listed; more are counted."""
+
+
+def design_text(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
+    """Returns what an experiment varies, what it measures, and its first episodes in the order of the run."""
+    factors = [
+        f"  {factor.name}: {', '.join(factor.levels)}{'  (compared)' if factor.name == experiment.compared else ''}"
+        for factor in experiment.factors
+    ]
+    names = [factor.name for factor in experiment.factors]
+    widths = [max(len(name), *(len(spec.configuration[name]) for spec in episodes)) for name in names]
+    head = "  ".join(f"{name:<{width}}" for name, width in zip(names, widths, strict=True))
+    rows = [
+        f"{spec.number:>6}  {spec.trial:>5}  {spec.seed:>10}  "
+        + "  ".join(f"{spec.configuration[name]:<{width}}" for name, width in zip(names, widths, strict=True))
+        for spec in episodes[:SHOWN]
+    ]
+    more = [f"   ... and {len(episodes) - SHOWN} more"] if len(episodes) > SHOWN else []
+    longest_h = len(episodes) * experiment.time_limit_s / 3600 / experiment.workers
+    return "\n".join(
+        [
+            f"{experiment.name}: {len(episodes)} episodes = {len(experiment.combinations)} combinations x "
+            f"{experiment.trials} trials; mode {experiment.mode}",
+            *factors,
+            f"  metrics: {', '.join(metric.name for metric in experiment.metrics)}",
+            f"  at most {longest_h:.1f} h: {experiment.time_limit_s:g} s an episode, workers: {experiment.workers}",
+            f"number  trial        seed  {head}".rstrip(),
+            *(row.rstrip() for row in rows),
+            *more,
+        ]
+    )

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gives the episodes out in their order, those that can share a running stack to the same worker."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+
+from modular_framework_benchmark.experiments.design import stack_of
+from modular_framework_benchmark.records.episode import EpisodeSpec
+
+
+class EpisodeQueue:
+    """The episodes that are still to be run.
+
+    Args:
+        episodes: In the order of the run.
+    """
+
+    def __init__(self, episodes: Iterable[EpisodeSpec]) -> None:
+        self._groups: list[tuple[str, deque[EpisodeSpec]]] = []
+        for spec in episodes:
+            stack = stack_of(spec.settings)
+            if not self._groups or self._groups[-1][0] != stack:
+                self._groups.append((stack, deque()))
+            self._groups[-1][1].append(spec)
+        self._groups.reverse()  # the next one is the last of the list, from where it is taken off at no cost
+        self._owned: dict[str, deque[EpisodeSpec]] = {}
+
+    def __len__(self) -> int:
+        return sum(len(group) for _, group in self._groups) + sum(len(group) for group in self._owned.values())
+
+    def next_for(self, slot: str) -> EpisodeSpec | None:
+        """Returns the next episode for a slot; None when there is none left.
+
+        A slot goes through the episodes of one stack, then takes the next ones that no other slot has. At the end it
+        helps the slot that has most left.
+        """
+        own = self._owned.get(slot)
+        if not own and self._groups:
+            own = self._owned[slot] = self._groups.pop()[1]
+        if not own:
+            own = max(self._owned.values(), key=len, default=None)
+        return own.popleft() if own else None

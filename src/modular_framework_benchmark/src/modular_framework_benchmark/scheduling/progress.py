@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows how far an experiment is: a bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import TextIO
+
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeStatus
+
+BAR_PERIOD_S, LINE_PERIOD_S = 0.2, 15.0
+BAR_WIDTH = 24
+STATUS_WORDS = {
+    EpisodeStatus.SUCCEEDED: "succeeded",
+    EpisodeStatus.FAILED: "failed",
+    EpisodeStatus.TIMED_OUT: "timed out",
+    EpisodeStatus.BROKEN: "broken",
+}
+
+
+class Progress:
+    """Counts episodes and shows the counts.
+
+    Args:
+        total: How many episodes the experiment has.
+        finished: How many of them had ended before this run.
+        stream: Where to show it.
+        clock: Gives the time [s].
+    """
+
+    def __init__(self, total: int, finished: int, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
+        self._total, self._before, self._stream, self._clock = total, finished, stream, clock
+        self._counts: Counter[EpisodeStatus] = Counter()
+        self._start = self._shown = clock()
+        self._is_terminal = stream.isatty()
+
+    @property
+    def ended(self) -> int:
+        """Returns how many episodes ended in this run."""
+        return sum(self._counts.values())
+
+    def add(self, record: EpisodeRecord) -> None:
+        """Counts an episode that has ended; tells what is broken at once."""
+        self._counts[record.status] += 1
+        if record.status is EpisodeStatus.BROKEN:
+            self._line(f"episode {record.spec.number} ({record.spec.key}) is broken: {record.cause}")
+        self.show()
+
+    def show(self, *, now: bool = False) -> None:
+        """Shows the counts, if that is due."""
+        time_s = self._clock()
+        period_s = BAR_PERIOD_S if self._is_terminal else LINE_PERIOD_S
+        if not now and time_s - self._shown < period_s:
+            return
+        self._shown = time_s
+        if self._is_terminal:
+            self._stream.write(f"\r{self._bar()} {self.text()}"[: _columns(self._stream)] + "\033[K")
+        else:
+            self._stream.write(f"{self.text()}\n")
+        self._stream.flush()
+
+    def end(self) -> None:
+        """Shows the counts for the last time."""
+        self.show(now=True)
+        if self._is_terminal:
+            self._stream.write("\n")
+            self._stream.flush()
+
+    def text(self) -> str:
+        """Returns the counts and the time left in words."""
+        done = self._before + self.ended
+        counts = ", ".join(f"{self._counts[status]} {word}" for status, word in STATUS_WORDS.items())
+        before = f" ({self._before} before)" if self._before else ""
+        return f"{done} of {self._total} episodes{before}: {counts}; {self._time_left(self._total - done)}"
+
+    def _time_left(self, left: int) -> str:
+        if left <= 0:
+            return "done"
+        if self.ended == 0:
+            return "time left: not known yet"
+        seconds = (self._clock() - self._start) / self.ended * left
+        hours, rest = divmod(round(seconds), 3600)
+        return f"about {hours}:{rest // 60:02}:{rest % 60:02} left"
+
+    def _bar(self) -> str:
+        filled = BAR_WIDTH * (self._before + self.ended) // max(self._total, 1)
+        return f"[{'#' * filled}{'.' * (BAR_WIDTH - filled)}]"
+
+    def _line(self, text: str) -> None:
+        self._stream.write(f"\r\033[K{text}\n" if self._is_terminal else f"{text}\n")
+
+
+def _columns(stream: TextIO) -> int:
+    try:
+        return max(os.get_terminal_size(stream.fileno()).columns - 1, 20)
+    except OSError:
+        return 79

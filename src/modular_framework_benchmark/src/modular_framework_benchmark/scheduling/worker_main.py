@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The program of a worker process: `python -m modular_framework_benchmark.scheduling.worker_main CONNECTION LIFELINE`.
+
+It makes its runner, and then runs one episode after the other as they come through the connection. When the process
+that started it is gone, it ends what it has started, and itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import sys
+import threading
+import time
+import traceback
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.scheduling.episode_runner import EpisodeRunner, RunnerFactory, unrun_record
+from modular_framework_benchmark.scheduling.marked_processes import MARK, end_marked_processes
+
+EXIT_NO_RUNNER = 3
+
+
+def main(arguments: list[str]) -> int:
+    """Runs episodes until it is told to end."""
+    connection = Connection(int(arguments[0]))
+    threading.Thread(target=_end_with_parent, args=(int(arguments[1]),), daemon=True).start()
+    try:
+        sys.path[:] = connection.recv()
+        make_runner: RunnerFactory = connection.recv()
+        runner = make_runner()
+    except EOFError:
+        return 0
+    except Exception:  # whatever the mode's code raises is told to the one who started the worker
+        connection.send(traceback.format_exc())
+        return EXIT_NO_RUNNER
+    connection.send(None)
+    try:
+        _serve(connection, runner, make_runner)
+    except (EOFError, BrokenPipeError):
+        _end_with_children()
+    return 0
+
+
+def _serve(connection: Connection, runner: EpisodeRunner, make_runner: RunnerFactory) -> None:
+    while (request := connection.recv()) is not None:
+        spec, folder = request
+        record, usable = run_episode(runner, spec, folder)
+        connection.send(record)
+        if not usable:
+            runner = make_runner()
+    runner.close()
+
+
+def run_episode(runner: EpisodeRunner, spec: EpisodeSpec, folder: Path) -> tuple[EpisodeRecord, bool]:
+    """Runs an episode in an empty folder.
+
+    Returns:
+        Its record, and whether the runner can be used again: not after an exception.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    print(f"---- episode {spec.number}: {spec.key}", flush=True)
+    begun, start = time.time(), time.monotonic()
+    try:
+        return runner.run(spec, folder), True
+    except Exception as error:  # a fault of the mode's code or of a user's: the others can run
+        traceback.print_exc()
+        with contextlib.suppress(Exception):
+            runner.close()
+        cause = f"the runner raised {type(error).__name__}: {error}"
+        return unrun_record(spec, EpisodeStatus.BROKEN, cause, begun, time.monotonic() - start), False
+
+
+def _end_with_parent(lifeline: int) -> None:
+    """Waits until the other end of a pipe is closed: by the parent, or by its death."""
+    while os.read(lifeline, 1):
+        pass
+    _end_with_children()
+
+
+def _end_with_children() -> None:
+    with contextlib.suppress(TimeoutError):
+        end_marked_processes(os.environ[MARK])
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A worker process as the scheduler sees it: start it, give it an episode, see what became of it, end it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import uuid
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
+from modular_framework_benchmark.scheduling.episode_runner import RunnerFactory
+from modular_framework_benchmark.scheduling.marked_processes import MARK, end_marked_processes
+
+START_TIMEOUT_S = 120.0
+"""Longest time until a worker is ready: imports, on a busy machine [s]."""
+CLOSE_TIMEOUT_S = 60.0
+
+
+class WorkerStartError(Exception):
+    """A worker cannot run episodes of this experiment; the message has what it said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """The episode that a worker runs.
+
+    Attributes:
+        spec: The episode.
+        folder: Where its files go.
+        begun: When it started [s since 1970].
+        started: The same by the monotonic clock [s].
+        tries: How often it was started.
+    """
+
+    spec: EpisodeSpec
+    folder: Path
+    begun: float
+    started: float
+    tries: int
+
+
+class WorkerProcess:
+    """A process of its own session, that runs one episode at a time.
+
+    Args:
+        name: Names it in records and in its log file.
+        make_runner: Makes its runner.
+        run: Mark of the run, see `marked_processes`.
+        log_file: Gets what the worker prints.
+    """
+
+    def __init__(self, name: str, make_runner: RunnerFactory, run: str, log_file: Path) -> None:
+        self.name = name
+        self.running: Running | None = None
+        self._make_runner, self._log_file = make_runner, log_file
+        self._mark = f"{run}/{uuid.uuid4().hex}/"
+        self._process: subprocess.Popen[bytes] | None = None
+        self._connection: Connection | None = None
+        self._lifeline = -1
+
+    def start(self) -> None:
+        """Starts the process, and waits until it can run episodes.
+
+        Raises:
+            WorkerStartError: It cannot.
+        """
+        ours, theirs = socket.socketpair()
+        watched, self._lifeline = os.pipe()
+        self._log_file.parent.mkdir(parents=True, exist_ok=True)
+        with self._log_file.open("ab") as log:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", f"{__package__}.worker_main", str(theirs.fileno()), str(watched)],
+                env=os.environ | {MARK: self._mark},
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                pass_fds=(theirs.fileno(), watched),
+                start_new_session=True,
+            )
+        theirs.close()
+        os.close(watched)
+        self._connection = Connection(ours.detach())
+        self._wait_until_ready()
+
+    def _wait_until_ready(self) -> None:
+        assert self._connection is not None
+        try:
+            self._connection.send(sys.path)
+            self._connection.send(self._make_runner)
+            problem = self._connection.recv() if self._connection.poll(START_TIMEOUT_S) else "it does not answer"
+        except (EOFError, OSError):
+            problem = f"it ended: {self._last_words()}"
+        if problem is not None:
+            self.kill()
+            raise WorkerStartError(f"worker {self.name} cannot start: {problem.strip()}; its log is {self._log_file}")
+
+    @property
+    def connection(self) -> Connection:
+        """Returns what becomes readable when the worker has a record, or has ended."""
+        if self._connection is None:
+            raise RuntimeError("the worker was not started")
+        return self._connection
+
+    def begin(self, spec: EpisodeSpec, folder: Path, tries: int = 1) -> None:
+        """Has the worker run an episode; one that has died meanwhile is seen by `finish`."""
+        self.running = Running(spec, folder, time.time(), time.monotonic(), tries)
+        with contextlib.suppress(OSError):
+            self.connection.send((spec, folder))
+
+    def finish(self) -> EpisodeRecord | None:
+        """Returns the record of the episode that has ended; None when the worker has died instead."""
+        try:
+            record: EpisodeRecord = self.connection.recv()
+        except (EOFError, OSError):
+            return None
+        self.running = None
+        return record
+
+    def cause_of_death(self) -> str:
+        """Returns how a worker ended that did so by itself, and what it printed last."""
+        code: int | None = None
+        if self._process is not None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                code = self._process.wait(5.0)
+        how = "was lost" if code is None else f"ended with exit code {code}"
+        if code is not None and code < 0:
+            how = f"was killed by signal {signal.Signals(-code).name}"
+        return f"the worker process {how}; it said last: {self._last_words()}"
+
+    def _last_words(self) -> str:
+        try:
+            lines = self._log_file.read_text(encoding="utf-8", errors="replace").splitlines()
+        except OSError:
+            return "nothing"
+        said = [line.strip() for line in lines[-50:] if line.strip() and not line.startswith("---- ")]
+        return said[-1][:500] if said else "nothing"
+
+    def close(self) -> None:
+        """Has an idle worker end what it runs, and itself; kills it when it does not."""
+        if self._connection is not None and self._process is not None and self.running is None:
+            with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+                self._connection.send(None)
+                self._process.wait(CLOSE_TIMEOUT_S)
+        self.kill()
+
+    def kill(self) -> None:
+        """Ends the worker and everything it has started, at once; may be called twice."""
+        end_marked_processes(self._mark)
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        if self._connection is not None:
+            self._connection.close()
+            os.close(self._lifeline)
+        self._process, self._connection = None, None

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The whole command is killed at random moments, and `resume` completes the experiment: every episode exactly once."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from modular_framework_benchmark.results.database import open_database
+from modular_framework_benchmark.scheduling.marked_processes import marked_processes
+from modular_framework_benchmark.scheduling.run_lock import RunLock
+
+KILLS = 20
+TEXT = """
+experiment: plans
+mode: planning
+robot: {urdf: robot.urdf, srdf: robot.srdf}
+problems: problems
+planner: $planner
+factors: {planner: [RRTConnect, PRM, BKPIECE]}
+compare: planner
+trials: 40
+metrics: [success]
+time_limit: 30
+workers: 2
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "experiment.yaml").write_text(TEXT)
+    for name in ("robot.urdf", "robot.srdf"):
+        (tmp_path / name).write_text("<robot name='r'/>")
+    (tmp_path / "problems").mkdir()
+    for kind in ("scene", "request"):
+        (tmp_path / "problems" / f"{kind}0001.yaml").write_text("{}")
+    return tmp_path
+
+
+def start(folder: Path, command: str, *arguments: str, runner: str = "NodeRunner") -> subprocess.Popen[str]:
+    """Starts a command with a fake runner, as rosrun does."""
+    code = f"import sys; from modular_framework_benchmark.commands.ros_run_command import {command} as c; "
+    code += "sys.exit(c(sys.argv[1:]))"
+    environment = os.environ | {
+        "PYTHONPATH": f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}",
+        "FAKE_RUNS": str(folder / "runs"),
+        "FAKE_EPISODE_S": "0.05",
+        "ROS_HOME": str(folder / "ros"),
+    }
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments, "--runner", f"fake_runners:{runner}"],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finished(folder: Path) -> int:
+    with contextlib.suppress(sqlite3.Error), sqlite3.connect(f"file:{folder}/plans.db?mode=ro", uri=True) as connection:
+        return int(connection.execute("SELECT count(*) FROM runs").fetchone()[0])
+    return 0
+
+
+def test_twenty_kills_at_random_moments_lose_nothing_and_run_nothing_twice(folder: Path) -> None:
+    generator = random.Random(5)
+    mark = RunLock(str(folder / "plans.db")).run
+    kills = 0
+    process = start(folder, "run_experiment", "experiment.yaml")
+    while kills < KILLS:
+        before = finished(folder)
+        end = time.monotonic() + 60
+        while finished(folder) <= before and process.poll() is None and time.monotonic() < end:
+            time.sleep(0.01)
+        time.sleep(generator.uniform(0.0, 0.3))
+        if process.poll() is not None:
+            break
+        process.kill()
+        if generator.random() < 0.5:  # the workers too, so that nobody is left who could end the nodes
+            for number in marked_processes(f"{mark}/"):
+                if b"worker_main" in command_of(number):
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(number, signal.SIGKILL)
+        process.communicate()
+        kills += 1
+        process = start(folder, "resume", "plans.db")
+    output, errors = process.communicate(timeout=300)
+    assert process.returncode == 0, errors
+    assert kills == KILLS, "the experiment is long enough for all kills"
+    assert marked_processes(f"{mark}/") == []
+    with open_database(folder / "plans.db", read_only=True) as database:
+        (stored,) = database.experiments()
+        results = database.load(stored.id)
+    assert stored.finished == stored.planned == 120
+    assert sorted(results.episodes["number"]) == list(range(120))
+    with sqlite3.connect(folder / "plans.db") as connection:
+        assert connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+    ran = Counter((folder / "runs").read_text().split("\n"))
+    assert set(ran) - {""} == {f"planner={row.planner};trial={row.trial}" for row in results.episodes.itertuples()}
+
+
+def command_of(number: int) -> bytes:
+    try:
+        return Path(f"/proc/{number}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def test_a_signal_ends_the_run_and_what_it_has_started_and_says_how_to_go_on(folder: Path) -> None:
+    for kind in (signal.SIGINT, signal.SIGTERM):
+        before = finished(folder)
+        process = start(folder, "run_experiment", "experiment.yaml")
+        while finished(folder) < before + 4:
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        process.send_signal(kind)
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == 130
+        assert "every episode that had ended is stored. To go on: rosrun modular_framework_benchmark resume" in errors
+        assert marked_processes(f"{RunLock(str(folder / 'plans.db')).run}/") == []
+
+
+def test_a_second_run_of_a_database_is_refused_while_the_first_one_runs(folder: Path) -> None:
+    first = start(folder, "run_experiment", "experiment.yaml")
+    while not finished(folder):
+        assert first.poll() is None, first.communicate()
+        time.sleep(0.02)
+    second = start(folder, "resume", "plans.db")
+    _, errors = second.communicate(timeout=60)
+    assert second.returncode == 2
+    assert f"process {first.pid} runs episodes of plans.db already" in errors
+    first.send_signal(signal.SIGINT)
+    first.communicate(timeout=60)
+
+
+def test_the_design_is_shown_without_running_it(folder: Path) -> None:
+    output, _ = start(folder, "run_experiment", "experiment.yaml", "--dry-run").communicate(timeout=60)
+    assert "plans: 120 episodes = 3 combinations x 40 trials; mode planning" in output
+    assert "planner: RRTConnect, PRM, BKPIECE  (compared)" in output
+    assert not (folder / "plans.db").exists()
+
+
+def test_faults_of_the_user_end_with_exit_code_2_and_say_what_to_do(folder: Path) -> None:
+    (folder / "wrong.yaml").write_text(TEXT.replace("trials", "trails"))
+    for command, arguments, fault in (
+        ("run_experiment", ["wrong.yaml"], "wrong.yaml:9:1: the key 'trails' is unknown"),
+        ("run_experiment", ["none.yaml"], "none.yaml:1:1: there is no such file"),
+        ("run_experiment", ["experiment.yaml", "--workers", "0"], "--workers is 0; allowed: 1 or more"),
+        ("resume", ["none.db"], "none.db"),
+    ):
+        process = start(folder, command, *arguments)
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == 2 and fault in errors, errors
