@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
+
 from modular_framework_benchmark.records.experiment import (
     Direction,
     ExperimentDescription,
