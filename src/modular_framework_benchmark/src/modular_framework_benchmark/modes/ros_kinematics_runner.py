@@ -60,7 +60,7 @@ class KinematicsEpisodeRunner:
         """Solves the poses of one trial.
 
         Args:
-            spec: What to run; `docs/experiments.md` has the settings of the mode.
+            spec: What to run; the experiment file of its mode has the settings.
             folder: Folder of the episode; nothing is written there, the figures are all there is.
         """
         watch = Stopwatch()

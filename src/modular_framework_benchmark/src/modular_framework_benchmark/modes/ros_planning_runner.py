@@ -66,7 +66,7 @@ class PlanningEpisodeRunner:
         """Plans one problem.
 
         Args:
-            spec: What to run; `docs/experiments.md` has the settings of the mode.
+            spec: What to run; the experiment file of its mode has the settings.
             folder: Folder for the planned motion, `trajectory.parquet`.
         """
         watch = Stopwatch()
