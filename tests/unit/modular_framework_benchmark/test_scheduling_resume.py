@@ -47,14 +47,16 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def start(folder: Path, command: str, *arguments: str, runner: str = "NodeRunner") -> subprocess.Popen[str]:
+def start(
+    folder: Path, command: str, *arguments: str, runner: str = "NodeRunner", episode_s: float = 0.05
+) -> subprocess.Popen[str]:
     """Starts a command with a fake runner, as rosrun does."""
     code = f"import sys; from modular_framework_benchmark.commands.ros_run_command import {command} as c; "
     code += "sys.exit(c(sys.argv[1:]))"
     environment = os.environ | {
         "PYTHONPATH": f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}",
         "FAKE_RUNS": str(folder / "runs"),
-        "FAKE_EPISODE_S": "0.05",
+        "FAKE_EPISODE_S": str(episode_s),
         "ROS_HOME": str(folder / "ros"),
     }
     return subprocess.Popen(
@@ -120,7 +122,7 @@ def command_of(number: int) -> bytes:
 def test_a_signal_ends_the_run_and_what_it_has_started_and_says_how_to_go_on(folder: Path) -> None:
     for kind in (signal.SIGINT, signal.SIGTERM):
         before = finished(folder)
-        process = start(folder, "run_experiment", "experiment.yaml")
+        process = start(folder, "run_experiment", "experiment.yaml", episode_s=0.5)  # not done before the signal
         while finished(folder) < before + 4:
             assert process.poll() is None, process.communicate()
             time.sleep(0.02)
@@ -132,7 +134,7 @@ def test_a_signal_ends_the_run_and_what_it_has_started_and_says_how_to_go_on(fol
 
 
 def test_a_second_run_of_a_database_is_refused_while_the_first_one_runs(folder: Path) -> None:
-    first = start(folder, "run_experiment", "experiment.yaml")
+    first = start(folder, "run_experiment", "experiment.yaml", episode_s=0.5)  # still running when the second starts
     while not finished(folder):
         assert first.poll() is None, first.communicate()
         time.sleep(0.02)
