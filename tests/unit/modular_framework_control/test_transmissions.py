@@ -187,7 +187,7 @@ def robot(*transmissions: str) -> str:
 def test_roles_say_which_joint_and_actuator_is_which(kind: str, expected: Any) -> None:
     (info,) = read_transmissions(robot(pair(kind)))
     assert info.transmission == expected((50.0, -50.0), (2.0, 1.0), (0.0, -0.5))
-    assert (info.joints, info.actuators, info.line) == (("pitch", "roll"), ("m1", "m2"), 3)
+    assert (info.joints, info.actuators, info.element.line) == (("pitch", "roll"), ("m1", "m2"), 3)
     assert info.interfaces == (PositionJointInterface,)
 
 

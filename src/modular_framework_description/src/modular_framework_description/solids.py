@@ -63,15 +63,6 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class MassProperties:
-    """Mass [kg], centre of mass [m] and inertia about it [kg m^2], in the axes of the body."""
-
-    mass: float
-    centre: Array
-    inertia: Array
-
-
-@dataclass(frozen=True, slots=True)
 class Body:
     """A rigid body of uniform density.
 
@@ -108,6 +99,15 @@ class Body:
         surface = self.mesh()
         surface.density = self.mass / surface.volume
         return MassProperties(self.mass, np.asarray(surface.center_mass), np.asarray(surface.moment_inertia))
+
+
+@dataclass(frozen=True, slots=True)
+class MassProperties:
+    """Mass [kg], centre of mass [m] and inertia about it [kg m^2], in the axes of the body."""
+
+    mass: float
+    centre: Array
+    inertia: Array
 
 
 def unit_inertia(part: Part) -> Array:

@@ -9,9 +9,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from modular_framework_urdf.mimics import Mimic
+from modular_framework_urdf.rotations import matrix_from_rpy
 
 Vector = tuple[float, float, float]
 MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
@@ -32,7 +32,7 @@ class Origin:
     def matrix(self) -> npt.NDArray[np.float64]:
         """Returns the pose as a (4, 4) matrix."""
         matrix = np.eye(4)
-        matrix[:3, :3] = Rotation.from_euler("xyz", self.rpy).as_matrix()
+        matrix[:3, :3] = matrix_from_rpy(*self.rpy)
         matrix[:3, 3] = self.xyz
         return matrix
 
@@ -92,30 +92,34 @@ class UnknownShape:
 Shape = Box | Sphere | Cylinder | Capsule | MeshFile | UnknownShape
 
 
-@dataclass(frozen=True, slots=True)
-class PlacedShapes:
-    """A <visual> or <collision>: its shapes (one, in a correct description), and their pose in the link."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrdfElement:
+    """Base of what is an element of the description; `line` is where it begins."""
 
-    shapes: tuple[Shape, ...]
-    origin: Origin
     line: int
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class PlacedShapes(UrdfElement):
+    """A <visual> or <collision>: its shapes (one, in a correct description), and their pose in the link."""
+
+    shapes: tuple[Shape, ...]
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True)
+class Link(UrdfElement):
     """A link.
 
     Attributes:
         name: of the link.
         visuals: its <visual> elements.
         collisions: its <collision> elements.
-        line: of the description.
     """
 
     name: str
     visuals: tuple[PlacedShapes, ...]
     collisions: tuple[PlacedShapes, ...]
-    line: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +127,8 @@ class Limit:
     """A <limit>; None is not given.
 
     Attributes:
-        lower, upper: positions [rad or m].
+        lower: the least position [rad or m].
+        upper: the greatest position [rad or m].
         effort: the largest [N m or N].
         velocity: the largest [rad/s or m/s].
     """
@@ -145,7 +150,7 @@ class SafetyController:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class Joint(UrdfElement):
     """A joint.
 
     Attributes:
@@ -158,7 +163,6 @@ class Joint:
         limit: None without the element.
         safety: None without the element.
         mimic: the joint it follows directly; None when it follows none.
-        line: of the description.
     """
 
     name: str
@@ -170,7 +174,6 @@ class Joint:
     limit: Limit | None
     safety: SafetyController | None
     mimic: Mimic | None
-    line: int
 
     @property
     def movable(self) -> bool:
@@ -186,7 +189,7 @@ class LocatedText(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class TransmissionPart:
+class TransmissionPart(UrdfElement):
     """A <joint> or <actuator> of a transmission; None is not given."""
 
     tag: str
@@ -195,18 +198,16 @@ class TransmissionPart:
     reduction: LocatedText | None
     offset: LocatedText | None
     interfaces: tuple[LocatedText, ...]
-    line: int
 
 
 @dataclass(frozen=True, slots=True)
-class Transmission:
+class Transmission(UrdfElement):
     """A <transmission>, in the words of the file."""
 
     name: str
     kind: str
     joints: tuple[TransmissionPart, ...]
     actuators: tuple[TransmissionPart, ...]
-    line: int
 
 
 @dataclass(frozen=True, slots=True)

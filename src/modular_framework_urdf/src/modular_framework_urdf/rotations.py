@@ -1,34 +1,65 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rotations as quaternions xyzw and as roll, pitch and yaw: turns about the fixed axes x, then y, then z [rad].
 
-Conversions are SciPy's. Products are written out: SciPy takes ten times as long for a single one, and the simulation
-composes thousands a second.
+Written out, and tested against SciPy: importing SciPy would cost every node a third of a second at its start, and it
+takes ten times as long for a single rotation, of which the simulation composes thousands a second.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-
-from scipy.spatial.transform import Rotation
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
+POLE_RAD = 1e-7  # roll and yaw cannot be told apart where the pitch is so near to its ends
+
 
 def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Returns the unit quaternion of roll, pitch and yaw [rad] (REP 103)."""
-    x, y, z, w = Rotation.from_euler("xyz", (roll, pitch, yaw)).as_quat().tolist()
-    return x, y, z, w
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def matrix_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[Vector3, Vector3, Vector3]:
+    """Returns the rows of the rotation matrix of roll, pitch and yaw [rad] (REP 103)."""
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
 
 
 def rpy_from_quaternion(quaternion: Sequence[float]) -> Vector3:
     """Returns roll, pitch and yaw [rad], pitch within [-pi/2, pi/2]; at its ends the yaw is chosen as 0.
 
+    Sum and difference of roll and yaw come first (Bernardes and Viollet, 2022): no digits are lost near the ends.
+
     Raises:
         ValueError: the quaternion has no length.
     """
-    roll, pitch, yaw = Rotation.from_quat(quaternion).as_euler("xyz", suppress_warnings=True).tolist()
-    return roll, pitch, yaw
+    x, y, z, w = quaternion
+    if not math.hypot(x, y, z, w) > 0.0:
+        raise ValueError(f"({x}, {y}, {z}, {w}) is no rotation: a quaternion must have a length")
+    upper, lower = math.hypot(w + y, z - x), math.hypot(w - y, x + z)
+    pitch = 2 * math.atan2(upper, lower) - math.pi / 2
+    half_sum, half_difference = math.atan2(x + z, w - y), math.atan2(z - x, w + y)
+    if math.pi / 2 - abs(pitch) < POLE_RAD:
+        roll, yaw = (-2 * half_difference if pitch > 0.0 else 2 * half_sum), 0.0
+    else:
+        roll, yaw = half_sum - half_difference, half_sum + half_difference
+    return math.remainder(roll, 2 * math.pi), pitch, math.remainder(yaw, 2 * math.pi)
 
 
 def multiply_quaternions(a: Sequence[float], b: Sequence[float]) -> Quaternion:

@@ -125,12 +125,12 @@ def _link(element: Element, where: str) -> Link:
             PlacedShapes(
                 tuple(_shape(shape, owner, where) for shape in item.findall("geometry/*")),
                 _origin(item, owner, where),
-                item.sourceline,
+                line=item.sourceline,
             )
             for item in element.findall(role)
         )
 
-    return Link(name, placed("visual"), placed("collision"), element.sourceline)
+    return Link(name, placed("visual"), placed("collision"), line=element.sourceline)
 
 
 def _origin(element: Element, owner: str, where: str) -> Origin:
@@ -182,7 +182,7 @@ def _joint(element: Element, where: str) -> Joint:
         None
         if element.find("mimic") is None
         else Mimic(mimic.text("joint") or "", mimic.number("multiplier", 1.0), mimic.number("offset", 0.0)),
-        element.sourceline,
+        line=element.sourceline,
     )
 
 
@@ -193,7 +193,7 @@ def _transmission(element: Element) -> Transmission:
         (element.findtext("type") or "").strip(),
         parts["joint"],
         parts["actuator"],
-        element.sourceline,
+        line=element.sourceline,
     )
 
 
@@ -205,7 +205,7 @@ def _part(element: Element) -> TransmissionPart:
         _text(element.find("mechanicalReduction")),
         _text(element.find("offset")),
         tuple(LocatedText((item.text or "").strip(), item.sourceline) for item in element.findall("hardwareInterface")),
-        element.sourceline,
+        line=element.sourceline,
     )
 
 

@@ -10,6 +10,9 @@ from dataclasses import dataclass, field
 from modular_framework_urdf.mimics import Mimic, resolved
 from modular_framework_urdf.robot import Joint, Robot
 
+DECIMALS = 3
+"""Decimals of a position that is shown."""
+
 
 @dataclass(frozen=True, slots=True)
 class SliderSettings:
@@ -52,6 +55,12 @@ class SliderJoint:
     def has_range(self) -> bool:
         """Whether there is anything to choose."""
         return self.upper > self.lower
+
+    @property
+    def range_text(self) -> str:
+        """The limits, for a user."""
+        limits = f"{self.lower:.{DECIMALS}f} to {self.upper:.{DECIMALS}f} {self.unit}"
+        return f"{limits}, continuous" if self.continuous else limits
 
     def shown(self, position: float) -> float:
         """Returns the position within the limits that is nearest; of a continuous joint, the same one within a turn."""

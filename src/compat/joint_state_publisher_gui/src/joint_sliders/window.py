@@ -22,11 +22,10 @@ from python_qt_binding.QtWidgets import (
 )
 
 from joint_sliders.joint_values import JointValues
-from joint_sliders.slider_joints import SliderJoint, SliderJoints
+from joint_sliders.slider_joints import DECIMALS, SliderJoint, SliderJoints
 
 TICKS = 10000
 """Steps of a slider over its joint's range; numbers may be between two steps."""
-DECIMALS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +112,7 @@ class SliderWindow(QWidget):
         slider.valueChanged.connect(lambda tick: self._move(row, row.position(tick)))
         followers = [name for name, mimic in joints.following.items() if mimic.leader == joint.name]
         widget.setToolTip(
-            f"{joint.name}: {joint.lower:.{DECIMALS}f} to {joint.upper:.{DECIMALS}f} {joint.unit}"
-            + (", continuous" if joint.continuous else "")
-            + (f"; {', '.join(followers)} follow it" if followers else "")
+            f"{joint.name}: {joint.range_text}" + (f"; {', '.join(followers)} follow it" if followers else "")
         )
         _arrange(row)
         return row

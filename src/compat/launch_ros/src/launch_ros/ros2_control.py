@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,14 +37,29 @@ FORWARD_TYPES = (
     "forward_command_controller/ForwardCommandController",
     "forward_command_controller/MultiInterfaceForwardCommandController",
 )
-TRAJECTORY_PACKAGES = {
-    ("position",): "position_controllers",
-    ("velocity",): "velocity_controllers",
-    ("effort",): "effort_controllers",
-    ("position", "velocity"): "pos_vel_controllers",
-    ("acceleration", "position", "velocity"): "pos_vel_acc_controllers",
+
+
+@dataclass(frozen=True, slots=True)
+class JointCommands:
+    """The words of ros_control for joints that take certain commands.
+
+    Attributes:
+        interface: Their hardware interface.
+        package: Package of their trajectory controller.
+    """
+
+    interface: str
+    package: str
+
+
+JOINT_COMMANDS = {
+    ("position",): JointCommands("PositionJointInterface", "position_controllers"),
+    ("velocity",): JointCommands("VelocityJointInterface", "velocity_controllers"),
+    ("effort",): JointCommands("EffortJointInterface", "effort_controllers"),
+    ("position", "velocity"): JointCommands("PosVelJointInterface", "pos_vel_controllers"),
+    ("acceleration", "position", "velocity"): JointCommands("PosVelAccJointInterface", "pos_vel_acc_controllers"),
 }
-"""By command interfaces, in order: the package of ROS 1's trajectory controller."""
+"""By ROS 2's command interfaces of a joint, in order."""
 
 
 def source_of(path: str) -> ParameterSource:
@@ -73,10 +89,10 @@ def ros1_type(type_name: str, parameters: Mapping[str, Any]) -> str:
     """
     if type_name == TRAJECTORY_TYPE:
         interfaces = tuple(sorted(parameters.get("command_interfaces", ["position"])))
-        if interfaces not in TRAJECTORY_PACKAGES:
-            allowed = "; ".join(" ".join(each) for each in TRAJECTORY_PACKAGES)
+        if interfaces not in JOINT_COMMANDS:
+            allowed = "; ".join(" ".join(each) for each in JOINT_COMMANDS)
             raise LaunchError(f"command_interfaces of a {type_name} are {list(interfaces)}; allowed: {allowed}")
-        return f"{TRAJECTORY_PACKAGES[interfaces]}/JointTrajectoryController"
+        return f"{JOINT_COMMANDS[interfaces].package}/JointTrajectoryController"
     if type_name in FORWARD_TYPES:
         interface = str(parameters.get("interface_name", "position"))
         return f"{interface}_controllers/JointGroup{interface.capitalize()}Controller"

@@ -14,6 +14,7 @@ from launch.core.screen_log import get_logger
 
 from launch_ros.namespaces import full_name
 from launch_ros.node_parameters import DESCRIPTION
+from launch_ros.ros2_control import JOINT_COMMANDS
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.robot import Joint
 from modular_framework_urdf.ros2_control import (
@@ -28,14 +29,6 @@ from modular_framework_urdf.urdf_reader import read_urdf
 MOCK_TYPE = "modular_framework_control/MockRobotHW"
 SINGLE_AXIS = ("revolute", "continuous", "prismatic")
 """Kinds of joints that controllers move."""
-MOCK_INTERFACES = {
-    ("position",): "PositionJointInterface",
-    ("velocity",): "VelocityJointInterface",
-    ("effort",): "EffortJointInterface",
-    ("position", "velocity"): "PosVelJointInterface",
-    ("acceleration", "position", "velocity"): "PosVelAccJointInterface",
-}
-"""By command interfaces, in order: the interface of the mock hardware."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +113,8 @@ def _parts(hardware: Ros2ControlHardware) -> list[tuple[str, dict[str, Any]]]:
     several = len(by_interfaces) > 1
     parts = []
     for interfaces, members in by_interfaces.items():
-        if interfaces not in MOCK_INTERFACES:
-            allowed = "; ".join(" ".join(each) for each in MOCK_INTERFACES)
+        if interfaces not in JOINT_COMMANDS:
+            allowed = "; ".join(" ".join(each) for each in JOINT_COMMANDS)
             raise LaunchError(
                 f"{DESCRIPTION}: <ros2_control name='{hardware.name}'>: joint '{members[0].name}' has the command "
                 f"interfaces {list(interfaces)}; allowed for mock hardware: {allowed}"
@@ -136,7 +129,7 @@ def _mock(joints: Iterable[Ros2ControlJoint], interfaces: tuple[str, ...]) -> di
         "type": MOCK_TYPE,
         "joints": [joint.name for joint in members],
         "initial_positions": {joint.name: joint.initial_position for joint in members},
-        "command_interface": MOCK_INTERFACES[interfaces],
+        "command_interface": JOINT_COMMANDS[interfaces].interface,
     }
 
 

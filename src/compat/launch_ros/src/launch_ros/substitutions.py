@@ -25,13 +25,10 @@ class FindPackage(SubstitutionOfText):
         package: Its name.
     """
 
+    package = SubstitutionOfText.text
+
     def __init__(self, package: SomeSubstitutionsType) -> None:
         super().__init__(package)
-
-    @property
-    def package(self) -> list[Substitution]:
-        """Its name."""
-        return self._text
 
     def find(self, package_name: str) -> str:
         """Returns the folder.
@@ -41,8 +38,8 @@ class FindPackage(SubstitutionOfText):
         """
         raise NotImplementedError(f"{type(self).__name__} does not say which folder: define find(package_name)")
 
-    def perform(self, context: LaunchContext) -> str:
-        return self.find(perform_substitutions(context, self._text))
+    def _value(self, context: LaunchContext, package: str) -> str:
+        return self.find(package)
 
     def __truediv__(self, part: SomeSubstitutionsType) -> PathJoinSubstitution:
         """Returns a path in the folder, as `FindPackageShare("robot") / "config"`."""
@@ -79,10 +76,8 @@ class ExecutableInPackage(FindPackage):
     def describe(self) -> str:
         return f"ExecInPkg({described(self._text)}, {described(self._executable)})"
 
-    def perform(self, context: LaunchContext) -> str:
-        return program_of_package(
-            perform_substitutions(context, self._text), perform_substitutions(context, self._executable)
-        )
+    def _value(self, context: LaunchContext, package: str) -> str:
+        return program_of_package(package, perform_substitutions(context, self._executable))
 
 
 class Parameter(SubstitutionOfText):
@@ -97,8 +92,7 @@ class Parameter(SubstitutionOfText):
         super().__init__(name)
         self._default = default
 
-    def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._text)
+    def _value(self, context: LaunchContext, name: str) -> str:
         known: dict[str, Any] = {}
         for entry in context.launch_configurations.get("global_params", ()):
             known |= entry if isinstance(entry, dict) else {}

@@ -252,20 +252,10 @@ class MoveItConfigsBuilder(ParameterBuilder):
             RuntimeError: several files of controllers might be meant.
         """
         configs = self._configs
-        if not configs.robot_description:
-            self.robot_description()
-        if not configs.robot_description_semantic:
-            self.robot_description_semantic()
+        self._load_missing("robot_description", "robot_description_semantic")
         if not configs.robot_description_kinematics:
             _if_present(self.robot_description_kinematics, "no inverse kinematics: goals can be given for joints only")
-        if not configs.planning_pipelines:
-            self.planning_pipelines()
-        if not configs.trajectory_execution:
-            self.trajectory_execution()
-        if not configs.planning_scene_monitor:
-            self.planning_scene_monitor()
-        if not configs.sensors_3d:
-            self.sensors_3d()
+        self._load_missing("planning_pipelines", "trajectory_execution", "planning_scene_monitor", "sensors_3d")
         if not configs.joint_limits:
             _if_present(self.joint_limits, "the limits of the URDF alone count")
         if PILZ in configs.planning_pipelines["planning_pipelines"] and not configs.pilz_cartesian_limits:
@@ -280,6 +270,12 @@ class MoveItConfigsBuilder(ParameterBuilder):
         """
         own = super().to_dict()
         return {**own, **self.to_moveit_configs().to_dict()} if include_moveit_configs else own
+
+    def _load_missing(self, *parts: str) -> None:
+        """Takes the steps, in this order, of the parts that no step has loaded; part and step have the same name."""
+        for part in parts:
+            if not getattr(self._configs, part):
+                getattr(self, part)()
 
     def _content(self, file_path: Path | str | None, name: str) -> dict[str, Any]:
         return self._yaml.load(self._package_path / (file_path or CONFIG / name))

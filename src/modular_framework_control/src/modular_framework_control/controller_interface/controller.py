@@ -38,6 +38,11 @@ class Controller:
     robot_hw: RobotHW = RobotHW()
     pids: Mapping[str, Pid] = MappingProxyType({})
 
+    @property
+    def moving(self) -> bool:
+        """Whether it carries out a goal or brings the joints to rest: simulated time must pass for it."""
+        return False
+
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         """Gets the joint handles and reads the parameters.
 

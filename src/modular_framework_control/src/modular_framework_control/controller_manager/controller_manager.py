@@ -98,6 +98,11 @@ class ControllerManager:
 
     # ---- control loop ----
 
+    @property
+    def moving(self) -> bool:
+        """Whether a running controller carries out a goal."""
+        return any(entry.running and entry.controller.moving for entry in self._loaded)
+
     def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
         """Updates every running controller, then carries out a pending switch. Never raises, never waits.
 

@@ -98,6 +98,11 @@ class GripperActionController(Controller):
 
     # ---- any thread ----
 
+    @property
+    def moving(self) -> bool:
+        """Whether it carries out a goal."""
+        return self._active is not None
+
     def submit(self, position: float, max_effort: float, goal_handle: GripperGoalHandle) -> None:
         """Hands a goal to the control loop.
 

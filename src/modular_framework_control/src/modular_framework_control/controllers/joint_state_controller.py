@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,8 @@ from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_ros.node_handle import NodeHandle, join_names, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.joint_state_controller")
+STILL_PERIOD_S = 0.05
+"""Real time between two reports while the time of the loop stands still [s]: nodes that start then need one."""
 STATE_KEYS = ("position", "velocity", "effort")
 
 
@@ -56,6 +59,9 @@ class JointStateController(Controller):
         self.on_state: Callable[[JointStateSnapshot], None] | None = None
         self._handles: list[JointStateHandle] = []
         self._extra: list[JointStateHandle] = []
+        self._clock: Callable[[], float] = time.monotonic
+        self._reported_s = -math.inf
+        self._repeat_s = 0.0
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         names = read_names(controller_nh, "joints") if controller_nh.has_param("joints") else sorted(hw.names)
@@ -68,8 +74,21 @@ class JointStateController(Controller):
     def starting(self, time_s: float) -> None:
         self._turns.start(time_s)
 
+    def _is_due(self, time_s: float, period_s: float) -> bool:
+        """Whether to report now: in turn, and, while time stands still, what the joints are at that time."""
+        if self._turns.take_turn(time_s):
+            self._reported_s = time_s
+            return True
+        if period_s > 0.0:
+            return False
+        now_s = self._clock()
+        if time_s == self._reported_s and now_s < self._repeat_s:
+            return False
+        self._reported_s, self._repeat_s = time_s, now_s + STILL_PERIOD_S
+        return True
+
     def update(self, time_s: float, period_s: float) -> None:
-        if self.on_state is None or not self._turns.take_turn(time_s):
+        if self.on_state is None or not self._is_due(time_s, period_s):
             return
         joints = (*self._handles, *self._extra)
         self.on_state(

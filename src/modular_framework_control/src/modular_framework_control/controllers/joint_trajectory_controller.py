@@ -107,6 +107,11 @@ class JointTrajectoryController(Controller):
 
     # ---- any thread ----
 
+    @property
+    def moving(self) -> bool:
+        """Whether it follows a goal, a command or a stop ramp."""
+        return self._active is not None or (self._running and self._clock.now_s < self._plan.end_s)
+
     def submit(self, goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None = None) -> None:
         """Hands a goal (with a goal handle) or a command (without one) to the control loop.
 

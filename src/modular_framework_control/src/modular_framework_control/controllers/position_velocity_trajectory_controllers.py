@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from modular_framework_control.controllers.joint_trajectory_controller import JointTrajectoryController
@@ -15,32 +16,34 @@ from modular_framework_control.trajectory.joint_trajectory import ACCELERATION, 
 
 
 class PosVelJointTrajectoryController(JointTrajectoryController):
-    """pos_vel_controllers/JointTrajectoryController: commands position [rad|m] and velocity [rad/s|m/s]."""
+    """pos_vel_controllers/JointTrajectoryController: commands position [rad|m] and velocity [rad/s|m/s].
+
+    Attributes:
+        further_commands: attribute of a joint's handle that takes a command beside the position: row of the desired
+            state that it is given.
+    """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]] = PosVelJointInterface
+    further_commands: ClassVar[Mapping[str, int]] = {"command_velocity": VELOCITY}
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
         super()._command(desired, error, period_s)
-        for handle, velocity in zip(self._handles, desired[VELOCITY].tolist(), strict=True):
-            handle.command_velocity = velocity
+        for attribute, row in self.further_commands.items():
+            for handle, value in zip(self._handles, desired[row].tolist(), strict=True):
+                setattr(handle, attribute, value)
 
     def _command_rest(self) -> None:
         super()._command_rest()
-        for handle in self._handles:
-            handle.command_velocity = 0.0
+        for attribute in self.further_commands:
+            for handle in self._handles:
+                setattr(handle, attribute, 0.0)
 
 
 class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
     """pos_vel_acc_controllers/JointTrajectoryController: commands acceleration [rad/s^2|m/s^2] besides."""
 
     interface_class = PosVelAccJointInterface
-
-    def _command(self, desired: Array, error: Array, period_s: float) -> None:
-        super()._command(desired, error, period_s)
-        for handle, acceleration in zip(self._handles, desired[ACCELERATION].tolist(), strict=True):
-            handle.command_acceleration = acceleration
-
-    def _command_rest(self) -> None:
-        super()._command_rest()
-        for handle in self._handles:
-            handle.command_acceleration = 0.0
+    further_commands: ClassVar[Mapping[str, int]] = {
+        "command_velocity": VELOCITY,
+        "command_acceleration": ACCELERATION,
+    }

@@ -42,16 +42,14 @@ class TransmissionInfo:
     """One transmission of a description.
 
     Attributes:
-        name: of the transmission.
-        line: of the description in which it begins.
+        element: of the description.
         transmission: its formulas.
         actuators: names, in the order of the formulas.
         joints: names, in the order of the formulas.
         interfaces: through which its joints are seen and commanded.
     """
 
-    name: str
-    line: int
+    element: urdf.Transmission
     transmission: Transmission
     actuators: tuple[str, ...]
     joints: tuple[str, ...]
@@ -60,7 +58,7 @@ class TransmissionInfo:
     @property
     def where(self) -> str:
         """The beginning of messages about it."""
-        return f"{WHERE}:{self.line}: transmission '{self.name}'"
+        return f"{WHERE}:{self.element.line}: transmission '{self.element.name}'"
 
 
 class _FaultError(Exception):
@@ -86,7 +84,7 @@ def read_transmissions(description: str) -> list[TransmissionInfo]:
             faults.append(str(fault))
             continue
         for kind, mine, taken in (
-            ("transmission", {info.name}, {other.name for other in infos}),
+            ("transmission", {info.element.name}, {other.element.name for other in infos}),
             ("joint", set(info.joints), {name for other in infos for name in other.joints}),
             ("actuator", set(info.actuators), {name for other in infos for name in other.actuators}),
         ):
@@ -117,8 +115,7 @@ class _Reader:
         joints = self._in_order("joint", self._transmission.joints)
         actuators = self._in_order("actuator", self._transmission.actuators)
         return TransmissionInfo(
-            name,
-            self._line,
+            self._transmission,
             self._formulas(actuators, joints),
             tuple(part.name for part in actuators),
             tuple(part.name for part in joints),

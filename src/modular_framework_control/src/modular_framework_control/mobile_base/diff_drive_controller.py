@@ -22,21 +22,6 @@ from modular_framework_control.mobile_base.wheel_geometry import WheelGeometry
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_names
 
 
-@dataclass(frozen=True)
-class DiffDriveSettings(BaseSettings):
-    """Settings of differential drive: also the factors that calibrate its geometry.
-
-    Attributes:
-        left_wheel_radius_multiplier: of `wheel_radius`, for the left wheels.
-        right_wheel_radius_multiplier: of `wheel_radius`, for the right wheels.
-        wheel_separation_multiplier: of `wheel_separation`.
-    """
-
-    left_wheel_radius_multiplier: float = 1.0
-    right_wheel_radius_multiplier: float = 1.0
-    wheel_separation_multiplier: float = 1.0
-
-
 @dataclass(frozen=True, slots=True)
 class WheelState:
     """One wheel in one cycle.
@@ -58,6 +43,21 @@ class WheelState:
     desired_position: float
     desired_velocity: float
     desired_acceleration: float
+
+
+@dataclass(frozen=True)
+class DiffDriveSettings(BaseSettings):
+    """Settings of differential drive: also the factors that calibrate its geometry.
+
+    Attributes:
+        left_wheel_radius_multiplier: of `wheel_radius`, for the left wheels.
+        right_wheel_radius_multiplier: of `wheel_radius`, for the right wheels.
+        wheel_separation_multiplier: of `wheel_separation`.
+    """
+
+    left_wheel_radius_multiplier: float = 1.0
+    right_wheel_radius_multiplier: float = 1.0
+    wheel_separation_multiplier: float = 1.0
 
 
 class _Wheel:

@@ -44,9 +44,8 @@ class WheelGeometry:
         try:
             return read_urdf(description, self._where)
         except AttributeFault as fault:
-            raise ParameterError(
-                f"{self._where}: <{fault.tag} {fault.key}> of {fault.owner} is '{fault.text}'; "
-                f"expected {fault.expected}; {self._remedy}"
+            raise self._error(
+                f"<{fault.tag} {fault.key}> of {fault.owner} is '{fault.text}'; expected {fault.expected}"
             ) from fault
         except XmlError as error:
             raise ParameterError(str(error)) from error
@@ -80,36 +79,33 @@ class WheelGeometry:
         name = self._joint(joint).child
         link = self._links.get(name)
         if link is None:
-            raise ParameterError(
-                f"{self._where}: joint '{joint}' has the child link '{name}', which is not there; "
-                f"links: {', '.join(sorted(self._links)) or 'none'}; {self._remedy}"
+            raise self._error(
+                f"joint '{joint}' has the child link '{name}', which is not there; "
+                f"links: {', '.join(sorted(self._links)) or 'none'}"
             )
         found = link.collisions[0].shapes if link.collisions else ()
         for shape in found:
             if shape.tag in shapes and isinstance(shape, Cylinder | Sphere):
                 return self._checked(shape, name)
         tags = ", ".join(f"<{shape.tag}>" for shape in found) or ("empty" if link.collisions else "none")
-        raise ParameterError(
-            f"{self._where}: collision geometry of the wheel link '{name}' is {tags}; expected "
-            f"{' or '.join(f'<{tag}>' for tag in shapes)}, whose radius is the wheel's; "
-            f"{self._remedy}"
+        raise self._error(
+            f"collision geometry of the wheel link '{name}' is {tags}; expected "
+            f"{' or '.join(f'<{tag}>' for tag in shapes)}, whose radius is the wheel's"
         )
 
     def _joint(self, name: str) -> Joint:
         if name not in self._joints:
-            raise ParameterError(
-                f"{self._where}: there is no joint '{name}'; joints: "
-                f"{', '.join(sorted(self._joints)) or 'none'}; {self._remedy}"
-            )
+            raise self._error(f"there is no joint '{name}'; joints: {', '.join(sorted(self._joints)) or 'none'}")
         return self._joints[name]
 
     def _checked(self, wheel: Cylinder | Sphere, link: str) -> float:
         if not 0.0 < wheel.radius < math.inf:
-            raise ParameterError(
-                f"{self._where}: <{wheel.tag} radius> of link '{link}' is '{wheel.radius:g}'; "
-                f"expected a number above 0; {self._remedy}"
-            )
+            raise self._error(f"<{wheel.tag} radius> of link '{link}' is '{wheel.radius:g}'; expected a number above 0")
         return wheel.radius
+
+    def _error(self, fault: str) -> ParameterError:
+        """Returns the error of a fault of the description, with its place and what to do."""
+        return ParameterError(f"{self._where}: {fault}; {self._remedy}")
 
     def _frame(self, link: str) -> Array:
         """Frame of a link in the root link, all joints unmoved."""
@@ -121,7 +117,4 @@ class WheelGeometry:
                 return frame
             frame = carrier.origin.matrix() @ frame
             above = carrier.parent
-        raise ParameterError(
-            f"{self._where}: the way from link '{link}' to the root link never ends; expected a tree "
-            f"of links; {self._remedy}"
-        )
+        raise self._error(f"the way from link '{link}' to the root link never ends; expected a tree of links")

@@ -56,6 +56,9 @@ from modular_framework_control.trajectory.trajectory_goal import (
 from modular_framework_ros.node_handle import join_names
 from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
 
+QUEUE_SIZE = 50
+"""Messages that wait for a subscriber: a simulation that runs faster than real time sends them in bursts."""
+
 PID_GAINS = (
     Adjustable("p", -1e5, 1e5, "command per error"),
     Adjustable("i", -1e5, 1e5, "command per error and second"),
@@ -73,7 +76,7 @@ class JointStateRosInterface:
         self, controller: JointStateController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
     ) -> None:
         del name
-        self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=10)
+        self._publisher = rospy.Publisher(join_names(namespace, "joint_states"), JointState, queue_size=QUEUE_SIZE)
         controller.on_state = lambda snapshot: outbox.publish(
             self._publisher, lambda: conversions.joint_state_to_msg(snapshot, loop_time.ahead_s)
         )
@@ -97,7 +100,7 @@ class JointTrajectoryRosInterface:
         self._name = join_names(namespace, name)
         self._loop_time = loop_time
         with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
-            self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=1)
+            self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=QUEUE_SIZE)
             opened.callback(self._state.unregister)
             self._action = ControllerActionServer(
                 f"{self._name}/follow_joint_trajectory",

@@ -116,6 +116,11 @@ class RosControllerManager:
         ]
         return message
 
+    @property
+    def moving(self) -> bool:
+        """Whether a controller carries out a goal."""
+        return self.manager.moving
+
     def flush(self, timeout_s: float = 2.0) -> None:
         """Waits until everything is published that controllers have handed over so far, at most `timeout_s` [s]."""
         self._outbox.flush(timeout_s)

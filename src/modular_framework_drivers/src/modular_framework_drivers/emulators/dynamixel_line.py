@@ -45,6 +45,14 @@ class LineFaults:
     lose_every: int = 0
     corrupt_every: int = 0
 
+    def loses(self, number: int) -> bool:
+        """Whether the answer of a number, counted from 1, is lost."""
+        return bool(self.lose_every) and number % self.lose_every == 0
+
+    def corrupts(self, number: int) -> bool:
+        """Whether it has a flipped bit."""
+        return bool(self.corrupt_every) and number % self.corrupt_every == 0
+
 
 class DynamixelLine:
     """Servos behind a pseudo-terminal; answers, and lets time pass for the fingers, on a thread of its own.
@@ -253,9 +261,9 @@ class DynamixelLine:
         """Put an answer on the line, with its faults and after the time it takes on the wire."""
         self._answered += 1
         faults = self.faults
-        if faults.lose_every and self._answered % faults.lose_every == 0:
+        if faults.loses(self._answered):
             return
-        if faults.corrupt_every and self._answered % faults.corrupt_every == 0:
+        if faults.corrupts(self._answered):
             index = self._random.randrange(2, len(answer))
             answer = answer[:index] + bytes([answer[index] ^ 1 << self._random.randrange(7)]) + answer[index + 1 :]
         answer = self._random.randbytes(faults.garbage) + answer

@@ -25,13 +25,9 @@ from modular_framework_drivers.ezgripper.gripper_servos import (
     describe_errors,
 )
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
-from modular_framework_drivers.ezgripper.mx64 import MOTOR_FAULTS, TORQUE_MAX, ServoErrors
+from modular_framework_drivers.ezgripper.mx64 import MOTOR_FAULTS, TORQUE_MAX, UNWATCHED_TORQUE, WARM, ServoErrors
 
 LOGGER = logging.getLogger("rosout.ezgripper")
-WARM = 70.0
-"""Temperature from which on a warning is logged [deg C]; the motor switches itself off at 80."""
-UNWATCHED_TORQUE = 100
-"""Torque that an MX-64 may apply for any length of time, by its maker [units of the servo]."""
 SILENT_S = 1.0
 """A state older than this, plus the time a servo has for its answer, counts as lost [s]."""
 

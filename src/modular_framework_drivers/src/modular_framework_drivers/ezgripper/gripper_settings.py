@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from modular_framework_drivers.ezgripper.dynamixel_bus import BAUDRATES
 from modular_framework_drivers.ezgripper.grip import GripRules
 from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
-from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
+from modular_framework_drivers.ezgripper.mx64 import LARGEST_ID, TORQUE_MAX
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_number
 
-LARGEST_ID = 252
 FULL_TORQUE = 800
 """Torque that an intensity of 1 stands for at most, by the maker's advice [units of the servo]."""
 

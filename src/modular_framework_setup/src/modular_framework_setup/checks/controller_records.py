@@ -16,30 +16,39 @@ MOTION_TYPES = ("JointTrajectoryController", "GripperActionController", "Paralle
 
 
 @dataclass(frozen=True, slots=True)
-class MoveItController:
+class NamedController:
+    """A controller that a file names.
+
+    Attributes:
+        location: of its entry in the file.
+        joints: it moves, each where the file names it.
+    """
+
+    name: str
+    location: SourceLocation
+    joints: tuple[Located, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MoveItController(NamedController):
     """A controller that motions are sent to.
 
     Attributes:
         kind: its type; empty when none is given.
         action_ns: name of its action; None when none is given.
+        is_default: whether MoveIt prefers it to others of the same joints.
     """
 
-    name: str
-    location: SourceLocation
     kind: Located
     action_ns: Located | None
     is_default: bool
-    joints: tuple[Located, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class HardwareController:
-    """A controller of ros_control or ros2_control."""
+class HardwareController(NamedController):
+    """A controller of ros_control or ros2_control; `kind` is its type."""
 
-    name: str
-    location: SourceLocation
     kind: str
-    joints: tuple[Located, ...]
 
     @property
     def moves(self) -> bool:
@@ -94,10 +103,10 @@ def _controller(name: str, where: SourceLocation, entry: Mapping, faults: FaultL
     return MoveItController(
         name,
         where,
+        joints,
         (plain_text(kind), kind.location if kind else where),
         (plain_text(action), action.location) if action else None,
         default is not None and read_truth(default, f"controller '{name}': default", faults) is True,
-        joints,
     )
 
 
@@ -107,17 +116,17 @@ def hardware_controllers(top: Mapping) -> list[HardwareController]:
     parameters = manager.entries.get("ros__parameters") if isinstance(manager, Mapping) else None
     if isinstance(parameters, Mapping):
         return [
-            HardwareController(name, where, plain_text(entry.entries["type"]), _joints(_settings(top, name)))
+            HardwareController(name, where, _joints(_settings(top, name)), plain_text(entry.entries["type"]))
             for name, where, entry in mappings(parameters)
             if "type" in entry.entries
         ]
     found = []
     for name, where, entry in mappings(top):
         if "/" in plain_text(entry.entries.get("type")):
-            found.append(HardwareController(name, where, plain_text(entry.entries["type"]), _joints(entry)))
+            found.append(HardwareController(name, where, _joints(entry), plain_text(entry.entries["type"])))
         else:  # controllers in the namespace of a robot
             found += [
-                HardwareController(inner, at, plain_text(below.entries["type"]), _joints(below))
+                HardwareController(inner, at, _joints(below), plain_text(below.entries["type"]))
                 for inner, at, below in mappings(entry)
                 if "/" in plain_text(below.entries.get("type"))
             ]

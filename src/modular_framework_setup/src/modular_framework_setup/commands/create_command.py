@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `create_robot`."""
+"""Makes the packages of a robot from its URDF: ROBOT_robot and ROBOT_moveit_config.
+
+The first has description and controllers, the second the configuration for planning. On a terminal it shows what it
+found and asks; otherwise options decide.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +15,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from modular_framework_setup.checks.package_check import check_package
+from modular_framework_setup.commands.command import Command, add_sampling_arguments, check_sampling
 from modular_framework_setup.config_files.robot_tree import RobotTree
-from modular_framework_setup.creation.errors import CreationError
 from modular_framework_setup.creation.package_writer import refuse_existing, write_packages
 from modular_framework_setup.creation.progress_bar import ProgressBar
 from modular_framework_setup.creation.questions import ask_name, confirm_parts
 from modular_framework_setup.creation.robot_parts import RobotParts
 from modular_framework_setup.creation.robot_plan import Choices, RobotPlan, make_plan
 from modular_framework_setup.creation.source_urdf import read_source
+from modular_framework_setup.errors import CreationError
 from modular_framework_urdf import xml_text
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -26,20 +31,10 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Makes the packages of a robot; returns 0, or 1 when it could not."""
-    given = _parser().parse_args(arguments)
-    try:
-        return _create(given)
-    except CreationError as error:
-        print(f"create_robot: {error}", file=sys.stderr)
-        return 1
+    return Command("create_robot", __doc__, _add_arguments, _create).run(arguments)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="create_robot",
-        description="Makes ROBOT_robot (description, controllers) and ROBOT_moveit_config (planning configuration) "
-        "from a URDF. On a terminal it shows what it found and asks; otherwise options decide.",
-    )
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("urdf", type=Path, help="URDF or xacro file")
     parser.add_argument("arguments", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro file")
     parser.add_argument("--name", help="of the robot, in the packages' names; default: the URDF's")
@@ -56,19 +51,16 @@ def _parser() -> argparse.ArgumentParser:
         "--gripper", nargs="+", action="append", default=[], metavar="LINK",
         help="links of the fingers; once a gripper; default: found by mimic joints and pairs of equal joints",
     )  # fmt: skip
-    parser.add_argument("--samples", type=int, default=10_000, help="random states for self collisions")
-    parser.add_argument("--seed", type=int, default=1, help="of the random states")
+    add_sampling_arguments(parser)
     parser.add_argument("--author", default="maintainer", help="maintainer in package.xml")
     parser.add_argument("--email", default="maintainer@example.com", help="maintainer's address in package.xml")
     parser.add_argument("--yes", action="store_true", help="ask nothing: take what is found")
-    return parser
 
 
 def _create(given: argparse.Namespace) -> int:
     if not given.urdf.is_file():
         raise CreationError(f"{given.urdf} is no file; give the path of a URDF or xacro file")
-    if given.samples < 1:
-        raise CreationError(f"--samples is {given.samples}; allowed: 1 or more, 10000 is usual")
+    check_sampling(given)
     is_asking = not given.yes and sys.stdin.isatty()
     choices = Choices(
         _name(given, is_asking), [tuple(chain) for chain in given.arm], given.gripper, given.samples, given.seed,

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `compute_self_collisions`."""
+"""Computes which pairs of links of a robot need no collision check, for the SRDF of a config package.
+
+The reasons are those of the MoveIt Setup Assistant, found on the exact shapes. The package may be of MoveIt 1 or
+MoveIt 2.
+"""
 
 from __future__ import annotations
 
@@ -12,22 +16,20 @@ from pathlib import Path
 from modular_framework_core.files.faults import FaultList
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_setup.commands.command import Command, add_sampling_arguments, check_sampling
 from modular_framework_setup.config_files.collision_matrix import REASONS, MatrixError, matrix_text, with_matrix
 from modular_framework_setup.config_files.config_package import (
-    NoConfigPackageError,
     find_package,
     folder_of,
     packages_beside,
     read_config_package,
 )
 from modular_framework_setup.config_files.description_files import package_document
-from modular_framework_setup.creation.errors import CreationError
 from modular_framework_setup.creation.package_hands import hands_of
 from modular_framework_setup.creation.progress_bar import ProgressBar
 from modular_framework_setup.creation.self_collisions import PairVerdict, find_verdicts
+from modular_framework_setup.errors import CreationError
 from modular_framework_urdf.mesh_paths import mesh_path
-
-SAMPLES = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,31 +49,17 @@ class LoadedRobot:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Computes the collision matrix of a config package, and prints or writes it; returns 0, or 1 when it could not."""
-    given = _parser().parse_args(arguments)
-    try:
-        _run(given)
-    except (CreationError, NoConfigPackageError, OSError, PlanningError) as error:
-        print(f"compute_self_collisions: {error}", file=sys.stderr)
-        return 1
-    return 0
+    return Command("compute_self_collisions", __doc__, _add_arguments, _compute).run(arguments)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="compute_self_collisions",
-        description="Computes which pairs of links of a robot need no collision check, with the reasons of the MoveIt "
-        "Setup Assistant, on the exact shapes; for the SRDF of a config package, of MoveIt 1 or MoveIt 2.",
-    )
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("package", help="a ROS package, or a folder; it need not be built")
-    parser.add_argument("--samples", type=int, default=SAMPLES, help=f"random states; default: {SAMPLES}")
-    parser.add_argument("--seed", type=int, default=1, help="of the random states; default: 1")
+    add_sampling_arguments(parser)
     parser.add_argument("--write", action="store_true", help="replace the matrix in the SRDF; default: print it")
-    return parser
 
 
-def _run(given: argparse.Namespace) -> None:
-    if given.samples < 1:
-        raise CreationError(f"--samples is {given.samples}; allowed: 1 or more, {SAMPLES} is usual")
+def _compute(given: argparse.Namespace) -> int:
+    check_sampling(given)
     folder = folder_of(given.package)
     with packages_beside(folder):
         robot = _load(folder)
@@ -91,6 +79,7 @@ def _run(given: argparse.Namespace) -> None:
         print(matrix_text(disabled), end="")
         _print_checked([verdict for verdict in verdicts if verdict.pair not in disabled])
     print(f"self collisions: {len(disabled)} of {len(verdicts)} pairs of links need no check", file=sys.stderr)
+    return 0
 
 
 def _load(folder: Path) -> LoadedRobot:

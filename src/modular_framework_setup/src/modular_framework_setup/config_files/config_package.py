@@ -16,16 +16,13 @@ from modular_framework_core.files.faults import FaultList, SourceLocation, close
 from modular_framework_core.files.located_yaml import Mapping as YamlMapping
 from modular_framework_core.files.located_yaml import Scalar
 from modular_framework_setup.config_files.yaml_files import load_yaml
+from modular_framework_setup.errors import NoConfigPackageError
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.launch_arguments import launch_files, xacro_arguments
 
 SETTINGS = ".setup_assistant"
 SETTINGS_KEY = "moveit_setup_assistant_config"
 _XACRO_ARGUMENT = re.compile(r"(\w+):=['\"]?([^\s'\"]+)")
-
-
-class NoConfigPackageError(Exception):
-    """What was named is no folder and no ROS package."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,7 +89,9 @@ class Semantics:
     """What the checks of other files need of the SRDF.
 
     Attributes:
+        groups: planning groups by name.
         states: {group: names of its states}.
+        virtual_joints: names of the joints that connect the robot to the world.
     """
 
     groups: Mapping[str, PlanningGroup] = field(default_factory=dict)

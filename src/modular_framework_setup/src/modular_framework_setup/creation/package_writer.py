@@ -13,9 +13,9 @@ from typing import Any
 import jinja2
 
 from modular_framework_setup.config_files.config_package import find_package
-from modular_framework_setup.creation.errors import CreationError
 from modular_framework_setup.creation.robot_parts import Arm
 from modular_framework_setup.creation.robot_plan import RobotPlan
+from modular_framework_setup.errors import CreationError
 
 SUFFIX = ".jinja"
 FRAMEWORK_FILES = (

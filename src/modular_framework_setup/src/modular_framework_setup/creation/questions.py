@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from modular_framework_setup.config_files.robot_tree import RobotTree
-from modular_framework_setup.creation.errors import CreationError
 from modular_framework_setup.creation.robot_parts import RobotParts, find_parts
 from modular_framework_setup.creation.robot_plan import Choices
+from modular_framework_setup.errors import CreationError
 
 
 def ask_name(found: str) -> str:

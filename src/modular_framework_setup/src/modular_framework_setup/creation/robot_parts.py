@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_setup.config_files.robot_tree import RobotTree
-from modular_framework_setup.creation.errors import CreationError
+from modular_framework_setup.errors import CreationError
 from modular_framework_urdf.robot import Joint
 
 LEAST_JOINTS = 2

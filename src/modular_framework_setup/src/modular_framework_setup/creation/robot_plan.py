@@ -16,7 +16,6 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_setup.config_files.config_package import find_package
 from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.creation.collision_sampling import CollisionSampling, Pair
-from modular_framework_setup.creation.errors import CreationError
 from modular_framework_setup.creation.finger_shapes import with_gripper
 from modular_framework_setup.creation.grasp_frame import approach_axis, grasp_pose
 from modular_framework_setup.creation.named_states import gripper_states, ready_state
@@ -24,6 +23,7 @@ from modular_framework_setup.creation.robot_parts import Arm, Gripper, RobotPart
 from modular_framework_setup.creation.self_collisions import Hand, PairVerdict, Progress, find_verdicts
 from modular_framework_setup.creation.source_urdf import SourceUrdf
 from modular_framework_setup.creation.urdf_completion import add_frame, complete_urdf
+from modular_framework_setup.errors import CreationError
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.urdf_reader import read_urdf

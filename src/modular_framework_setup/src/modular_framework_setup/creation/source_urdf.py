@@ -11,7 +11,7 @@ from pathlib import Path
 from modular_framework_core.files.faults import FaultList
 from modular_framework_setup.config_files.config_package import find_package, packages_beside
 from modular_framework_setup.config_files.description_files import parse_document, read_document
-from modular_framework_setup.creation.errors import CreationError
+from modular_framework_setup.errors import CreationError
 from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.xml_text import Element

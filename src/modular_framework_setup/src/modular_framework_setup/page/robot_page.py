@@ -25,7 +25,13 @@ OTHER, CHECKED = "Other", "checked"
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A position of a named state on the bar of a joint."""
+    """A position of a named state on the bar of a joint.
+
+    Attributes:
+        state: "group state".
+        position: [rad or m].
+        percent: place on the scale [%].
+    """
 
     state: str
     position: float
@@ -64,7 +70,15 @@ class JointRow:
 
 @dataclass(frozen=True, slots=True)
 class GroupRow:
-    """A planning group."""
+    """A planning group.
+
+    Attributes:
+        ends: its chains and the groups it is made of, for a reader.
+        active: joints a planner moves.
+        others: its further joints, sorted.
+        solver: of kinematics.yaml; empty when none is given.
+        states: names of its states.
+    """
 
     name: str
     ends: str
@@ -76,7 +90,12 @@ class GroupRow:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What is done with two links: one of REASONS, OTHER, CHECKED; empty for a link and itself."""
+    """What is done with two links.
+
+    Attributes:
+        kind: one of REASONS, OTHER, CHECKED; empty for a link and itself.
+        text: the same for a reader, with the links' names.
+    """
 
     kind: str
     text: str

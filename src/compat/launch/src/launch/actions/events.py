@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from launch.core.action import Action
-from launch.core.errors import LaunchError
+from launch.core.errors import LaunchError, require_type
 from launch.core.event_handler import BaseEventHandler
 from launch.core.launch_context import LaunchContext
 from launch.core.launch_description_entity import LaunchDescriptionEntity
@@ -22,8 +22,8 @@ EXIT_NODE_DIED = 3
 """Exit code of a launch that ended because a process failed."""
 
 
-class RegisterEventHandler(Action):
-    """Registers an event handler.
+class _EventHandlerAction(Action):
+    """Base of actions on an event handler.
 
     Args:
         event_handler: The handler.
@@ -33,7 +33,7 @@ class RegisterEventHandler(Action):
         super().__init__(**kwargs)
         if not isinstance(event_handler, BaseEventHandler):
             raise TypeError(
-                f"{self.where}: RegisterEventHandler: got {event_handler!r}; allowed: a handler of "
+                f"{self.where}: {type(self).__name__}: got {event_handler!r}; allowed: a handler of "
                 "launch.event_handlers"
             )
         self._handler = event_handler
@@ -43,6 +43,10 @@ class RegisterEventHandler(Action):
         """The handler."""
         return self._handler
 
+
+class RegisterEventHandler(_EventHandlerAction):
+    """Registers an event handler."""
+
     def execute(self, context: LaunchContext) -> None:
         context.register_event_handler(self._handler)
 
@@ -50,16 +54,8 @@ class RegisterEventHandler(Action):
         return [(type(self._handler).__name__, normalize_to_list_of_entities(self._handler.described_entities()))]
 
 
-class UnregisterEventHandler(Action):
-    """Removes an event handler.
-
-    Args:
-        event_handler: The handler that was registered.
-    """
-
-    def __init__(self, event_handler: BaseEventHandler, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self._handler = event_handler
+class UnregisterEventHandler(_EventHandlerAction):
+    """Removes an event handler that was registered."""
 
     def execute(self, context: LaunchContext) -> None:
         context.unregister_event_handler(self._handler)
@@ -74,8 +70,7 @@ class EmitEvent(Action):
 
     def __init__(self, *, event: Event, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        if not isinstance(event, Event):
-            raise TypeError(f"{self.where}: EmitEvent: event is {event!r}; allowed: an event of launch.events")
+        require_type(event, Event, f"{self.where}: EmitEvent: event", "an event of launch.events")
         self._event = event
 
     @property

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from launch.core.condition import Condition
-from launch.core.errors import LaunchError, line_of_launch_file, located_error
+from launch.core.errors import LaunchError, line_of_launch_file, located_error, require_type
 from launch.core.launch_context import LaunchContext
 from launch.core.launch_description_entity import LaunchDescriptionEntity
 
@@ -22,13 +22,13 @@ class Action(LaunchDescriptionEntity):
     """
 
     def __init__(self, *, condition: Condition | None = None) -> None:
-        if condition is not None and not isinstance(condition, Condition):
-            raise TypeError(
-                f"{line_of_launch_file()}: {type(self).__name__}: condition is {condition!r}; allowed: a condition of "
-                "launch.conditions; write IfCondition(...) around it"
+        self.where = line_of_launch_file()
+        if condition is not None:
+            what = f"{self.where}: {type(self).__name__}: condition"
+            require_type(
+                condition, Condition, what, "a condition of launch.conditions; write IfCondition(...) around it"
             )
         self._condition = condition
-        self.where = line_of_launch_file()
 
     @property
     def condition(self) -> Condition | None:

@@ -60,6 +60,22 @@ def listed(names: Iterable[str]) -> str:
     return ", ".join(sorted(names)) or "none"
 
 
+def require_type(value: object, kind: type, what: str, allowed: str) -> None:
+    """Checks the type of an argument.
+
+    Args:
+        value: The argument.
+        kind: The type it must have.
+        what: What it is, for the message.
+        allowed: What is allowed, and what to do.
+
+    Raises:
+        TypeError: It has another type.
+    """
+    if not isinstance(value, kind):
+        raise TypeError(f"{what} is {value!r}; allowed: {allowed}")
+
+
 def line_of_launch_file() -> str:
     """Returns file and line of the innermost caller outside of this package: the launch file."""
     frame = sys._getframe(1)

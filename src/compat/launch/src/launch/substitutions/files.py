@@ -59,8 +59,8 @@ class FileContent(SubstitutionOfText):
     def __init__(self, path: SomeSubstitutionsType) -> None:
         super().__init__(path)
 
-    def perform(self, context: LaunchContext) -> str:
-        path = Path(perform_substitutions(context, self._text))
+    def _value(self, context: LaunchContext, text: str) -> str:
+        path = Path(text)
         try:
             return path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
@@ -80,8 +80,7 @@ class FindExecutable(SubstitutionOfText):
     def __init__(self, name: SomeSubstitutionsType) -> None:
         super().__init__(name)
 
-    def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._text)
+    def _value(self, context: LaunchContext, name: str) -> str:
         path = context.environment.get("PATH", os.defpath)
         found = shutil.which(name, path=path)
         if found is None:
@@ -100,17 +99,13 @@ class Command(SubstitutionOfText):
         on_stderr: What to do when it prints errors: fail, ignore, warn, or capture (take them too).
     """
 
+    command = SubstitutionOfText.text
+
     def __init__(self, command: SomeSubstitutionsType, *, on_stderr: SomeSubstitutionsType = "fail") -> None:
         super().__init__(command)
         self._on_stderr = normalize_to_list_of_substitutions(on_stderr)
 
-    @property
-    def command(self) -> list[Substitution]:
-        """Program and arguments."""
-        return self._text
-
-    def perform(self, context: LaunchContext) -> str:
-        command = perform_substitutions(context, self._text)
+    def _value(self, context: LaunchContext, command: str) -> str:
         on_stderr = perform_substitutions(context, self._on_stderr)
         if on_stderr not in ON_STDERR:
             raise SubstitutionFailure(
@@ -150,18 +145,13 @@ class PythonExpression(SubstitutionOfText):
     """
 
     label = "PythonExpr"
+    expression = SubstitutionOfText.text
 
     def __init__(self, expression: SomeSubstitutionsType, python_modules: SomeSubstitutionsType = ("math",)) -> None:
         super().__init__(expression)
         self._modules = normalize_to_list_of_substitutions(python_modules)
 
-    @property
-    def expression(self) -> list[Substitution]:
-        """The expression."""
-        return self._text
-
-    def perform(self, context: LaunchContext) -> str:
-        expression = perform_text(context, self._text)
+    def _value(self, context: LaunchContext, expression: str) -> str:
         names: dict[str, Any] = {}
         try:
             for substitution in self._modules:

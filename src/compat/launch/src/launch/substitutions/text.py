@@ -47,8 +47,20 @@ class SubstitutionOfText(Substitution):
     def __init__(self, text: SomeSubstitutionsType) -> None:
         self._text = normalize_to_list_of_substitutions(text)
 
+    @property
+    def text(self) -> list[Substitution]:
+        """The text; a subclass may offer it under the name it has in ROS 2."""
+        return self._text
+
     def describe(self) -> str:
         return f"{self.label or type(self).__name__}({described(self._text)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        return self._value(context, perform_substitutions(context, self._text))
+
+    def _value(self, context: LaunchContext, text: str) -> str:
+        """Returns the value that follows from the text in a launch context."""
+        raise NotImplementedError(f"{type(self).__name__} does not say its value: define _value(context, text)")
 
 
 class LaunchConfiguration(SubstitutionOfText):
@@ -60,6 +72,7 @@ class LaunchConfiguration(SubstitutionOfText):
     """
 
     label = "LaunchConfig"
+    variable_name = SubstitutionOfText.text
 
     def __init__(self, variable_name: SomeSubstitutionsType, *, default: object = None) -> None:
         super().__init__(variable_name)
@@ -71,13 +84,7 @@ class LaunchConfiguration(SubstitutionOfText):
                 [each if isinstance(each, Substitution) else str(each) for each in parts]
             )
 
-    @property
-    def variable_name(self) -> list[Substitution]:
-        """Its name."""
-        return self._text
-
-    def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._text)
+    def _value(self, context: LaunchContext, name: str) -> str:
         value = context.read_configuration(name)
         if value is not None:
             return str(value)
@@ -104,8 +111,7 @@ class EnvironmentVariable(SubstitutionOfText):
         super().__init__(name)
         self._default = default_value
 
-    def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._text)
+    def _value(self, context: LaunchContext, name: str) -> str:
         if name in context.environment:
             return context.environment[name]
         if self._default is not None:
@@ -168,10 +174,9 @@ class AnonName(SubstitutionOfText):
     def __init__(self, name: SomeSubstitutionsType) -> None:
         super().__init__(name)
 
-    def perform(self, context: LaunchContext) -> str:
-        key = f"anon{perform_substitutions(context, self._text)}"
+    def _value(self, context: LaunchContext, name: str) -> str:
+        key = f"anon{name}"
         if key not in context.launch_configurations:
             host = "".join(each if each.isalnum() else "_" for each in socket.gethostname())
-            name = f"{key.removeprefix('anon')}_{host}_{os.getpid()}_{os.urandom(4).hex()}"
-            context.launch_configurations[key] = name
+            context.launch_configurations[key] = f"{name}_{host}_{os.getpid()}_{os.urandom(4).hex()}"
         return str(context.launch_configurations[key])
