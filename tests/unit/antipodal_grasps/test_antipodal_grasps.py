@@ -125,7 +125,7 @@ def test_the_hand_advances_and_closes_without_touching_anything_but_with_its_pad
     for grasp in grasps[:6]:
         pregrasp = gripper.position_for(grasp.pose.opening)
         seen = []
-        for back in np.linspace(0.0, SETTINGS.approach_distance_m, 4):
+        for back in np.linspace(0.0, SETTINGS.hand.approach_distance_m, 4):
             room = distances(hand, gripper, grasp, float(back), pregrasp, target_body)
             assert min(room.values()) > SETTINGS.hand.min_finger_clearance_m - SAMPLING_M, (name, grasp, back, room)
             seen += [min(distances(hand, gripper, grasp, float(back), pregrasp, body).values()) for body in bodies]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -40,6 +41,7 @@ class Scripted(node.GraspGenerator):
         self._scene = SimpleNamespace(targets=self._next_scene, attached=set(attached))
         self.scenes, self.makes, self.signals = list(scenes), makes, []
         self._stored = SimpleNamespace(replace=lambda grasps, prefix: None)
+        self._reporter = SimpleNamespace(work=lambda name: nullcontext(SimpleNamespace(figures={}, reason="")))
 
     def _next_scene(self, settings):
         scene = self.scenes.pop(0)
@@ -47,7 +49,7 @@ class Scripted(node.GraspGenerator):
             raise scene
         return scene
 
-    def _generate(self, settings, objects):
+    def _generate(self, settings, objects, figures):
         return self.makes()
 
     def _publish(self, success, text):
@@ -59,6 +61,7 @@ def watched(monkeypatch):
     """Lets a generator look at scripted scenes, some seconds of the ROS clock apart; returns what it signalled."""
 
     def watch(scenes, period_s=1.0, makes=lambda: [SimpleNamespace(object_id="box__link")], attached=frozenset()):
+        monkeypatch.setattr(node.SimulatedTime, "enabled", False)
         generator = Scripted(scenes, makes, attached)
         clock = SimpleNamespace(now=50.0)
 

@@ -91,7 +91,7 @@ def test_a_sensor_may_stand_at_a_pose_that_has_a_name(tmp_path: Path) -> None:
     stored = NamedPose("corner", "world", {"": Placement((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))})
     text = "cam: {frame_id: cam, initial_pose: corner}\nlost: {frame_id: x, initial_pose: cornr}\n"
     frames, faults = load_sensor_frames(write(tmp_path, text), {"corner": stored}.get)
-    found = [(frame.frame, frame.parent_frame, frame.position_m) for frame in frames]
+    found = [(frame.frame, frame.parent_frame, frame.placement.position_m) for frame in frames]
     assert found == [("cam", "world", (1.0, 2.0, 3.0))]
     assert "file.yaml:2:" in str(faults[0]) and "no pose named 'cornr' is stored" in str(faults[0])
 
@@ -150,8 +150,12 @@ SENSOR = (
 def test_sensor_frames_are_read_and_single_values_are_left_alone(tmp_path: Path) -> None:
     frames, faults = load_sensor_frames(write(tmp_path, f"kinect: {{{SENSOR}}}\npointcloud_topic_name: a/b\n"))
     assert not faults
-    assert (frames[0].parent_frame, frames[0].frame, frames[0].position_m) == ("world", "cam", (-0.1645, 0.375, 2.72))
-    assert frames[0].quaternion_xyzw == pytest.approx((math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0), abs=1e-9)
+    assert (frames[0].parent_frame, frames[0].frame, frames[0].placement.position_m) == (
+        "world",
+        "cam",
+        (-0.1645, 0.375, 2.72),
+    )
+    assert frames[0].placement.quaternion_xyzw == pytest.approx((math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0), abs=1e-9)
 
 
 def test_the_later_layout_with_an_inline_pose_gives_the_same_frame(tmp_path: Path) -> None:
@@ -161,8 +165,8 @@ def test_the_later_layout_with_an_inline_pose_gives_the_same_frame(tmp_path: Pat
     )
     frames, faults = load_sensor_frames(write(tmp_path, text))
     assert not faults
-    assert frames[0].position_m == (1.0, 2.0, 3.0)
-    assert frames[0].quaternion_xyzw == pytest.approx(quaternion_from_rpy(0.1, 0.2, 0.3))
+    assert frames[0].placement.position_m == (1.0, 2.0, 3.0)
+    assert frames[0].placement.quaternion_xyzw == pytest.approx(quaternion_from_rpy(0.1, 0.2, 0.3))
 
 
 @pytest.mark.parametrize(

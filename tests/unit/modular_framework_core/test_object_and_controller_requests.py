@@ -9,11 +9,11 @@ import pytest
 
 from modular_framework_core.launching.external_controllers import (
     ControllerNode,
-    ExternalControllerError,
     controller_node,
 )
 from modular_framework_core.managers.object_types import ObjectTypeError, ObjectTypes
 from modular_framework_core.scene.manage_object import ObjectRequestError, parse_request
+from modular_framework_ros.node_handle import ParameterError
 
 
 @pytest.fixture
@@ -89,9 +89,9 @@ def test_the_parameters_name_the_node() -> None:
 
 
 def test_missing_parameters_are_listed() -> None:
-    with pytest.raises(ExternalControllerError, match="package_manipulator_action_server"):
+    with pytest.raises(ParameterError, match="package_manipulator_action_server"):
         controller_node({})
-    with pytest.raises(ExternalControllerError, match="manipulator_controller_node_name"):
+    with pytest.raises(ParameterError, match="manipulator_controller_node_name"):
         controller_node({"package_manipulator_action_server": "p", "manipulator_controller_action_server_type": "t"})
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -30,8 +32,25 @@ ARM = ControllerSpec("arm", "follow", "FollowJointTrajectory", ("elbow",))
 GRIPPER = ControllerSpec("gripper", "gripper_cmd", "GripperCommand", ("finger",))
 
 
+class HeldTime:
+    """Notes whether simulated time is held."""
+
+    def __init__(self, enabled: bool) -> None:
+        self.enabled = enabled
+        self.stands = False
+
+    @contextmanager
+    def held(self, _owner: str, during_motions: bool = False) -> Iterator[None]:
+        self.stands = self.enabled and during_motions
+        yield
+        self.stands = False
+
+
 class StandingRobot:
     """What execution asks of the scene monitor: the joints stand at 0.3, the wheel almost a turn further."""
+
+    def __init__(self, waits_for_planning: bool = False) -> None:
+        self.time = HeldTime(waits_for_planning)
 
     model = SimpleNamespace(
         index={"elbow": 0, "finger": 1, "wheel": 2},
@@ -40,6 +59,9 @@ class StandingRobot:
     )
 
     def wait_for_state(self) -> None:
+        return
+
+    def catch_up(self) -> None:
         return
 
     def wait_for_next_state(self, _: float) -> bool:
@@ -74,7 +96,7 @@ class RecordedControllers(ActionControllers):
                 raise answer
             return bool(answer)
 
-        return SimpleNamespace(is_done=is_done, cancel=lambda: self.cancelled.append(name))
+        return SimpleNamespace(is_done=is_done, has_begun=lambda: True, cancel=lambda: self.cancelled.append(name))
 
 
 @pytest.fixture(autouse=True)
@@ -103,6 +125,50 @@ def motion(joints: str, *points: tuple[float, list[float]]) -> RobotTrajectory:
         for at, positions in points
     ]
     return message
+
+
+@pytest.mark.parametrize("waits_for_planning", [False, True])
+def test_parts_of_a_motion_begin_at_one_instant_where_time_can_be_held(waits_for_planning: bool) -> None:
+    robot, stood = StandingRobot(waits_for_planning), []
+
+    class Watched(RecordedControllers):
+        def begin(self, part: MotionPart) -> Any:
+            stood.append(robot.time.stands)
+            return super().begin(part)
+
+    settings = ExecutionSettings(wait_for_trajectory_completion=False)
+    execution = TrajectoryExecution(Watched(ARM, GRIPPER), settings, robot)  # type: ignore[arg-type]
+    execution.execute(motion("elbow finger", (0.0, [0.3, 0.3]), (1.0, [0.4, 0.4])), threading.Event())
+    assert stood == [waits_for_planning, waits_for_planning] and not robot.time.stands
+
+
+def test_where_time_is_held_a_motion_settles_from_the_state_of_the_instant_in_which_it_ended() -> None:
+    class LateRobot(StandingRobot):
+        """Has a state from before the end of the motion until it catches up."""
+
+        late, states = False, 0
+
+        def catch_up(self) -> None:
+            self.late = False
+
+        def wait_for_next_state(self, _: float) -> bool:
+            self.states, self.late = self.states + 1, False
+            return True
+
+        def positions(self) -> Any:
+            return super().positions() - (0.1 if self.late else 0.0)
+
+    robot = LateRobot(waits_for_planning=True)
+
+    class Moving(RecordedControllers):
+        def begin(self, part: MotionPart) -> Any:
+            robot.late = True
+            return super().begin(part)
+
+    settings = ExecutionSettings(wait_for_trajectory_completion=True)
+    execution = TrajectoryExecution(Moving(ARM), settings, robot)  # type: ignore[arg-type]
+    execution.execute(motion("elbow", (0.0, [0.3]), (1.0, [0.4])), threading.Event())
+    assert robot.states == 1
 
 
 def test_a_motion_to_where_the_arm_is_succeeds_without_bothering_its_controller() -> None:

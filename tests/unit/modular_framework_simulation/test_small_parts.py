@@ -68,6 +68,19 @@ def test_a_factor_of_two_runs_twice_as_fast_and_zero_never_sleeps() -> None:
         Pacer(-1.0)
 
 
+def test_time_that_nobody_waits_for_may_pass_at_another_pace() -> None:
+    time = FakeTime()
+    pacer = Pacer(0.0, time.clock, time.sleep, idle_factor=1.0)
+    pacer.keep(1.0, idle=True)
+    pacer.keep(1.2, idle=True)
+    assert time.now == pytest.approx(50.2)
+    pacer.keep(100.0)
+    assert time.now == pytest.approx(50.2)
+    pacer.keep(100.1, idle=True)
+    pacer.keep(100.3, idle=True)
+    assert time.now == pytest.approx(50.4)
+
+
 def test_requests_are_carried_out_by_the_loops_thread_and_errors_come_back() -> None:
     requests, stop, threads = RequestQueue(), threading.Event(), []
 

@@ -14,6 +14,7 @@ from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
 from modular_framework_ros.calls import call_service, wait_for_result
+from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_states.states.call_action import CallAction
 from modular_framework_states.states.call_service import CallService
 from modular_framework_states.states.cartesian_move import CartesianMove
@@ -50,6 +51,7 @@ FINITE = [
 @pytest.fixture()
 def _clock(monkeypatch: pytest.MonkeyPatch) -> None:
     seconds = iter(range(100))
+    monkeypatch.setattr(SimulatedTime, "enabled", False)
     monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(next(seconds)))
     monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
     monkeypatch.setattr("smach.is_shutdown", lambda: False)

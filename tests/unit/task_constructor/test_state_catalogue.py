@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from modular_framework_core.task_constructor.explanation import explain, option_meanings
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSourceError, class_name_of
 
 
@@ -42,6 +43,43 @@ def test_a_state_without_constructor_has_that_of_its_base(tmp_path: Path) -> Non
     assert source.default_names("outcomes") == ("success", "fail")
     text = "class Base:\n    def __init__(self, a=1): pass\nclass Plan(Base):\n    pass\n"
     assert list(catalogue(tmp_path, plan=text).get("plan").options) == ["a"]
+
+
+def test_a_state_has_the_constructor_of_a_base_in_another_module_of_its_package(tmp_path: Path) -> None:
+    package = tmp_path / "my_states"
+    (package / "states").mkdir(parents=True)
+    for folder in (package, package / "states"):
+        (folder / "__init__.py").touch()
+    (package / "kinds.py").write_text("from typing import Literal\nKind = Literal['door', 'drawer']\n")
+    (package / "doors.py").write_text(
+        "from my_states.kinds import Kind\n"
+        "class DoorState(FrameworkState):\n"
+        '    """Base.\n\n    Args:\n        kind: What is moved.\n        **keys: Of any state.\n    """\n'
+        "    DEFAULT_IO_KEYS = ('arm',)\n"
+        "    def __init__(self, kind: Kind, **keys: Unpack[StateKeys]):\n        super().__init__(**keys)\n"
+    )
+    text = 'from my_states.doors import DoorState\nclass Open(DoorState):\n    """Opens it."""\n'
+    source = catalogue(package / "states", open=text).get("open")
+    assert list(source.options) == ["kind", "outcomes", "input_keys", "output_keys", "io_keys"]
+    assert source.options["kind"].type.describe() == "one of 'door', 'drawer'"
+    assert source.is_framework_state and not source.takes_any_option
+    assert (source.default_names("outcomes"), source.default_names("io_keys")) == (("success", "fail"), ("arm",))
+    assert "Opens it." in explain(source) and "Base." not in explain(source)
+    assert option_meanings(source.doc)["kind"] == "What is moved."
+
+
+def test_options_that_a_state_adds_to_those_of_its_imported_base_are_its_own(tmp_path: Path) -> None:
+    (tmp_path / "doors.py").write_text(
+        "class Doors(FrameworkState):\n    def __init__(self, kind, **keys: Unpack[StateKeys]): pass\n"
+    )
+    text = (
+        "from doors import Doors as Base\n"
+        "class Open(Base):\n    def __init__(self, width, **keys: Unpack[StateKeys]):\n"
+        "        super().__init__('door', **keys)\n"
+    )
+    source = catalogue(tmp_path, open=text).get("open")
+    assert list(source.options) == ["width", "outcomes", "input_keys", "output_keys", "io_keys"]
+    assert not source.takes_any_option
 
 
 @pytest.mark.parametrize("call", ["super().__init__(**keys)", "FrameworkState.__init__(self, **keys)"])

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from modular_framework_core.task_runner.userdata_parameters import (
-    UserdataParameterError,
     manipulator_links,
     read_parameters,
 )
+from modular_framework_ros.node_handle import ParameterError
 
 GOOD: dict[str, Any] = {
     "planner_name": "RRTConnect",
@@ -26,7 +26,7 @@ GOOD: dict[str, Any] = {
 
 
 def message(**changes: Any) -> str:
-    with pytest.raises(UserdataParameterError) as caught:
+    with pytest.raises(ParameterError) as caught:
         read_parameters({**GOOD, **changes}.get)
     return str(caught.value)
 
@@ -38,7 +38,7 @@ def test_good_parameters_are_read() -> None:
 
 
 def test_without_any_parameter_all_missing_ones_of_the_arm_are_named_with_their_file() -> None:
-    with pytest.raises(UserdataParameterError) as caught:
+    with pytest.raises(ParameterError) as caught:
         read_parameters({}.get)
     for name in ("planner_name", "robot_speed_factor", "arm_group_name", "number_plan_attempt", "planning_max_time"):
         assert f"'{name}' is not set; it belongs in motion_planner_config.yaml" in str(caught.value)

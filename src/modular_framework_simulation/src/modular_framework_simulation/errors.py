@@ -48,3 +48,7 @@ class DuplicateModelError(SimulationError):
 
 class LoopTimeoutError(SimulationError):
     """The simulation loop did not process a request in time."""
+
+
+class PlanningSceneError(SimulationError):
+    """The planning scene cannot be brought in step with the simulated world."""

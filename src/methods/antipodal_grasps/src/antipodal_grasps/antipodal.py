@@ -36,9 +36,7 @@ class AntipodalSettings:
 
     Attributes:
         pairs: How pairs of contacts are found.
-        hand: How the hand is placed on them.
-        approach_distance_m: How far the hand advances to the grasp [m].
-        lift_distance_m: How high it is lifted [m].
+        hand: How the hand comes to them, is placed on them, and leaves.
         full_clearance_m: Distance from other objects beyond which more is no better [m].
         max_poses: Greatest number of poses of the hand that are tried.
         max_candidates: Greatest number of grasps to return.
@@ -46,11 +44,14 @@ class AntipodalSettings:
 
     pairs: PairSettings = field(default_factory=PairSettings)
     hand: HandSettings = field(default_factory=HandSettings)
-    approach_distance_m: float = 0.10
-    lift_distance_m: float = 0.15
     full_clearance_m: float = 0.03
     max_poses: int = 400
     max_candidates: int = 80
+
+    def squareness(self, alignment: float) -> float:
+        """Returns how squarely two sides face each other: 1 for parallel sides, 0 at the edge of the friction cone."""
+        least = self.hand.cone_cosine
+        return max(0.0, (alignment - least) / (1.0 - least))
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ def antipodal_grasps(query: GraspQuery, settings: AntipodalSettings) -> list[Ant
         if pose is None:
             continue
         clearance = surroundings.of_grasp(
-            pose.position, pose.axes, (pose.opening, pose.width), settings.approach_distance_m
+            pose.position, pose.axes, (pose.opening, pose.width), settings.hand.approach_distance_m
         )
         if clearance > 0.0:
             grasps.append(_ranked(pose, clearance, query, settings))
@@ -107,7 +108,7 @@ def _poses_to_try(
     centroid = query.target.surface.centroid
     tries = []
     for pair in pairs:
-        worth = _squareness(pair.alignment, settings) + _centred(pair.distance_from(centroid))
+        worth = settings.squareness(pair.alignment) + _centred(pair.distance_from(centroid))
         for axes in hand_axes_for(pair.axis, settings.hand):
             angle = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
             tries.append((angle, worth, (pair, axes)))
@@ -130,18 +131,13 @@ def _ranked(pose: HandPose, clearance: float, query: GraspQuery, settings: Antip
     from_centre = query.target.surface.centroid - pose.contacts.mean(axis=0)
     offset = float(np.linalg.norm(from_centre - axis * (from_centre @ axis)))
     quality = (
-        0.25 * _squareness(pose.alignment, settings)
+        0.25 * settings.squareness(pose.alignment)
         + 0.25 * _centred(offset)
         + 0.25 * min(1.0, clearance / settings.full_clearance_m)
         + 0.15 * min(1.0, pose.overlap / (2 * gripper.pad_half_height))
         + 0.10 * (gripper.max_opening - pose.opening) / gripper.max_opening
     )
     return AntipodalGrasp(pose, clearance, offset, quality)
-
-
-def _squareness(alignment: float, settings: AntipodalSettings) -> float:
-    least = settings.hand.cone_cosine
-    return max(0.0, (alignment - least) / (1.0 - least))
 
 
 def _centred(offset: float) -> float:

@@ -10,14 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from antipodal_grasps.ray_casting import SAME_PLACE_M, Crossing, lines_through
+from antipodal_grasps.ray_casting import Crossing, lines_through
 from modular_framework_core.grasp_generation import solid_meshes
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
 Array = npt.NDArray[np.float64]
 
-
 ALIGNMENT_DIGITS = 3
+SAME_PLACE_M = 1e-5
+"""Crossings that are nearer to each other than this are at the same place."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,9 @@ from modular_framework_core.grasp_generation.hand_clearance import (
     Passage,
     highest_points,
     lowest_height,
+    passage_between,
 )
+from modular_framework_core.grasp_generation.hand_motion_settings import HandMotionSettings
 from modular_framework_core.grasp_generation.surface_points import Surface
 
 Array = npt.NDArray[np.float64]
@@ -32,25 +34,17 @@ LEVEL = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class HandSettings:
+class HandSettings(HandMotionSettings):
     """Limits of a usable pose of the hand.
 
     Attributes:
         approach_step_rad: Step between approach directions around a closing axis [rad].
         max_approach_angle_rad: Greatest angle between the approach and straight down [rad].
-        finger_clearance_m: Room between the hand and the object on each side when the hand advances [m].
-        min_finger_clearance_m: The least such room, with which a hand that opens no wider advances [m].
-        tip_clearance_m: Smallest distance of the hand from the support [m].
-        min_pad_overlap_m: Least length of the pads, along the approach, that must touch [m].
         cone_cosine: Least cosine between the line of the contacts and the normals there: the friction cone.
     """
 
     approach_step_rad: float = math.radians(30.0)
     max_approach_angle_rad: float = math.radians(95.0)
-    finger_clearance_m: float = 0.012
-    min_finger_clearance_m: float = 0.003
-    tip_clearance_m: float = 0.006
-    min_pad_overlap_m: float = 0.008
     cone_cosine: float = 0.95
 
 
@@ -135,7 +129,7 @@ def place_hand(
         needed = 2 * (hold.passage.half_width + hold.passage.clearance)
         if _height_over_support(pair, axes, hold, needed, support_z, gripper, settings) > farthest:
             return None
-        lowest, opening = lowest_height(view.top - [hold.middle, 0.0, 0.0], hold.passage, height, gripper)
+        lowest, opening = lowest_height(view.top - [hold.passage.middle, 0.0, 0.0], hold.passage, height, gripper)
         lowest = max(lowest, _height_over_support(pair, axes, hold, opening, support_z, gripper, settings))
         if lowest > farthest:
             return None
@@ -173,9 +167,8 @@ class _View:
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
-    """What the pads touch at one height: the middle along x, each side's centre and normal, and what passes."""
+    """What the pads touch at one height: the centre of each side, how they face each other, and what passes."""
 
-    middle: float
     low: Array
     high: Array
     alignment: float
@@ -192,7 +185,6 @@ def _hold_at(
     if not touching.any():
         return None
     x = points[touching, 0]
-    middle = float(x.min() + x.max()) / 2
     sides = [
         _side(points[touching], view.normals[touching], x <= x.min() + CONTACT_DEPTH_M, -1.0),
         _side(points[touching], view.normals[touching], x >= x.max() - CONTACT_DEPTH_M, 1.0),
@@ -207,11 +199,8 @@ def _hold_at(
     if alignment < settings.cone_cosine or overlap < settings.min_pad_overlap_m:
         return None
     passed = points[points[:, 2] >= pad_z - gripper.pad_half_height, 0]
-    half_width = max(float(passed.max()) - middle, middle - float(passed.min()))
-    clearance = min(settings.finger_clearance_m, gripper.max_opening / 2 - half_width)
-    if clearance < min(settings.min_finger_clearance_m, settings.finger_clearance_m):
-        return None
-    return _Hold(middle, low, high, alignment, overlap, Passage(float(np.ptp(x)), half_width, clearance))
+    passage = passage_between(x, passed, gripper, settings)
+    return None if passage is None else _Hold(low, high, alignment, overlap, passage)
 
 
 def _side(points: Array, normals: Array, outermost: npt.NDArray[np.bool_], sign: float) -> tuple[Array, Array] | None:
@@ -237,7 +226,7 @@ def _height_over_support(
     samples = np.flatnonzero((gripper.openings >= hold.passage.width) & (gripper.openings <= opening))
     samples = samples if len(samples) else np.array([int(np.argmin(np.abs(gripper.openings - opening)))])
     reach = min(float((part.corners[samples] @ axes[2]).min()) for part in gripper.parts)
-    missing = support_z + settings.tip_clearance_m - (float(pair.middle[2] + hold.middle * axes[2, 0]) + reach)
+    missing = support_z + settings.tip_clearance_m - (float(pair.middle[2] + hold.passage.middle * axes[2, 0]) + reach)
     lift = -float(axes[2, 2])
     if lift > LEVEL:
         return missing / lift
@@ -248,6 +237,6 @@ def _pose(
     pair: ContactPair, axes: Array, height: float, opening: float, hold: _Hold, settings: HandSettings
 ) -> HandPose:
     frame = axes * [1.0, -1.0, -1.0]
-    position = pair.middle + frame @ [hold.middle, 0.0, height]
+    position = pair.middle + frame @ [hold.passage.middle, 0.0, height]
     contacts = pair.middle + np.array([hold.low, hold.high]) @ frame.T
     return HandPose(position, axes, contacts, hold.alignment, hold.passage.width, opening, hold.overlap)

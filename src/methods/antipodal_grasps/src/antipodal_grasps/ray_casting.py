@@ -12,10 +12,10 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 
 Array = npt.NDArray[np.float64]
 
-PARALLEL = 1e-9
-EDGE = 1e-9
-SAME_PLACE_M = 1e-5
+ROUNDING = 1e-9
+"""A line meets no triangle to whose plane it is parallel within this, and goes through one that it passes this near."""
 BATCH = 2_000_000
+"""Pairs of a line and a triangle that are computed at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +70,10 @@ def _cut(corners: Array, normals: Array, origins: Array, directions: Array) -> t
     """
     corner, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     facing = directions @ normals.T
-    parallel = np.abs(facing) < PARALLEL * np.linalg.norm(normals, axis=1)
+    parallel = np.abs(facing) < ROUNDING * np.linalg.norm(normals, axis=1)
     inverse = -1.0 / np.where(parallel, 1.0, facing)
     moments = np.cross(origins, directions)
     u = (moments @ second.T - directions @ np.cross(second, corner).T) * inverse
     v = (directions @ np.cross(first, corner).T - moments @ first.T) * inverse
     distances = (origins @ normals.T - (corner * normals).sum(axis=1)) * inverse
-    return distances, ~parallel & (u >= -EDGE) & (v >= -EDGE) & (u + v <= 1.0 + EDGE)
+    return distances, ~parallel & (u >= -ROUNDING) & (v >= -ROUNDING) & (u + v <= 1.0 + ROUNDING)

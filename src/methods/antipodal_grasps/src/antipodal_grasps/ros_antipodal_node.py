@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 
 import numpy as np
 
 from antipodal_grasps.antipodal import AntipodalGrasp, AntipodalSettings, antipodal_grasps
 from antipodal_grasps.contact_pairs import PairSettings
 from antipodal_grasps.hand_poses import HandSettings
-from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspQuery
+from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspQuery, ReadNumber
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
-from modular_framework_core.grasp_generation.ros_generator_settings import number
+from modular_framework_core.grasp_generation.ros_generator_settings import ParameterisedMethod, number, read_hand_motion
 from modular_framework_core.grasp_generation.ros_grasp_generator import run_grasp_generator
 
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
@@ -20,14 +21,14 @@ FAR_TRAVEL, TRAVEL_SHARE = 1.5, 0.2
 """A joint that moves this far [rad] between two poses of a grasp has swung to another posture of the arm."""
 
 
-class AntipodalMethod:
+class AntipodalMethod(ParameterisedMethod):
     """Antipodal grasps; the parameters of :func:`read_antipodal_settings` are read again for every object."""
 
     manner = "between two opposite sides"
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
         """Returns the grasps of an object in the order of :func:`antipodal_grasps`, then with the hand half turned."""
-        settings = read_antipodal_settings()
+        settings = read_antipodal_settings(self.read)
         grasps = antipodal_grasps(query, settings)
         return [_candidate(grasp, turn, query.gripper, settings) for turn in (np.eye(3), HALF_TURN) for grasp in grasps]
 
@@ -43,37 +44,37 @@ def _candidate(
         grasp.pose.position,
         grasp.pose.axes @ turn,
         gripper.position_for(grasp.pose.opening),
-        settings.approach_distance_m,
-        settings.lift_distance_m,
+        settings.hand.approach_distance_m,
+        settings.hand.lift_distance_m,
         grasp.quality,
     )
 
 
-def read_antipodal_settings() -> AntipodalSettings:
-    """Reads the parameters of the method; a value out of range is replaced by its default, and that is logged."""
+def read_antipodal_settings(read: ReadNumber = number) -> AntipodalSettings:
+    """Reads the parameters of the method.
+
+    Args:
+        read: Reads a parameter; by default from the parameter server, where a value out of range is replaced by its
+            default, and that is logged.
+    """
     pairs, hand, defaults = PairSettings(), HandSettings(), AntipodalSettings()
     pairs = PairSettings(
-        surface_samples=int(number("~surface_samples", pairs.surface_samples, 10, 100000)),
-        lines_per_sample=int(number("~lines_per_sample", pairs.lines_per_sample, 1, 100)),
-        friction=number("~friction", pairs.friction, 0.02, 2.0),
+        surface_samples=int(read("~surface_samples", pairs.surface_samples, 10, 100000)),
+        lines_per_sample=int(read("~lines_per_sample", pairs.lines_per_sample, 1, 100)),
+        friction=read("~friction", pairs.friction, 0.02, 2.0),
     )
     hand = HandSettings(
-        approach_step_rad=number("~approach_step", hand.approach_step_rad, 0.05, math.pi),
-        max_approach_angle_rad=number("~max_approach_angle", hand.max_approach_angle_rad, 0.01, math.pi),
-        finger_clearance_m=number("~finger_clearance", hand.finger_clearance_m, 0.0, 0.1),
-        min_finger_clearance_m=number("~min_finger_clearance", hand.min_finger_clearance_m, 0.0, 0.1),
-        tip_clearance_m=number("~tip_clearance", hand.tip_clearance_m, 0.0, 0.1),
-        min_pad_overlap_m=number("~min_pad_overlap", hand.min_pad_overlap_m, 0.001, 0.1),
+        **asdict(read_hand_motion(read)),
+        approach_step_rad=read("~approach_step", hand.approach_step_rad, 0.05, math.pi),
+        max_approach_angle_rad=read("~max_approach_angle", hand.max_approach_angle_rad, 0.01, math.pi),
         cone_cosine=pairs.cone_cosine,
     )
     return AntipodalSettings(
         pairs=pairs,
         hand=hand,
-        approach_distance_m=number("~approach_distance", defaults.approach_distance_m, 0.01, 0.5),
-        lift_distance_m=number("~lift_distance", defaults.lift_distance_m, 0.0, 1.0),
-        full_clearance_m=number("~full_clearance", defaults.full_clearance_m, 0.001, 1.0),
-        max_poses=int(number("~max_poses", defaults.max_poses, 1, 1000000)),
-        max_candidates=int(number("~max_candidates", defaults.max_candidates, 1, 1000000)),
+        full_clearance_m=read("~full_clearance", defaults.full_clearance_m, 0.001, 1.0),
+        max_poses=int(read("~max_poses", defaults.max_poses, 1, 1000000)),
+        max_candidates=int(read("~max_candidates", defaults.max_candidates, 1, 1000000)),
     )
 
 

@@ -4,23 +4,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 
 import numpy as np
 
-from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspQuery
-from modular_framework_core.grasp_generation.ros_generator_settings import number
+from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspQuery, ReadNumber
+from modular_framework_core.grasp_generation.ros_generator_settings import ParameterisedMethod, number, read_hand_motion
 from modular_framework_core.grasp_generation.ros_grasp_generator import run_grasp_generator
 from top_down_grasps.top_down import TopDownGrasp, TopDownSettings, top_down_grasps
 
 
-class TopDownMethod:
+class TopDownMethod(ParameterisedMethod):
     """Grasps from above; the parameters of :func:`read_top_down_settings` are read again for every object."""
 
     manner = "from above"
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
         """Returns the grasps of an object, best first."""
-        settings = read_top_down_settings()
+        settings = read_top_down_settings(self.read)
         return [
             _candidate(grasp, settings)
             for grasp in top_down_grasps(query.target.surface, query.support_z, query.gripper, settings)
@@ -43,21 +44,21 @@ def _candidate(grasp: TopDownGrasp, settings: TopDownSettings) -> GraspCandidate
     )
 
 
-def read_top_down_settings() -> TopDownSettings:
-    """Reads the parameters of the method; a value out of range is replaced by its default, and that is logged."""
+def read_top_down_settings(read: ReadNumber = number) -> TopDownSettings:
+    """Reads the parameters of the method.
+
+    Args:
+        read: Reads a parameter; by default from the parameter server, where a value out of range is replaced by its
+            default, and that is logged.
+    """
     defaults = TopDownSettings()
     return TopDownSettings(
-        approach_distance_m=number("~approach_distance", defaults.approach_distance_m, 0.01, 0.5),
-        lift_distance_m=number("~lift_distance", defaults.lift_distance_m, 0.0, 1.0),
-        finger_clearance_m=number("~finger_clearance", defaults.finger_clearance_m, 0.0, 0.1),
-        min_finger_clearance_m=number("~min_finger_clearance", defaults.min_finger_clearance_m, 0.0, 0.1),
-        tip_clearance_m=number("~tip_clearance", defaults.tip_clearance_m, 0.0, 0.1),
-        min_pad_overlap_m=number("~min_pad_overlap", defaults.min_pad_overlap_m, 0.001, 0.1),
-        min_side_alignment=number("~min_side_alignment", defaults.min_side_alignment, 0.5, 0.999),
-        yaw_step_rad=number("~yaw_step", defaults.yaw_step_rad, 0.02, math.pi),
-        place_step_m=number("~place_step", defaults.place_step_m, 0.002, 0.5),
-        best_reach_m=number("~best_reach", defaults.best_reach_m, 0.0, 10.0),
-        base_xy_m=(number("~base_x", 0.0), number("~base_y", 0.0)),
+        **asdict(read_hand_motion(read)),
+        min_side_alignment=read("~min_side_alignment", defaults.min_side_alignment, 0.5, 0.999),
+        yaw_step_rad=read("~yaw_step", defaults.yaw_step_rad, 0.02, math.pi),
+        place_step_m=read("~place_step", defaults.place_step_m, 0.002, 0.5),
+        best_reach_m=read("~best_reach", defaults.best_reach_m, 0.0, 10.0),
+        base_xy_m=(read("~base_x", 0.0), read("~base_y", 0.0)),
     )
 
 

@@ -23,10 +23,11 @@ from modular_framework_core.grasp_generation.hand_clearance import (
     CONTACT_DEPTH_M,
     HEIGHT_ROUNDS,
     HEIGHT_TOLERANCE_M,
-    Passage,
     highest_points,
     lowest_height,
+    passage_between,
 )
+from modular_framework_core.grasp_generation.hand_motion_settings import HandMotionSettings
 from modular_framework_core.grasp_generation.surface_points import Surface
 
 Array = npt.NDArray[np.float64]
@@ -35,16 +36,10 @@ SAME_DIRECTION_RAD = math.radians(3.0)
 
 
 @dataclass(frozen=True, slots=True)
-class TopDownSettings:
+class TopDownSettings(HandMotionSettings):
     """Limits of a usable grasp.
 
     Attributes:
-        approach_distance_m: Height of the pregrasp pose over the grasp pose [m].
-        lift_distance_m: Height of the postgrasp pose over the grasp pose [m].
-        finger_clearance_m: Room between the hand and the object on each side when the hand comes down [m].
-        min_finger_clearance_m: The least such room, with which a hand that opens no wider comes down [m].
-        tip_clearance_m: Smallest distance of the fingertips from the support [m].
-        min_pad_overlap_m: Least height of the pads that must touch [m].
         min_side_alignment: Least cosine between a side's normal and the closing direction.
         yaw_step_rad: Step between closing directions [rad].
         place_step_m: Step between places along the object [m].
@@ -52,12 +47,6 @@ class TopDownSettings:
         base_xy_m: Place of the arm's base in the world [m].
     """
 
-    approach_distance_m: float = 0.10
-    lift_distance_m: float = 0.15
-    finger_clearance_m: float = 0.012
-    min_finger_clearance_m: float = 0.003
-    tip_clearance_m: float = 0.006
-    min_pad_overlap_m: float = 0.008
     min_side_alignment: float = 0.95
     yaw_step_rad: float = math.pi / 12
     place_step_m: float = 0.015
@@ -244,16 +233,13 @@ def _highest_hold(
         overlap = min(top, pad_z + gripper.pad_half_height) - (pad_z - gripper.pad_half_height)
         if overlap < settings.min_pad_overlap_m or not touching.any():
             return None
-        low, high = float(flat.x[touching].min()), float(flat.x[touching].max())
-        middle = (low + high) / 2
-        straddled = flat.x[between & (flat.z >= z - gripper.max_tip)]
-        half_width = max(float(straddled.max()) - middle, middle - float(straddled.min()))
-        clearance = min(settings.finger_clearance_m, gripper.max_opening / 2 - half_width)
-        if clearance < min(settings.min_finger_clearance_m, settings.finger_clearance_m):
+        straddled = between & (flat.z >= z - gripper.max_tip)
+        passage = passage_between(flat.x[touching], flat.x[straddled], gripper, settings)
+        if passage is None:
             return None
-        passage = Passage(high - low, half_width, clearance)
-        lowest, opening = lowest_height(flat.top_around(middle, y_grasp), passage, z, gripper)
+        lowest, opening = lowest_height(flat.top_around(passage.middle, y_grasp), passage, z, gripper)
         if lowest <= z + HEIGHT_TOLERANCE_M:
+            low, high = float(flat.x[touching].min()), float(flat.x[touching].max())
             return _Hold(z, pad_z, low, high, overlap, opening, touching)
         z = lowest
     return None

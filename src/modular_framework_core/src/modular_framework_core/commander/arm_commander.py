@@ -55,6 +55,7 @@ from modular_framework_ros.calls import (
     wait_for_service,
     wait_until,
 )
+from modular_framework_ros.seeds import seed_parameter
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested
 
@@ -63,6 +64,7 @@ PLANNERS_SERVICE = "query_planner_interface"
 CLOCK_WAIT_S = 0.3
 SERVICE_TIMEOUT_S = 10.0
 IK_TIMEOUT_S = 1.0
+SEEDED_TIMEOUT_FACTOR = 10.0
 
 
 class CommanderError(RuntimeError):
@@ -231,10 +233,13 @@ class ArmCommander:
 
         Joints outside the group are left out on purpose: a seed that names them would pin fingers that follow others.
         """
-        return self._joints.positions(self.group.joint_names)
+        names = self.group.joint_names
+        self._joints.catch_up()
+        return self._joints.positions(names)
 
     def positions_of(self, joints: Iterable[str]) -> dict[str, float]:
         """Returns the latest positions of some joints of the robot [rad or m]; joints without one are left out."""
+        self._joints.catch_up()
         return self._joints.positions(joints)
 
     def plan_to_pose_target(self, pose: PoseStamped, custom_start_state: StartState = None) -> PlanResult:
@@ -389,6 +394,8 @@ class ArmCommander:
         message.start_state = robot_state(start)
         message.goal_constraints = [goal(name)]
         timeout_s = SERVICE_TIMEOUT_S + 3.0 * self._attempts * self._planning_time_s
+        if seed_parameter() is not None:  # iterations bound the search then, on a slow machine as on a fast one
+            timeout_s *= SEEDED_TIMEOUT_FACTOR
         try:
             proxy = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
             response = call_service(proxy, request, timeout_s).motion_plan_response

@@ -11,9 +11,11 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from modular_framework_ros.calls import wait_until
+from modular_framework_ros.simulated_time import SimulatedTime
 
 REST_SPEED = 0.02  # [rad/s or m/s]
 REST_TIMEOUT_S = 1.0
+REST_PERIOD_S = 0.02  # of simulated time, where that is held
 
 
 class JointMonitor:
@@ -32,6 +34,8 @@ class JointMonitor:
         self._positions: dict[str, float] = {}
         self._velocities: dict[str, float] = {}
         self._received: dict[str, float] = {}
+        self._latest: rospy.Time | None = None
+        self._time = SimulatedTime()
         self._subscriber: rospy.Subscriber | None = None
 
     def connect(self) -> None:
@@ -39,6 +43,14 @@ class JointMonitor:
         self._subscriber = rospy.Subscriber(
             "joint_states", JointState, self._on_joint_states, queue_size=self._queue_size
         )
+
+    def catch_up(self) -> None:
+        """Where simulated time is held: waits until the joints are known as they are at the time that it stands at.
+
+        Raises:
+            CallError: they are not received.
+        """
+        self._time.catch_up(lambda: self._latest)
 
     def positions(self, names: Iterable[str]) -> dict[str, float]:
         """Returns the positions of joints [rad or m]; joints that have not been received are left out."""
@@ -56,11 +68,23 @@ class JointMonitor:
             stop_requested: Evaluated during the wait; True ends it.
         """
         joints, begun_s = tuple(names), time.monotonic()
+        if self._time.enabled:
+            return self._rests_in_held_time(joints, stop_requested)
         wait_until(lambda: stop_requested() or self._at_rest_since(joints, begun_s), REST_TIMEOUT_S)
         return self._at_rest_since(joints, begun_s)
 
+    def _rests_in_held_time(self, joints: tuple[str, ...], stop_requested: Callable[[], bool]) -> bool:
+        """As `wait_for_rest`, asking for simulated time to pass, so that the same states are looked at every time."""
+
+        def rests() -> bool:
+            self.catch_up()
+            return stop_requested() or self._at_rest_since(joints, 0.0)
+
+        return self._time.wait_until(rests, REST_TIMEOUT_S, REST_PERIOD_S)
+
     def message(self, names: Iterable[str]) -> JointState:
-        """Makes a joint state message of some joints."""
+        """Makes a joint state message of some joints, as they are now."""
+        self.catch_up()
         positions = self.positions(names)
         state = JointState(name=list(positions), position=list(positions.values()))
         state.header.stamp = rospy.Time.now()
@@ -78,3 +102,4 @@ class JointMonitor:
             self._positions.update(zip(message.name, message.position, strict=False))
             self._velocities.update(zip(message.name, message.velocity, strict=False))
             self._received.update(dict.fromkeys(message.name, time.monotonic()))
+            self._latest = message.header.stamp

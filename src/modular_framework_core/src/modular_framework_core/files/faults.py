@@ -37,15 +37,28 @@ class Fault:
         return f"{self.location}: {self.message}"
 
 
-class TaskFault(Exception):
-    """A task file cannot be used. Carries every fault that was found in it."""
+class FileFaults(Exception):
+    """A file cannot be used. Carries every fault that was found in it.
+
+    Attributes:
+        kind: What the file describes, as the text says it.
+        faults: What is wrong, in the order of the file.
+    """
+
+    kind = "file"
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         """Sorts the faults by location and drops repetitions."""
         self.faults: tuple[Fault, ...] = tuple(sorted(set(faults)))
         lines = "\n".join(f"  {fault}" for fault in self.faults)
         count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
-        super().__init__(f"{count} in the task:\n{lines}")
+        super().__init__(f"{count} in the {self.kind}:\n{lines}")
+
+
+class TaskFault(FileFaults):
+    """A task file cannot be used."""
+
+    kind = "task"
 
 
 class FaultList:

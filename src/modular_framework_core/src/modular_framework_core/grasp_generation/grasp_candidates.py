@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -63,6 +64,20 @@ class GraspCandidate:
     def postgrasp_position(self) -> Array:
         """Where the grasp frame is lifted to, in the planning frame (3,) [m]."""
         return self.position + np.array([0.0, 0.0, self.lift_distance_m])
+
+
+class ReadNumber(Protocol):
+    """Reads a parameter of a method, which is a number."""
+
+    def __call__(self, name: str, default: float, low: float = -math.inf, high: float = math.inf) -> float:
+        """Returns its value; where it comes from, and what becomes of a wrong one, is decided by who reads.
+
+        Args:
+            name: Parameter, with ~ in front as of a node's own.
+            default: Value when it is not set.
+            low: Smallest value that is allowed.
+            high: Greatest value that is allowed.
+        """
 
 
 class GraspMethod(Protocol):

@@ -13,16 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
+from modular_framework_core.grasp_generation.hand_motion_settings import HandMotionSettings
 
 Array = npt.NDArray[np.float64]
 
 CONTACT_DEPTH_M = 0.001
 CLOSING_CLEARANCE_M = 0.002
 """Room between the object and what is not a pad when the pads touch it: the spacing error of surface points."""
-CLOSING_STEPS, OPENING_STEPS = 5, 8
 HEIGHT_TOLERANCE_M = 0.0005
+"""Heights that differ by less count as the same."""
 HEIGHT_ROUNDS = 4
+"""How often a height is tried before a place is given up."""
 COLUMN_M = 0.004
+"""Width of the columns in which only the highest point is kept: about the spacing of surface points."""
+CLOSING_STEPS, OPENING_STEPS = 5, 8
+"""Openings that are tried: below the width of the object, and above it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +35,36 @@ class Passage:
     """What passes between the pads while the hand advances.
 
     Attributes:
+        middle: Middle of what the pads touch, along the closing direction [m].
         width: Opening at which the pads touch [m].
         half_width: Farthest the object reaches from the middle of the hand [m].
         clearance: Room to keep on each side [m].
     """
 
+    middle: float
     width: float
     half_width: float
     clearance: float
+
+
+def passage_between(
+    touched: Array, passed: Array, gripper: GripperGeometry, settings: HandMotionSettings
+) -> Passage | None:
+    """Measures what passes between the pads; None where the hand does not open wide enough.
+
+    Args:
+        touched: (n,) positions of the points that the pads touch, along the closing direction [m].
+        passed: (m,) those of the points that the hand has passed by then [m].
+        gripper: Geometry of the hand.
+        settings: The room that the hand keeps.
+    """
+    low, high = float(touched.min()), float(touched.max())
+    middle = (low + high) / 2
+    half_width = max(float(passed.max()) - middle, middle - float(passed.min()))
+    clearance = min(settings.finger_clearance_m, gripper.max_opening / 2 - half_width)
+    if clearance < min(settings.min_finger_clearance_m, settings.finger_clearance_m):
+        return None
+    return Passage(middle, high - low, half_width, clearance)
 
 
 def highest_points(points: Array) -> Array:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import rospy
 
+from modular_framework_core.grasp_generation.grasp_candidates import ReadNumber
+from modular_framework_core.grasp_generation.hand_motion_settings import HandMotionSettings
 from modular_framework_core.grasp_generation.planning_scene_objects import CropBox
 
 DEFAULT_SEED, LARGEST_SEED = 1, 2**63 - 1
@@ -87,3 +89,32 @@ def number(name: str, default: float, low: float = -math.inf, high: float = math
         )
         return float(default)
     return float(value)
+
+
+def read_hand_motion(read: ReadNumber = number) -> HandMotionSettings:
+    """Reads the parameters that grasp methods share.
+
+    Args:
+        read: Reads a parameter; by default from the parameter server.
+    """
+    defaults = HandMotionSettings()
+    return HandMotionSettings(
+        approach_distance_m=read("~approach_distance", defaults.approach_distance_m, 0.01, 0.5),
+        lift_distance_m=read("~lift_distance", defaults.lift_distance_m, 0.0, 1.0),
+        finger_clearance_m=read("~finger_clearance", defaults.finger_clearance_m, 0.0, 0.1),
+        min_finger_clearance_m=read("~min_finger_clearance", defaults.min_finger_clearance_m, 0.0, 0.1),
+        tip_clearance_m=read("~tip_clearance", defaults.tip_clearance_m, 0.0, 0.1),
+        min_pad_overlap_m=read("~min_pad_overlap", defaults.min_pad_overlap_m, 0.001, 0.1),
+    )
+
+
+class ParameterisedMethod:
+    """Base of a grasp method whose parameters are read again for every object.
+
+    Args:
+        read: Reads a parameter; by default from the parameter server.
+    """
+
+    def __init__(self, read: ReadNumber = number) -> None:
+        """Reads nothing yet."""
+        self.read = read

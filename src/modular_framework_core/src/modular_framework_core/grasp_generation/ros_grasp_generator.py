@@ -6,6 +6,7 @@ from __future__ import annotations
 import heapq
 import threading
 from collections import Counter
+from contextlib import nullcontext
 
 import rospy
 from scipy.spatial.transform import Rotation
@@ -25,6 +26,8 @@ from modular_framework_core.grasp_generation.wait_limit import WaitLimit
 from modular_framework_core.grasping.grasp_messages import generate_pose_stamped_message, get_standardised_grasp
 from modular_framework_core.msg import StandardisedGrasp
 from modular_framework_ros.calls import CallError
+from modular_framework_ros.component_report import ComponentReporter
+from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_ros.start_up import start_timeout
 
 SIGNAL_TOPIC = "grasp_generated"
@@ -41,7 +44,8 @@ class GraspGenerator:
     is set down under its name.
 
     Parameters: see :mod:`ros_generator_settings`, and those of the method; they are read again for every generation.
-    Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched).
+    Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched),
+        ``component_reports`` (std_msgs/String, JSON: of a generation its time and how many grasps there were).
     Services (std_srvs/Trigger), the names of every method first, this node's own second:
         ``generate_grasps``, ``~generate``: generates grasps.
         ``refresh_grasps``, ``~refresh``: waits until the objects rest, and generates grasps if one was moved since;
@@ -59,7 +63,8 @@ class GraspGenerator:
         self._generated = GeneratedObjects()
         self._scene = SceneObjects()
         self._stored = StoredGrasps()
-        self._generating = threading.Lock()
+        self._generating = threading.RLock()
+        self._time = SimulatedTime()
 
     def connect(self) -> None:
         """Measures the gripper and waits for the nodes it needs, at most ``/start_timeout`` for each.
@@ -68,6 +73,7 @@ class GraspGenerator:
             NoGraspError: Something needed is missing; the text names it.
         """
         self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
+        self._reporter = ComponentReporter("generation")
         self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
         settings = read_settings()
         if not settings.gripper_joint:
@@ -93,6 +99,8 @@ class GraspGenerator:
     def watch(self) -> None:
         """Generates for each object that appears, also when it was there before, or was moved, until ROS shuts down.
 
+        With ``/wait_for_planning`` it generates once, and on request only from then on: what it sees when would depend
+        on the load of the machine.
         What may still arrive is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
         there yet, a service that does not answer in time on a busy machine.
         """
@@ -100,17 +108,22 @@ class GraspGenerator:
         wait_limit: WaitLimit | None = WaitLimit()  # None: every object that is there has been handled
         scene_was_read = False
         while not rospy.is_shutdown():
+            if wait_limit is None and self._time.enabled:
+                rospy.rostime.wallsleep(SCENE_PERIOD_S)
+                continue
             settings = read_settings()
             try:
-                objects = self._scene.targets(settings)
-                self._generated.keep({found.name for found in objects} | self._scene.attached)
-                scene_was_read = True
-                if self._generated.stale(objects):
-                    wait_limit = wait_limit or WaitLimit()
-                    if at_rest(before, objects):
-                        self._signal_grasps(settings, objects, refresh=True)
-                        wait_limit = None
-                before = objects
+                # a request that comes meanwhile looks at the scene later, and so has the last word
+                with self._generating if self._time.enabled else nullcontext():
+                    objects = self._scene.targets(settings)
+                    self._generated.keep({found.name for found in objects} | self._scene.attached)
+                    scene_was_read = True
+                    if self._generated.stale(objects):
+                        wait_limit = wait_limit or WaitLimit()
+                        if at_rest(before, objects):
+                            self._signal_grasps(settings, objects, refresh=True)
+                            wait_limit = None
+                    before = objects
             except (NoObjectError, CallError, CommanderError) as error:
                 if isinstance(error, NoObjectError):
                     self._generated.keep(self._scene.attached)
@@ -133,6 +146,7 @@ class GraspGenerator:
     def _on_demand(self, refresh: bool) -> TriggerResponse:
         try:
             settings = read_settings()
+            self._time.catch_up()
             objects = self._resting(settings) if refresh else self._scene.targets(settings)
             return TriggerResponse(*self._signal_grasps(settings, objects, refresh))
         except (NoGraspError, CallError, CommanderError) as error:
@@ -143,7 +157,10 @@ class GraspGenerator:
         """Returns the objects to grasp once they rest, or as they are when that takes too long."""
         before, wait_limit = self._scene.targets(settings), WaitLimit()
         while True:
-            rospy.rostime.wallsleep(SCENE_PERIOD_S)
+            if self._time.enabled:
+                self._time.sleep(SCENE_PERIOD_S)
+            else:
+                rospy.rostime.wallsleep(SCENE_PERIOD_S)
             objects = self._scene.targets(settings)
             if at_rest(before, objects) or wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s):
                 return objects
@@ -165,16 +182,18 @@ class GraspGenerator:
         Raises:
             CallError, CommanderError: Another node does not answer.
         """
-        with self._generating:  # a request by service may come while grasps of a new object are generated
+        # a request by service may come while grasps of a new object are generated
+        with self._generating, self._time.held("grasp generation", during_motions=True):
             if refresh and not self._generated.stale(objects):
                 return True, f"nothing has moved; the grasps of {sorted(found.name for found in objects)} stay"
-            try:
-                grasps = self._generate(settings, objects)
-                self._stored.replace(grasps, settings.name_prefix)
-                success, text = True, f"{len(grasps)} grasps of {sorted({g.object_id for g in grasps})} were stored"
-            except NoGraspError as error:
-                self._stored.replace([], settings.name_prefix)
-                success, text = False, str(error)
+            with self._reporter.work(rospy.get_name()) as work:
+                try:
+                    grasps = self._generate(settings, objects, work.figures)
+                    self._stored.replace(grasps, settings.name_prefix)
+                    success, text = True, f"{len(grasps)} grasps of {sorted({g.object_id for g in grasps})} were stored"
+                except NoGraspError as error:
+                    self._stored.replace([], settings.name_prefix)
+                    success, text, work.reason = False, str(error), str(error)
             self._generated.mark(objects)
             self._publish(success, text)
             return success, text
@@ -184,7 +203,9 @@ class GraspGenerator:
         self._reason.publish(text)
         self._signal.publish(success)
 
-    def _generate(self, settings: GeneratorSettings, objects: list[SceneObject]) -> list[StandardisedGrasp]:
+    def _generate(
+        self, settings: GeneratorSettings, objects: list[SceneObject], figures: dict[str, float]
+    ) -> list[StandardisedGrasp]:
         found_in: list[list[tuple[SceneObject, GraspCandidate]]] = []
         present = self._scene.read()
         for found in objects:
@@ -198,10 +219,11 @@ class GraspGenerator:
                 f"no part of {'; '.join(_sides(found) for found in objects)} can be grasped {self._method.manner}: the "
                 f"gripper opens to {self._gripper.max_opening:.3f} m and needs flat or round sides"
             )
-        return self._reachable(ranked, settings)
+        figures["candidates"] = len(ranked)
+        return self._reachable(ranked, settings, figures)
 
     def _reachable(
-        self, ranked: list[tuple[SceneObject, GraspCandidate]], settings: GeneratorSettings
+        self, ranked: list[tuple[SceneObject, GraspCandidate]], settings: GeneratorSettings, figures: dict[str, float]
     ) -> list[StandardisedGrasp]:
         chosen: list[StandardisedGrasp] = []
         reasons: Counter[str] = Counter()
@@ -216,6 +238,8 @@ class GraspGenerator:
             chosen.append(message)
             if len(chosen) >= settings.max_grasps:
                 break
+        if settings.check_reachability:
+            figures |= {"checked": len(chosen) + reasons.total(), "reachable": len(chosen)}
         if not chosen:
             names = sorted({found.name for found, _ in tried})
             raise NoGraspError(

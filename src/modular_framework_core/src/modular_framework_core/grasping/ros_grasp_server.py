@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from typing import Any
 
 import rospy
@@ -62,6 +63,7 @@ class GraspServer:
         self._motion_lock = threading.Lock()
         self._goals = RunningGoals()
         self._evidence = StallEvidence(self._tolerance)
+        self._last_s = 0.0
 
     def connect(self, action_name: str) -> None:
         """Connects the manipulator and offers the action."""
@@ -111,6 +113,10 @@ class GraspServer:
             raise GraspCommandError("stopped on request, before anything moved")
         efforts = effort_limits(targets, intensities, self._group, share, stage)
         motion = Motion(targets, efforts, self._timeout_s, stop.is_set)
+        now_s = rospy.get_time()
+        if now_s < self._last_s:  # a simulation that begins again: what was seen of the fingers before does not count
+            self._evidence = StallEvidence(self._tolerance)
+        self._last_s = now_s
         begun = self._manipulator.joint_state(targets)
         attempt = Attempt(dict(zip(begun.name, begun.position, strict=True)), targets, efforts)
         outcome = self._evidence.judge(self._move(handle, motion), attempt)
@@ -121,9 +127,10 @@ class GraspServer:
 
         def publish() -> None:
             while not ended.wait(FEEDBACK_PERIOD_S):
-                handle.publish_feedback(
-                    GraspFeedback(current_joint_state=self._manipulator.joint_state(motion.targets))
-                )
+                with suppress(CallError):  # the next one is soon
+                    handle.publish_feedback(
+                        GraspFeedback(current_joint_state=self._manipulator.joint_state(motion.targets))
+                    )
 
         threading.Thread(target=publish, daemon=True).start()
         try:

@@ -6,13 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from modular_framework_ros.node_handle import ParameterError
+
 PACKAGE_KEY = "package_manipulator_action_server"
 TYPE_KEY = "manipulator_controller_action_server_type"
 NAME_KEY = "manipulator_controller_node_name"
-
-
-class ExternalControllerError(ValueError):
-    """The parameters do not name a node; the text lists what is missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +32,10 @@ def controller_node(parameters: Mapping[str, object]) -> ControllerNode | None:
         The node; None when the package is empty, which says that the manipulator is driven by a ros_control plug-in.
 
     Raises:
-        ExternalControllerError: A parameter is not set or empty.
+        ParameterError: A parameter is not set or empty.
     """
     if PACKAGE_KEY not in parameters:
-        raise ExternalControllerError(
+        raise ParameterError(
             f"parameter '{PACKAGE_KEY}' is not set; set it to the package of the "
             "manipulator's action server, or to an empty text when a ros_control plug-in "
             "drives it"
@@ -47,7 +45,7 @@ def controller_node(parameters: Mapping[str, object]) -> ControllerNode | None:
         return None
     missing = [key for key in (TYPE_KEY, NAME_KEY) if not parameters.get(key)]
     if missing:
-        raise ExternalControllerError(
+        raise ParameterError(
             f"the parameters {missing} are not set or empty; they name the executable and "
             f"the node of package '{package}'"
         )

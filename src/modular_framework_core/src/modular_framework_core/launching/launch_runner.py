@@ -7,8 +7,9 @@ node when a node died instead.
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -40,6 +41,7 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
         task_exit_code: Exit code of that node; None while it runs.
         dead_node: Name and exit code of the first other node that died; None if none did.
         last_process: roslaunch's name of the process that ended the launch.
+        at_end: Called in place of stopping the other nodes when the launch ends; None: they are stopped.
     """
 
     task_name: str
@@ -48,6 +50,7 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
     dead_node: tuple[str, int | None] | None = None
     last_process: str = ""
     parent: roslaunch.parent.ROSLaunchParent | None = field(default=None, repr=False)
+    at_end: Callable[[], None] | None = field(default=None, repr=False)
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
         """Called by roslaunch's process monitor, with a name such as `move_group-5`."""
@@ -70,12 +73,19 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
         return any(node.name == name and node.required for node in nodes)
 
     def _end_launch(self) -> None:
+        if self.at_end is not None:
+            self.at_end()
         if self.parent is not None and self.parent.pm is not None:
             self.parent.pm.is_shutdown = True
 
 
 def run_launch_file(
-    package: str, launch_file: str, arguments: list[str], task_name: str, later_files: Sequence[Path] = ()
+    package: str,
+    launch_file: str,
+    arguments: list[str],
+    task_name: str,
+    later_files: Sequence[Path] = (),
+    leaves_nodes: bool = False,
 ) -> int:
     """Runs a launch file until its task or one of its nodes ends, and prints last why it ended.
 
@@ -85,6 +95,7 @@ def run_launch_file(
         arguments: Launch arguments, `name:=value`; the launch file has `end_with_task`.
         task_name: Name of the node that runs the task; "" if the end of every node ends the launch.
         later_files: Launch files read after it: their parameters replace those of the launch file.
+        leaves_nodes: Whether this process exits at once when a node died, and leaves the others to the caller.
 
     Returns:
         The task's exit code; EXIT_NODE_DIED when another node died first; EXIT_BAD_LAUNCH when the launch file or an
@@ -96,6 +107,8 @@ def run_launch_file(
         ends_with_task = argument_values(path, arguments)["end_with_task"]
         watcher = EndWatcher(task_name, bool(roslaunch.loader.convert_value(ends_with_task, "bool")))
         uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
+        if leaves_nodes:
+            watcher.at_end = lambda: _exit_with(_tell_end(watcher, uuid))
         roslaunch.configure_logging(uuid)
         # The task is not a required node here: the watcher ends the launch, without roslaunch's banner of a death.
         given = [*arguments, "end_with_task:=false"]
@@ -109,8 +122,19 @@ def run_launch_file(
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError) as error:  # ValueError: of a value
         print(f"run_framework: {error}", file=sys.stderr)
         return EXIT_BAD_LAUNCH
+    return _tell_end(watcher, uuid)
+
+
+def _tell_end(watcher: EndWatcher, uuid: str) -> int:
     log_file = Path(rospkg.get_log_dir()) / uuid / f"{watcher.last_process}.log"
     return verdict(watcher, cause_of_death(log_file))
+
+
+def _exit_with(code: int) -> None:
+    """Ends this process at once: stopping the nodes, one after the other, takes seconds."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _master_port() -> int | None:
@@ -118,7 +142,7 @@ def _master_port() -> int | None:
 
 
 def verdict(watcher: EndWatcher, cause: str) -> int:
-    """Prints how the launch ended, after roslaunch's messages about the nodes it stops; returns the exit code."""
+    """Prints how the launch ended, after roslaunch's messages about the nodes; returns the exit code."""
     because = f": {cause.removeprefix('The task could not be run: ')}" if cause else ""
     if watcher.dead_node is not None:
         name, exit_code = watcher.dead_node

@@ -16,9 +16,9 @@ from modular_framework_core.launching.external_controllers import (
     PACKAGE_KEY,
     TYPE_KEY,
     ControllerNode,
-    ExternalControllerError,
     controller_node,
 )
+from modular_framework_ros.node_handle import ParameterError
 
 POLL_PERIOD_S = 0.2
 STOP_TIMEOUT_S = 5.0
@@ -39,7 +39,7 @@ def main() -> int:
     try:
         keys = (PACKAGE_KEY, TYPE_KEY, NAME_KEY)
         node = controller_node({key: rospy.get_param(key) for key in keys if rospy.has_param(key)})
-    except ExternalControllerError as error:
+    except ParameterError as error:
         rospy.logfatal("external_controllers_spawner: %s", error)
         return 2
     if node is None:

@@ -24,8 +24,8 @@ def transform_message(frame: SensorFrame) -> TransformStamped:
     message.header.stamp = rospy.Time.now()
     message.header.frame_id = frame.parent_frame
     message.child_frame_id = frame.frame
-    message.transform.translation = Vector3(*frame.position_m)
-    message.transform.rotation = Quaternion(*frame.quaternion_xyzw)
+    message.transform.translation = Vector3(*frame.placement.position_m)
+    message.transform.rotation = Quaternion(*frame.placement.quaternion_xyzw)
     return message
 
 

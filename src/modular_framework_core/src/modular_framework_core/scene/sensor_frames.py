@@ -10,7 +10,7 @@ from pathlib import Path
 import yaml
 
 from modular_framework_core.files.yaml_entries import Entry, EntryError, read_each_entry
-from modular_framework_core.managers.named_poses import NamedPose, frame_name, parse_pose
+from modular_framework_core.managers.named_poses import NamedPose, Placement, frame_name, parse_pose
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
 FRAME_KEYS = ("frame_id", "origin_frame_id", "frame_x", "frame_y", "frame_z", "frame_roll", "frame_pitch", "frame_yaw")
@@ -24,15 +24,13 @@ class SensorFrame:
         sensor: Name of the sensor in the file.
         parent_frame: Frame the pose is given in.
         frame: Frame of the sensor.
-        position_m: x, y, z of the sensor in the parent frame [m].
-        quaternion_xyzw: Orientation of the sensor in the parent frame.
+        placement: Pose of the sensor in the parent frame.
     """
 
     sensor: str
     parent_frame: str
     frame: str
-    position_m: tuple[float, ...]
-    quaternion_xyzw: tuple[float, ...]
+    placement: Placement
 
 
 PoseLookup = Callable[[str], "NamedPose | None"]
@@ -63,8 +61,7 @@ def parse_sensor(entry: Entry, lookup: PoseLookup) -> SensorFrame:
         entry.key,
         frame_name(fields["origin_frame_id"]),
         frame_name(fields["frame_id"]),
-        (x, y, z),
-        quaternion_from_rpy(roll, pitch, yaw),
+        Placement((x, y, z), quaternion_from_rpy(roll, pitch, yaw)),
     )
 
 
@@ -79,10 +76,7 @@ def _from_initial_pose(entry: Entry, fields: dict[str, Entry], lookup: PoseLooku
         raise fields["initial_pose"].fault(
             "the keys ['position', 'orientation'] are missing; a pose needs reference_frame, position, orientation"
         )
-    placement = pose.placements[""]
-    return SensorFrame(
-        entry.key, pose.reference_frame, frame_name(fields["frame_id"]), placement.position_m, placement.quaternion_xyzw
-    )
+    return SensorFrame(entry.key, pose.reference_frame, frame_name(fields["frame_id"]), pose.placements[""])
 
 
 def load_sensor_frames(

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ast
-import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,22 +13,12 @@ from modular_framework_core.state_api.constructor_keys import STATE_KEYS, keys_a
 from modular_framework_core.state_api.option_annotations import from_annotation, from_hint, uses_in
 from modular_framework_core.state_api.option_types import Anything, OptionType
 from modular_framework_core.state_api.option_uses import Use
+from modular_framework_core.task_constructor.state_classes import BASE_DEFAULTS, SourceClass, SourceModule
+from modular_framework_core.task_constructor.state_classes import StateSourceError as StateSourceError
 from modular_framework_core.task_constructor.state_imports import missing_imports
 from modular_framework_core.task_constructor.userdata_reads import UserdataReads, reads_of
 
-_FRAMEWORK = Path(__file__).resolve().parents[2]
-
-BASE_DEFAULTS: dict[str, tuple[str, ...]] = {
-    "FrameworkState": ("success", "fail"),
-    "State": (),
-}
-"""Default outcomes of the base classes a state may leave its constructor to."""
-
 _NAMES = from_hint(Sequence[str])
-
-
-class StateSourceError(Exception):
-    """A state file is not usable as a state; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,20 +148,18 @@ class StateCatalogue:
 
 
 def _read_state(name: str, file: Path) -> StateSource:
-    tree = _parsed(file)
-    classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+    module = SourceModule(file)
     wanted = class_name_of(name)
-    if wanted not in classes:
+    if wanted not in module.classes:
         raise StateSourceError(
             f"{file} must define the class {wanted} (the file name in camel case); it defines: "
-            f"{', '.join(classes) or 'no class'}"
+            f"{', '.join(module.classes) or 'no class'}"
         )
-    aliases = {**_imported(tree, file), **_aliases(tree)}
-    options, takes_any = _constructor_options(classes[wanted], classes, aliases)
-    is_ours = _is_framework_state(classes[wanted], classes)
+    state = SourceClass(module.classes[wanted], module)
+    options, takes_any = _constructor_options(state)
+    is_ours = state.is_framework_state
     if is_ours and "io_keys" in options and options["io_keys"].default_known and options["io_keys"].default is None:
-        options["io_keys"] = _default_io_keys(classes[wanted], classes, aliases)
-    doc = ast.get_docstring(classes[wanted]) or ""
+        options["io_keys"] = _default_io_keys(state)
     return StateSource(
         name,
         file,
@@ -180,111 +167,52 @@ def _read_state(name: str, file: Path) -> StateSource:
         options,
         takes_any,
         is_ours,
-        doc,
-        missing_imports(tree, file),
-        reads_of(classes[wanted]),
+        state.doc,
+        missing_imports(module.tree, file),
+        reads_of(state.node),
         file.read_text(encoding="utf-8"),
-        _own_keys(classes[wanted], classes, aliases),
+        _own_keys(state),
     )
 
 
-def _parsed(file: Path) -> ast.Module:
-    try:
-        return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
-    except (OSError, SyntaxError, ValueError) as error:
-        raise StateSourceError(f"{file} cannot be read as Python: {error}") from error
-
-
-def _is_framework_state(node: ast.ClassDef, classes: dict[str, ast.ClassDef]) -> bool:
-    others = {name: found for name, found in classes.items() if name != node.name}
-    names = [_base_name(base) for base in node.bases]
-    return "FrameworkState" in names or any(
-        _is_framework_state(others[name], others) for name in names if name in others
-    )
-
-
-def _base_name(base: ast.expr) -> str:
-    return base.attr if isinstance(base, ast.Attribute) else str(getattr(base, "id", ""))
-
-
-def _aliases(tree: ast.Module) -> dict[str, ast.expr]:
-    """Returns the plain assignments of a module: the names a type may have been given."""
-    return {
-        node.targets[0].id: node.value
-        for node in tree.body
-        if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)
-    }
-
-
-@functools.lru_cache(maxsize=1000)
-def _aliases_of(file: Path, changed_ns: int) -> dict[str, ast.expr]:
-    return _aliases(_parsed(file))
-
-
-def _imported(tree: ast.Module, file: Path) -> dict[str, ast.expr]:
-    """Returns the plain assignments that a file imports by name from its own package and the framework."""
-    own = next(folder for folder in file.parents if not (folder / "__init__.py").is_file())
-    found: dict[str, ast.expr] = {}
-    for node in tree.body:
-        if not isinstance(node, ast.ImportFrom) or node.level or not node.module:
-            continue
-        sources = [root.joinpath(*node.module.split(".")).with_suffix(".py") for root in (own, _FRAMEWORK)]
-        source = next((source for source in sources if source.is_file()), None)
-        aliases = {} if source is None else _aliases_of(source, source.stat().st_mtime_ns)
-        found |= {item.asname or item.name: aliases[item.name] for item in node.names if item.name in aliases}
-    return found
-
-
-def _constructor_options(
-    node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
-) -> tuple[dict[str, StateOption], bool]:
+def _constructor_options(state: SourceClass) -> tuple[dict[str, StateOption], bool]:
     """Returns the options of a class and whether it takes others: its own constructor's, or that of its base."""
-    for item in node.body:
-        if isinstance(item, ast.FunctionDef) and item.name == "__init__":
-            options, takes_any = _arguments(item.args, aliases)
-            if not keys_argument(item):
-                return options, takes_any
-            inherited, takes_any = _base_options(node, classes, aliases)
-            return options | {key: inherited[key] for key in STATE_KEYS if key in inherited}, takes_any
-    return _base_options(node, classes, aliases)
+    if state.constructor is None:
+        return _base_options(state)
+    options, takes_any = _arguments(state.constructor.args, state.module.aliases)
+    if not keys_argument(state.constructor):
+        return options, takes_any
+    inherited, takes_any = _base_options(state)
+    return options | {key: inherited[key] for key in STATE_KEYS if key in inherited}, takes_any
 
 
-def _base_options(
-    node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
-) -> tuple[dict[str, StateOption], bool]:
+def _base_options(state: SourceClass) -> tuple[dict[str, StateOption], bool]:
     """Returns the options of the constructor of a class's base, and whether it takes others."""
-    for base in node.bases:
-        base_name = _base_name(base)
-        if base_name in classes and base_name != node.name:
-            return _constructor_options(classes[base_name], classes, aliases)
-        if base_name in BASE_DEFAULTS:
-            defaults = {"outcomes": BASE_DEFAULTS[base_name], "io_keys": None}
+    for name in state.base_names:
+        base = state.base(name)
+        if base is not None:
+            return _constructor_options(base)
+        if name in BASE_DEFAULTS:
+            defaults = {"outcomes": BASE_DEFAULTS[name], "io_keys": None}
             return {key: StateOption(key, False, defaults.get(key, ()), True, _NAMES) for key in STATE_KEYS}, False
     return {}, True
 
 
-def _default_io_keys(node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]) -> StateOption:
+def _default_io_keys(state: SourceClass) -> StateOption:
     """Returns the option ``io_keys`` with the ``DEFAULT_IO_KEYS`` of a class, or those of its base, as its default."""
-    for item in node.body:
+    for item in state.node.body:
         match item:
             case ast.Assign(targets=[ast.Name("DEFAULT_IO_KEYS")], value=value):
-                return replace(_option(ast.arg("io_keys"), value, aliases), type=_NAMES)
-    inner = next((name for name in map(_base_name, node.bases) if name in classes and name != node.name), None)
-    if inner is None:
-        return StateOption("io_keys", False, (), True, _NAMES)
-    return _default_io_keys(classes[inner], classes, aliases)
+                return replace(_option(ast.arg("io_keys"), value, state.module.aliases), type=_NAMES)
+    return _default_io_keys(state.bases[0]) if state.bases else StateOption("io_keys", False, (), True, _NAMES)
 
 
-def _own_keys(
-    node: ast.ClassDef, classes: dict[str, ast.ClassDef], aliases: dict[str, ast.expr]
-) -> dict[str, tuple[str, ...] | None]:
+def _own_keys(state: SourceClass) -> dict[str, tuple[str, ...] | None]:
     """Returns what the constructor of a class, or that of its base, declares by itself."""
-    bases = [_base_name(base) for base in node.bases]
-    for item in node.body:
-        if isinstance(item, ast.FunctionDef) and item.name == "__init__":
-            return own_keys(item, bool(bases) and bases[0] in BASE_DEFAULTS, aliases)
-    inner = next((name for name in bases if name in classes and name != node.name), None)
-    return {} if inner is None else _own_keys(classes[inner], classes, aliases)
+    if state.constructor is None:
+        return _own_keys(state.bases[0]) if state.bases else {}
+    of_smach = bool(state.base_names) and state.base_names[0] in BASE_DEFAULTS
+    return own_keys(state.constructor, of_smach, state.module.aliases)
 
 
 def _arguments(arguments: ast.arguments, aliases: dict[str, ast.expr]) -> tuple[dict[str, StateOption], bool]:

@@ -44,7 +44,7 @@ def initialise_userdata(userdata: Any) -> None:
     """Puts the framework's keys into a userdata.
 
     Raises:
-        UserdataParameterError: Parameters are missing or wrong; names all of them and their files.
+        ParameterError: Parameters are missing or wrong; names all of them and their files.
         UserdataError, CallError, CommanderError: move_group or a manager is missing or refused.
     """
     parameters = read_parameters(lambda name: rospy.get_param(f"/{name}", None))

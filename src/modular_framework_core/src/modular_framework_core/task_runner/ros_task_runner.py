@@ -48,6 +48,7 @@ from modular_framework_core.task_constructor.state_catalogue import StateCatalog
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder, write_record
 from modular_framework_core.task_runner.ros_introspection import shown
 from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, EXIT_SUCCEEDED, TaskResult, TaskRun
+from modular_framework_ros.simulated_time import SimulatedTime
 
 STOP_GRACE_S = 0.6
 """How long running states have to stop [s] before the node gives up on them."""
@@ -175,10 +176,11 @@ def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Ca
     reporter, begun = TaskReporter(name), time.time()
     recorder = TaskRecorder(reporter.on_state, ros_clock=rospy.get_time)
     run = TaskRun(name, shown(name, factory), recorder)
-    run.start()
     stop = rospy.Service("~stop", Trigger, lambda request: _asked(asked_by))
     try:
-        _wait(run, asked_by, lambda: reporter.on_running(recorder.running()))
+        with SimulatedTime().held(f"task '{name}'"):  # nothing of it passes while states compute
+            run.start()
+            _wait(run, asked_by, lambda: reporter.on_running(recorder.running()))
     finally:
         stop.shutdown("the task has ended")
         for number, handler in previous.items():

@@ -7,12 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from modular_framework_ros.node_handle import ParameterError
+
 PLANNER_FILE = "motion_planner_config.yaml"
 MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
-
-
-class UserdataParameterError(ValueError):
-    """Parameters are missing or have a wrong value; the text lists all of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,7 @@ def read_parameters(get: Callable[[str], Any]) -> UserdataParameters:
         get: Returns the value of a global parameter, None when it is not set.
 
     Raises:
-        UserdataParameterError: Lists every parameter that is missing or wrong, with its config file.
+        ParameterError: Lists every parameter that is missing or wrong, with its config file.
     """
     faults: list[str] = []
 
@@ -72,7 +70,7 @@ def read_parameters(get: Callable[[str], Any]) -> UserdataParameters:
         action = value(name, MANIPULATOR_FILE, (str,), "the name of an action", bool)
         torque = value("max_torque", MANIPULATOR_FILE, number, "a number of at least 0", lambda v: v >= 0.0)
     if faults:
-        raise UserdataParameterError("parameters of the task are missing or wrong: " + "; ".join(faults))
+        raise ParameterError("parameters of the task are missing or wrong: " + "; ".join(faults))
     return UserdataParameters(
         planner, float(speed), group, attempts, float(time_s), prefix, action, None if torque is None else float(torque)
     )

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
-from scipy.optimize import nnls
-from scipy.spatial import ConvexHull, QhullError
 
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.geometry.spatial import Array
@@ -163,6 +161,8 @@ class HullSolid:
         Raises:
             GeometryError: they are fewer than four, not finite, or in one plane.
         """
+        from scipy.spatial import ConvexHull, QhullError  # 0.3 s of import, for meshes only
+
         points = np.asarray(vertices, dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
             raise GeometryError("mesh: a vertex is not finite; every coordinate must be finite")
@@ -184,6 +184,8 @@ class HullSolid:
 
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the hull: the shortest convex combination of vertices seen from the point."""
+        from scipy.optimize import nnls  # see above
+
         if float((self._normals @ point + self._offsets).max()) <= 0.0:
             return point
         system = np.vstack([(self._vertices - point).T, np.ones(len(self._vertices))])

@@ -113,7 +113,7 @@ def _workspace(scene: PlanningScene, message: Any) -> Workspace | None:
 def answer(
     context: MoveGroupContext, message: Any, change: SceneChange, cancelled: Callable[[], bool]
 ) -> MotionPlanResponse:
-    """Plans, reports and shows the motion.
+    """Plans, reports and shows the motion; holds simulated time meanwhile where that may be held.
 
     Args:
         context: parts of the node.
@@ -135,12 +135,13 @@ def answer(
     }
     context.reporter.request(message)
     try:
-        if not names_joints(message.start_state) or message.start_state.is_diff:
-            context.monitor.wait_for_state()
-        request = read_request(context, change(context.monitor.snapshot()), message, cancelled)
-        scene = request.scene
-        details["start"] = dict(zip(scene.model.joint_names, scene.positions.tolist(), strict=True))
-        found = context.plan(request)
+        with context.monitor.time.held("planning", during_motions=True):
+            if not names_joints(message.start_state) or message.start_state.is_diff:
+                context.monitor.wait_for_state()
+            request = read_request(context, change(context.monitor.snapshot()), message, cancelled)
+            scene = request.scene
+            details["start"] = dict(zip(scene.model.joint_names, scene.positions.tolist(), strict=True))
+            found = context.plan(request)
     except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
         code = context.reporter.failure("plan", error, **details)
         if isinstance(error, PlanningError):

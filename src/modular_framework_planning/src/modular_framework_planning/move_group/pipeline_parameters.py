@@ -21,10 +21,24 @@ from modular_framework_planning.planning_interface.planning_request import (
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, read_pipeline_spec
 from modular_framework_planning.planning_pipeline.plugins import DEFAULT_PLANNER
+from modular_framework_planning.reproducible.request_seeds import RequestCounts, request_digest
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_ros.seeds import SeedError, derived_seed, seed_parameter
 
 PARENT = "~planning_pipelines"
+SEEDED_ITERATIONS_PER_S = 1000.0
+"""Iterations that stand for a second of the allowed time where /seed is set: about what one core does for an arm."""
+CLOCK_MARGIN = 20.0
+"""With /seed the clock ends a plan only after so many times the allowed time: a busy machine must not decide."""
+
+
+def launch_seed() -> int | None:
+    """Returns the parameter /seed; raises PlanningError where it is no seed."""
+    try:
+        return seed_parameter()
+    except SeedError as error:
+        raise PlanningError(ErrorCode.PLANNING_FAILED, str(error)) from error
 
 
 class PipelineSet(Mapping[str, PlanningPipeline]):
@@ -43,6 +57,7 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         """
         self._loaded, self.default, self._refused, self._seeded = dict(loaded), default, dict(refused), seeded
         self._sampling = SamplingSettings()
+        self._asked = RequestCounts()
 
     @property
     def sampling_settings(self) -> SamplingSettings:
@@ -65,10 +80,25 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         return len(self._loaded)
 
     def plan(self, request: PlanningRequest) -> PlanningAnswer:
-        """Plans with the pipeline the request names; in a process of its own where it or the pipeline has a seed."""
+        """Plans with the pipeline the request names; with a seed in a process of its own."""
         pipeline = self.choose(request.pipeline_id)
+        request = self._with_launch_seed(request)
         seed = pipeline.settings.seed if request.seed is None else request.seed
         return pipeline.plan(request) if seed is None else self._seeded.plan(pipeline, request, seed)
+
+    def _with_launch_seed(self, request: PlanningRequest) -> PlanningRequest:
+        """Gives a request without a seed one that follows from /seed; iterations bound its searches, not the clock."""
+        seed = launch_seed() if request.seed is None else None
+        if seed is None:
+            return request
+        digest = request_digest(request)
+        number = self._asked.count(digest, rospy.get_time())
+        return replace(
+            request,
+            seed=derived_seed(seed, "planning", digest, number),
+            most_iterations=max(1, int(SEEDED_ITERATIONS_PER_S * request.allowed_time_s)),
+            allowed_time_s=CLOCK_MARGIN * request.allowed_time_s,
+        )
 
     def close(self) -> None:
         """Ends the worker processes."""
@@ -136,7 +166,7 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_dete
     for name, reason in refused.items():
         rospy.logwarn("planning pipeline '%s' is left out: %s", name, reason)
     seeded = SeededPlanning(model, specs)
-    if any(pipeline.settings.seed is not None for pipeline in loaded.values()):
+    if launch_seed() is not None or any(pipeline.settings.seed is not None for pipeline in loaded.values()):
         threading.Thread(target=_start, args=(seeded,), daemon=True).start()
     return PipelineSet(loaded, default, refused, seeded)
 

@@ -157,12 +157,9 @@ def read_full(children: NDArray[np.uint8], levels: int) -> tuple[int, Keys, NDAr
     """
     count = len(children)
     starts, depths, nodes = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
-    stack_key, stack_depth = np.empty(8 * (levels + 1), np.int64), np.empty(8 * (levels + 1), np.int64)
-    stack_key[0], stack_depth[0] = 0, 0
+    stack_key, stack_depth = np.zeros(8 * (levels + 1), np.int64), np.zeros(8 * (levels + 1), np.int64)
     size, leaves, node = 1, 0, 0
-    while size:
-        if node == count:
-            return -1, starts[:0], depths[:0], nodes[:0]
+    while size and node < count:
         size -= 1
         key, depth, bits = stack_key[size], stack_depth[size], children[node]
         if bits == 0:
@@ -177,7 +174,7 @@ def read_full(children: NDArray[np.uint8], levels: int) -> tuple[int, Keys, NDAr
                     stack_depth[size] = depth + 1
                     size += 1
         node += 1
-    return node, starts[:leaves], depths[:leaves], nodes[:leaves]
+    return -1 if size else node, starts[:leaves], depths[:leaves], nodes[:leaves]
 
 
 @njit(cache=True, nogil=True)
@@ -195,12 +192,9 @@ def read_binary(codes: NDArray[np.uint16], levels: int) -> tuple[int, Keys, NDAr
     count = len(codes)
     starts, depths = np.empty(8 * count, np.int64), np.empty(8 * count, np.int64)
     occupied = np.empty(8 * count, np.bool_)
-    stack_key, stack_depth = np.empty(8 * (levels + 1), np.int64), np.empty(8 * (levels + 1), np.int64)
-    stack_key[0], stack_depth[0] = 0, 0
+    stack_key, stack_depth = np.zeros(8 * (levels + 1), np.int64), np.zeros(8 * (levels + 1), np.int64)
     size, leaves, node = 1, 0, 0
-    while size:
-        if node == count:
-            return -1, starts[:0], depths[:0], occupied[:0]
+    while size and node < count:
         size -= 1
         key, depth, code = stack_key[size], stack_depth[size], int(codes[node])
         if depth == levels:
@@ -215,7 +209,7 @@ def read_binary(codes: NDArray[np.uint16], levels: int) -> tuple[int, Keys, NDAr
                 starts[leaves], depths[leaves], occupied[leaves] = start, depth + 1, kind == 2
                 leaves += 1
         node += 1
-    return node, starts[:leaves], depths[:leaves], occupied[:leaves]
+    return -1 if size else node, starts[:leaves], depths[:leaves], occupied[:leaves]
 
 
 @njit(cache=True, nogil=True)

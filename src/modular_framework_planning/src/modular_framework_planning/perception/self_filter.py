@@ -13,7 +13,6 @@ from typing import Any
 
 import coal
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from modular_framework_planning.geometry.shapes import Plane
 from modular_framework_planning.geometry.spatial import Array, Transform
@@ -139,6 +138,8 @@ def _round_planes(radius: float, half_length: float, slope: float) -> Array:
 
 
 def _hull_region(vertices: Array) -> Region:
+    from scipy.spatial import ConvexHull, QhullError  # 0.3 s of import, for octomaps only
+
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     center = (low + high) / 2.0
     radius = float(np.linalg.norm(vertices - center, axis=1).max())

@@ -188,6 +188,7 @@ class PlanningRequest:
         path_constraints: what every state of the motion must satisfy.
         max_cartesian_speed: of cartesian_speed_limited_link [m/s]; 0 for none.
         seed: makes the plan repeatable; None for the pipeline's own.
+        most_iterations: of one search that would go on until its time is over; None where the clock alone bounds it.
         auxiliary_point: of a circular motion.
     """
 
@@ -207,6 +208,7 @@ class PlanningRequest:
     cartesian_speed_limited_link: str = ""
     workspace: Workspace | None = None
     seed: int | None = None
+    most_iterations: int | None = None
     auxiliary_point: AuxiliaryPoint | None = None
 
 

@@ -50,13 +50,8 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True)
-class MultiDofJoint:
-    """A joint that connects the robot's root link to a frame outside the robot and moves in several directions."""
-
-    name: str
-    kind: str
-    parent_frame: str
-    child_link: str
+class MultiDofJoint(VirtualJoint):
+    """A planar or floating virtual joint, with the variables that the planner moves."""
 
     @property
     def variables(self) -> tuple[str, ...]:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import CubicSpline
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -58,6 +57,8 @@ def _envelope(values: Array, reach: int) -> Array:
 
 def _eased(trajectory: Trajectory, times: Array, slowing: Array) -> Trajectory:
     """Runs the trajectory slower by a factor that changes over time; all arrays of shape (m,)."""
+    from scipy.interpolate import CubicSpline  # 0.4 s of import, for motions that are slowed only
+
     reach = max(2, int(min(EASE_S, 0.25 * trajectory.duration_s) / (times[1] - times[0])))
     pace = CubicSpline(times, _envelope(np.maximum(slowing, 1.0), reach))
     clock = pace.antiderivative()

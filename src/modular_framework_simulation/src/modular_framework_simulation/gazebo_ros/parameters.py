@@ -25,6 +25,8 @@ class SimulationParameters:
         gui: `~gui`: whether to open a window (false).
         paused: `~paused`: whether to start with time standing still (false).
         real_time_factor: `~real_time_factor`: simulated over real time (1.0; 0 = as fast as possible).
+        wait_for_planning: `/wait_for_planning`: whether nodes may hold time while they compute (false).
+        state_digest: `~state_digest`: whether to hash the state of every physics step, for comparisons (false).
     """
 
     robot_description: str
@@ -35,6 +37,8 @@ class SimulationParameters:
     gui: bool
     paused: bool
     real_time_factor: float
+    wait_for_planning: bool = False
+    state_digest: bool = False
 
 
 def read_parameters() -> SimulationParameters:
@@ -56,6 +60,8 @@ def read_parameters() -> SimulationParameters:
         gui=_read("~gui", False, (bool,)),
         paused=_read("~paused", False, (bool,)),
         real_time_factor=float(factor),
+        wait_for_planning=_read("/wait_for_planning", False, (bool,)),
+        state_digest=_read("~state_digest", False, (bool,)),
     )
 
 

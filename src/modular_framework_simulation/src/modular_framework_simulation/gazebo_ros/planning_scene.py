@@ -24,7 +24,7 @@ from moveit_msgs.msg import (
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
 from std_msgs.msg import ColorRGBA
 
-from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.errors import PlanningSceneError, SimulationError
 from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.scene_changes import (
     Add,
@@ -70,6 +70,8 @@ class PlanningScenePublisher:
         self._compared_s = 0.0
         self._compare_pause_s = _COMPARE_PAUSE_S
         self._last_problem = ""
+        self._synchronising = threading.Lock()
+        self._exact_at = (-1, -1)
 
     def connect(self) -> None:
         """Starts the thread and subscribes to changes by other nodes."""
@@ -88,6 +90,29 @@ class PlanningScenePublisher:
         self._snapshot = snapshot
         self._news.set()
 
+    def is_up_to_date(self, time_ns: int, revision: int) -> bool:
+        """Returns whether the scene was brought in step with the world at a time [ns] and a revision."""
+        return self._exact_at == (time_ns, revision)
+
+    def bring_up_to_date(self, snapshot: WorldSnapshot) -> None:
+        """Makes the scene equal to a snapshot, to the last bit, and returns when it is; nothing without move_group.
+
+        Raises:
+            PlanningSceneError: move_group does not take the change.
+        """
+        with self._synchronising:
+            if not self._server_is_there():
+                return
+            self._compared_s = 0.0
+            self._scene_changed.set()
+            try:
+                self._synchronise(snapshot, exact=True)
+            except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+                self._fail(f"{type(error).__name__}: {error}")
+            if self._last_problem:
+                raise PlanningSceneError(f"the planning scene is not in step with the world: {self._last_problem}")
+            self._exact_at = (snapshot.time_ns, snapshot.revision)
+
     def _on_scene_change(self, _message: rospy.AnyMsg) -> None:
         self._scene_changed.set()
         self._news.set()
@@ -100,7 +125,8 @@ class PlanningScenePublisher:
             if snapshot is None:
                 continue
             try:
-                pause_s = self._synchronise(snapshot)
+                with self._synchronising:
+                    pause_s = self._synchronise(snapshot)
             except Exception as error:  # this thread must survive any failure of move_group or the network
                 pause_s = self._fail(f"{type(error).__name__}: {error}")
             end = time.monotonic() + pause_s
@@ -109,13 +135,14 @@ class PlanningScenePublisher:
                 if self._stop.wait(0.02):
                     return
 
-    def _synchronise(self, snapshot: WorldSnapshot) -> float:
+    def _synchronise(self, snapshot: WorldSnapshot, exact: bool = False) -> float:
         """Sends what is new; returns how long to rest afterwards [s]."""
         if not self._server_is_there():
             return _PRESENCE_PERIOD_S
         self._compare()
-        changes = self._changes.towards(snapshot)
+        changes = self._changes.towards(snapshot, exact)
         if not changes:
+            self._last_problem = self._last_problem if not exact else ""
             return _SYNC_PERIOD_S
         answer = rospy.ServiceProxy(ros_names.APPLY_PLANNING_SCENE, ApplyPlanningScene)(self._message(changes))
         if not answer.success:

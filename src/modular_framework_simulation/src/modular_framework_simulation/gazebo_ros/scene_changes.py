@@ -23,34 +23,36 @@ ObjectKey = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Add:
-    """An object is new in the world, or replaces the one of the same name."""
+class ObjectChange:
+    """A change of one object."""
 
     key: ObjectKey
+
+
+@dataclass(frozen=True, slots=True)
+class Add(ObjectChange):
+    """An object is new in the world, or replaces the one of the same name."""
+
     link: specs.Link
     pose_in_world: Pose
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class Move(ObjectChange):
     """An object is elsewhere in the world."""
 
-    key: ObjectKey
     pose_in_world: Pose
 
 
 @dataclass(frozen=True, slots=True)
-class Remove:
+class Remove(ObjectChange):
     """An object is gone from the world."""
-
-    key: ObjectKey
 
 
 @dataclass(frozen=True, slots=True)
-class Attach:
+class Attach(ObjectChange):
     """An object is carried by a link of the robot; it is no longer an object of the world."""
 
-    key: ObjectKey
     link: specs.Link
     carrier_link: str
     pose_in_carrier: Pose
@@ -58,10 +60,9 @@ class Attach:
 
 
 @dataclass(frozen=True, slots=True)
-class Detach:
+class Detach(ObjectChange):
     """An object is no longer carried."""
 
-    key: ObjectKey
     carrier_link: str
 
 
@@ -95,6 +96,7 @@ class SceneChanges:
     def __init__(self, translation_m: float = 0.001, rotation_rad: float = 0.01) -> None:
         self._translation_m = translation_m
         self._rotation_rad = rotation_rad
+        self._exact = False
         self._sent: dict[ObjectKey, _ObjectState] = {}
         self._pending: dict[ObjectKey, _ObjectState] = {}
         self._in_world: frozenset[ObjectKey] = frozenset()
@@ -130,12 +132,14 @@ class SceneChanges:
         self._attached = {key: link for key, link in attached.items() if key in self._sent}
         return sorted(gone)
 
-    def towards(self, snapshot: WorldSnapshot) -> list[Change]:
+    def towards(self, snapshot: WorldSnapshot, exact: bool = False) -> list[Change]:
         """Returns the changes to send; call `confirm` once the scene accepted them.
 
         Args:
             snapshot: The present world.
+            exact: Whether small movements count, so that the scene does not depend on what was sent before.
         """
+        self._exact = exact
         targets = _targets_of(snapshot)
         self._pending = dict(self._sent)
         changes: list[Change] = []
@@ -174,6 +178,8 @@ class SceneChanges:
         return [Move(key, now.pose)]
 
     def _moved(self, before: Pose, now: Pose) -> bool:
+        if self._exact:
+            return before != now
         translation, rotation = before.distance_to(now)
         return translation > self._translation_m or rotation > self._rotation_rad
 

@@ -19,11 +19,14 @@ from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
 from modular_framework_simulation.gazebo_ros.parameters import SimulationParameters, read_parameters
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
+from modular_framework_simulation.gazebo_ros.time_services import TimeServices
 from modular_framework_simulation.gazebo_ros.world_topics import WorldTopics
 from modular_framework_simulation.loop.pacing import Pacer
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.simulation_loop import Actors, Hook, SimulationLoop
-from modular_framework_simulation.loop.snapshots import take_snapshot
+from modular_framework_simulation.loop.snapshots import WorldSnapshot, take_snapshot
+from modular_framework_simulation.loop.time_holds import TimeHolds
+from modular_framework_simulation.loop.world_digest import WorldDigest
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
 from modular_framework_simulation.models.poses import Pose
@@ -44,11 +47,18 @@ _SWITCH_INTERVAL_S = 0.0005
 _STOP_TIMEOUT_S = 5.0
 
 
+def _pacer(parameters: SimulationParameters) -> Pacer:
+    """Returns the pacer; between episodes simulated time leaves the processor to nodes that start or compute."""
+    factor = parameters.real_time_factor
+    idle_factor = min(factor or 1.0, 1.0) if parameters.wait_for_planning else None
+    return Pacer(factor, idle_factor=idle_factor)
+
+
 class SimulationNode:
     """Builds the world from parameters and runs it.
 
     Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `GazeboServices`,
-    `PlanningScenePublisher` and, for the controllers, `RosControllerManager`.
+    `TimeServices`, `PlanningScenePublisher` and, for the controllers, `RosControllerManager`.
 
     Args:
         parameters: What to simulate and how.
@@ -69,12 +79,21 @@ class SimulationNode:
         actors = self._build_robot(parameters)
         self._topics = WorldTopics(self._world)
         self._loop = SimulationLoop(
-            self._world, Pacer(parameters.real_time_factor), RequestQueue(), actors, self._on_paused_tick
+            self._world,
+            _pacer(parameters),
+            RequestQueue(),
+            actors,
+            self._on_paused_tick,
+            TimeHolds(rospy.logwarn),
         )
         if parameters.paused:
             self._loop.pause()
         self._services = GazeboServices(self._loop, self._resources)
         self._scene = PlanningScenePublisher()
+        digest = WorldDigest(self._world, actors.robot if actors else None) if parameters.state_digest else None
+        self._time_services = TimeServices(
+            self._loop, self._scene, self._snapshot, parameters.wait_for_planning, digest
+        )
         self._add_hooks()
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
         self._failed = False
@@ -86,7 +105,7 @@ class SimulationNode:
             rospy.logdebug("world elements without meaning here: %s", ", ".join(spec.ignored))
         world = PhysicsWorld(self._settings, self._parts, spec.gravity, parameters.gui, rospy.logwarn)
         for model in spec.models:
-            world.spawn(model)
+            world.spawn(model, keep=True)
         rospy.loginfo("world '%s' with %d models: %s", spec.name, len(spec.models), ", ".join(world.names()) or "none")
         return world
 
@@ -137,7 +156,10 @@ class SimulationNode:
         self._show_snapshot()
 
     def _show_snapshot(self) -> None:
-        self._scene.show(take_snapshot(self._world, self._loop.held_objects()))
+        self._scene.show(self._snapshot())
+
+    def _snapshot(self) -> WorldSnapshot:
+        return take_snapshot(self._world, self._loop.held_objects())
 
     def _report_pace(self) -> None:
         if self._world.time_ns == 0:
@@ -170,6 +192,7 @@ class SimulationNode:
         if self._controllers is not None:
             self._controllers.connect()
         self._services.connect()
+        self._time_services.connect()
         self._scene.connect()
         rospy.loginfo("simulation is running%s", " (paused)" if self._loop.paused else "")
         rospy.spin()
@@ -184,6 +207,7 @@ class SimulationNode:
     def close(self) -> None:
         """Ends the loop and closes the world; may be called twice."""
         self._services.close()
+        self._time_services.close()
         self._scene.close()
         self._stop_loop()
         if self._controllers is not None:

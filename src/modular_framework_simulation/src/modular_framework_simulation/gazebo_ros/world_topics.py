@@ -15,6 +15,9 @@ from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.physics.physics_world import SCOPE, PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState
 
+_QUEUE_SIZE = 50
+"""Messages that wait for a subscriber: time that runs faster than real time sends them in bursts."""
+
 
 class WorldTopics:
     """Publishers of the simulation; all methods are called by the loop's thread.
@@ -29,7 +32,7 @@ class WorldTopics:
     def __init__(self, world: PhysicsWorld) -> None:
         self._world = world
         self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
-        self._models = rospy.Publisher(ros_names.MODEL_STATES, ModelStates, queue_size=1)
+        self._models = rospy.Publisher(ros_names.MODEL_STATES, ModelStates, queue_size=_QUEUE_SIZE)
         self._links = rospy.Publisher(ros_names.LINK_STATES, LinkStates, queue_size=1)
         self._grasped = rospy.Publisher(ros_names.GRASPED_OBJECT, String, queue_size=1, latch=True)
         self._last_grasped: str | None = None

@@ -35,6 +35,7 @@ class Pacer:
         real_time_factor: Simulated over real time; 0 is as fast as possible.
         clock: Real time [s].
         sleep: Waits [s].
+        idle_factor: The same while nobody waits for simulated time; None: `real_time_factor`.
     """
 
     def __init__(
@@ -42,9 +43,11 @@ class Pacer:
         real_time_factor: float,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
+        idle_factor: float | None = None,
     ) -> None:
         if real_time_factor < 0:
             raise ValueError(f"real_time_factor is {real_time_factor:g}; allowed: 0 (as fast as possible) or greater")
+        self._factors = (real_time_factor, real_time_factor if idle_factor is None else idle_factor)
         self._factor = real_time_factor
         self._clock = clock
         self._sleep = sleep
@@ -68,8 +71,16 @@ class Pacer:
         self._slept_s = 0.0
         self._steps = 0
 
-    def keep(self, simulated_s: float) -> None:
-        """Waits until real time has come as far as simulated time [s]."""
+    def keep(self, simulated_s: float, idle: bool = False) -> None:
+        """Waits until real time has come as far as simulated time [s].
+
+        Args:
+            simulated_s: Present simulated time [s].
+            idle: Whether nobody waits for it.
+        """
+        if self._factor != self._factors[idle]:
+            self._factor = self._factors[idle]
+            self.start(simulated_s)
         self._steps += 1
         if self._factor == 0.0:
             return

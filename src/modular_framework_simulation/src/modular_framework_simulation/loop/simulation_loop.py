@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,12 +13,17 @@ from modular_framework_simulation.loop.grasp_watch import GraspWatch
 from modular_framework_simulation.loop.pacing import Pacer
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.snapshots import HeldObject
+from modular_framework_simulation.loop.time_holds import TimeHolds
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
 
 _PAUSED_TICK_S = 0.05
+_HELD_TICK_S = 0.004
+"""Real time between two looks for goals while time is held [s]."""
+_STEPS_BEFORE_HOLD = 5
+"""Physics steps after a restart before time may be held: at time 0 nodes take the clock for not yet started."""
 _HALT_S = (0.1, 0.5)
 """How long the robot is simulated after `stop` [s]: at least, so that its standstill is published; at most."""
 _AT_REST = 0.01
@@ -25,6 +31,10 @@ _AT_REST = 0.01
 
 class Controllers(Protocol):
     """The methods of a controller manager that the loop calls."""
+
+    @property
+    def moving(self) -> bool:
+        """Whether a controller carries out a goal."""
 
     def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
         """Runs one control cycle."""
@@ -60,7 +70,8 @@ class SimulationLoop:
         pacer: Ties simulated to real time.
         requests: Work of other threads.
         actors: The robot; None for a world without one.
-        on_paused_tick: Called about 20 times a second while paused, so that the clock stays visible.
+        on_paused_tick: Called about 20 times a second while time stands still, so that the clock stays visible.
+        holds: Who holds time; nobody by default.
     """
 
     def __init__(
@@ -70,6 +81,7 @@ class SimulationLoop:
         requests: RequestQueue,
         actors: Actors | None,
         on_paused_tick: Callable[[], None] = lambda: None,
+        holds: TimeHolds | None = None,
     ) -> None:
         self.world = world
         self.pacer = pacer
@@ -78,9 +90,17 @@ class SimulationLoop:
         self.grasp_watches = tuple(GraspWatch() for _ in actors.robot.grippers) if actors is not None else ()
         self._hooks: list[Hook] = []
         self._on_paused_tick = on_paused_tick
+        self.holds = holds if holds is not None else TimeHolds(print)
+        self._held_at = -1
+        self._next_tick_s = 0.0
         self._paused = False
         self._stop = threading.Event()
         self._reset_controllers = False
+
+    @property
+    def held(self) -> bool:
+        """Whether time stands still because somebody holds it."""
+        return self._held_at >= 0
 
     @property
     def paused(self) -> bool:
@@ -103,11 +123,7 @@ class SimulationLoop:
     def reset_poses(self) -> None:
         """Puts models and robot at their initial poses, at rest; time continues."""
         self.world.reset_poses()
-        for watch in self.grasp_watches:
-            watch.reset()
-        if self._actors is not None:
-            self._actors.robot.reset()
-        self._restart_control()
+        self._restart_robot(RobotBody.reset)
 
     def set_joints(self, name: str, positions: dict[str, float]) -> None:
         """Puts joints of a model or of the robot at positions [rad or m], at rest.
@@ -119,6 +135,14 @@ class SimulationLoop:
         body.set_joints(positions)
         if self._actors is not None and body is self._actors.robot.body:
             self._restart_control()
+
+    def _restart_robot(self, place: Callable[[RobotBody], None]) -> None:
+        """Puts the robot where it starts, with empty grippers, and restarts what drives it."""
+        for watch in self.grasp_watches:
+            watch.reset()
+        if self._actors is not None:
+            place(self._actors.robot)
+        self._restart_control()
 
     def _restart_control(self) -> None:
         """Restarts hardware and controllers from the present joint positions."""
@@ -132,6 +156,16 @@ class SimulationLoop:
         self.world.reset_time()
         self.reset_poses()
         self.pacer.start(0.0)
+
+    def restart(self) -> None:
+        """Begins again in an empty physics engine, with the world as at the start; spawned models are gone."""
+        self.world.restart()
+        self._restart_robot(RobotBody.reload)
+        self.holds.restart()
+        for _ in range(_STEPS_BEFORE_HOLD):
+            self.step()
+        self._held_at = -1
+        self.pacer.start(self._time_s())
 
     def stop(self) -> None:
         """Makes `run` return; may be called from any thread."""
@@ -148,11 +182,34 @@ class SimulationLoop:
                     # Controllers can be loaded and started while time is paused.
                     self._actors.controllers.update(self._time_s(), 0.0)
                 self.requests.wait(_PAUSED_TICK_S)
-                continue
-            self.step()
-            self.pacer.keep(self._time_s())
+            elif self.holds.may_pass(self.world.steps, self._actors is not None and self._actors.controllers.moving):
+                self._pass_time()
+            else:
+                self._stand_still()
         if self._actors is not None and not self._paused:
             self._halt(self._actors.robot)
+
+    def _pass_time(self) -> None:
+        if self.held:
+            self._held_at = -1
+            self.pacer.start(self._time_s())
+        self.step()
+        self.pacer.keep(self._time_s(), idle=not self.holds.owners)
+
+    def _stand_still(self) -> None:
+        """Lets the controllers take up goals while time is held; at first, lets them report the state of now."""
+        now_s, first = self._time_s(), self._held_at != self.world.steps
+        if first:
+            self._held_at = self.world.steps
+            if self._actors is not None:
+                self._actors.hardware.read(now_s, 0.0)
+        if self._actors is not None:
+            reset, self._reset_controllers = self._reset_controllers, False
+            self._actors.controllers.update(now_s, 0.0, reset)
+        if first or time.monotonic() >= self._next_tick_s:
+            self._next_tick_s = time.monotonic() + _PAUSED_TICK_S
+            self._on_paused_tick()
+        self.requests.wait(_HELD_TICK_S)
 
     def _halt(self, robot: RobotBody) -> None:
         """Lets the controllers hold the robot at its present position, and continues until it is at rest."""

@@ -60,11 +60,15 @@ class WorldSnapshot:
         time_s: Simulated time [s].
         models: All models but robots.
         held: What the grippers hold.
+        time_ns: Simulated time [ns].
+        revision: Of the world: differs once something was spawned, deleted or moved by a request.
     """
 
     time_s: float
     models: tuple[ModelSnapshot, ...]
     held: tuple[HeldObject, ...]
+    time_ns: int = 0
+    revision: int = 0
 
 
 def take_snapshot(world: PhysicsWorld, held: tuple[HeldObject, ...]) -> WorldSnapshot:
@@ -77,5 +81,5 @@ def take_snapshot(world: PhysicsWorld, held: tuple[HeldObject, ...]) -> WorldSna
         links = tuple(
             LinkSnapshot(link, body.link_state(link.name).pose) for link in body.spec.links if link.collisions
         )
-        models.append(ModelSnapshot(name, body.number, body.static, links))
-    return WorldSnapshot(world.time_ns * 1e-9, tuple(models), held)
+        models.append(ModelSnapshot(name, world.instance(name), body.static, links))
+    return WorldSnapshot(world.time_ns * 1e-9, tuple(models), held, world.time_ns, world.revision)

@@ -119,6 +119,15 @@ class PhysicsEngine:
             distance_m, yaw_deg, pitch_deg, target = 1.8, 50.0, -30.0, (0.0, 0.4, 0.9)
             self.api.resetDebugVisualizerCamera(distance_m, yaw_deg, pitch_deg, target, physicsClientId=self.client)
 
+    def restart(self, gravity: Vector3) -> None:
+        """Takes everything out, contacts and their caches too.
+
+        Args:
+            gravity: [m/s^2]
+        """
+        self.api.resetSimulation(physicsClientId=self.client)
+        self._configure(gravity)
+
     def load_urdf(self, text: str, name: str, fixed: bool, flags: int) -> int:
         """Loads a body at the world origin.
 

@@ -66,6 +66,9 @@ class PhysicsWorld:
         self._bodies: dict[str, SimulatedBody] = {}
         self._names_by_number: dict[int, str] = {}
         self._initial_poses: dict[str, Pose] = {}
+        self._instances: dict[str, int] = {}
+        self._last_instance = 0
+        self._initial: list[tuple[specs.Model, BodyUrdf]] = []
         self._steps = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
@@ -108,12 +111,13 @@ class PhysicsWorld:
         """
         return model_to_urdf(model, self._convex_parts, self.engine.has_window)
 
-    def spawn(self, model: specs.Model, prepared: BodyUrdf | None = None) -> SimulatedBody:
+    def spawn(self, model: specs.Model, prepared: BodyUrdf | None = None, keep: bool = False) -> SimulatedBody:
         """Adds a model at its pose.
 
         Args:
             model: What to add.
             prepared: What `prepare` made of it, if that was called before.
+            keep: Whether it belongs to the world that `restart` makes anew.
 
         Raises:
             DuplicateModelError: Its name is taken.
@@ -129,6 +133,8 @@ class PhysicsWorld:
         body = SimulatedBody(self.engine, number, model.name, written.root_in_model, model.static, model)
         self._set_surfaces(body, model)
         self.add(body, model.pose)
+        if keep:
+            self._initial.append((model, written))
         return body
 
     def add(self, body: SimulatedBody, pose_in_world: Pose) -> None:
@@ -137,6 +143,8 @@ class PhysicsWorld:
             raise DuplicateModelError(body.name)
         body.set_state(BodyState(pose_in_world, Twist()))
         self._bodies[body.name] = body
+        self._last_instance += 1
+        self._instances[body.name] = self._last_instance
         self._names_by_number[body.number] = body.name
         self._initial_poses[body.name] = pose_in_world
         self.revision += 1
@@ -227,6 +235,25 @@ class PhysicsWorld:
             if body.spec is not None:
                 body.reset_joints({})
                 body.set_state(BodyState(self._initial_poses[name], Twist()))
+        self.revision += 1
+
+    def instance(self, name: str) -> int:
+        """Returns a number that no other model has or had, also after a restart.
+
+        Raises:
+            UnknownEntityError: There is no such model.
+        """
+        return self._instances[self.body(name).name]
+
+    def restart(self) -> None:
+        """Empties the engine, adds the models to keep, and starts time at 0; robots must load themselves."""
+        self.engine.restart(self.gravity)
+        self._bodies.clear()
+        self._names_by_number.clear()
+        self._initial_poses.clear()
+        for model, prepared in self._initial:
+            self.spawn(model, prepared)
+        self.reset_time()
         self.revision += 1
 
     def reset_time(self) -> None:

@@ -110,10 +110,8 @@ class RobotBody:
     ) -> None:
         self.description = description
         self.world = world
-        api = world.engine.api
-        flags = api.URDF_USE_INERTIA_FROM_FILE | api.URDF_USE_SELF_COLLISION
-        number = world.engine.load_urdf(description.engine_urdf, name, True, flags)
-        self.body = SimulatedBody(world.engine, number, name, Pose(), True, None)
+        self._name, self._pose = name, pose
+        self._load()
         self.roles = {joint.name: _role(joint, description) for joint in description.joints}
         self.joint_names = [joint.name for joint in description.joints if joint.name in self.body.joint_indices]
         self._joints = [joint for joint in description.joints if joint.name in self.body.joint_indices]
@@ -122,11 +120,25 @@ class RobotBody:
         self.readings = [JointReading(0.0, 0.0, 0.0)] * len(self._indices)
         self.grippers = self._grippers()
         self.starting_positions = self._complete(positions)
+        self._set_up()
+
+    def _load(self) -> None:
+        api = self.world.engine.api
+        flags = api.URDF_USE_INERTIA_FROM_FILE | api.URDF_USE_SELF_COLLISION
+        number = self.world.engine.load_urdf(self.description.engine_urdf, self._name, True, flags)
+        self.body = SimulatedBody(self.world.engine, number, self._name, Pose(), True, None)
+
+    def _set_up(self) -> None:
         self._limit_self_collisions()
         self._set_surfaces()
         self._disable_default_motors()
-        world.add(self.body, pose)
+        self.world.add(self.body, self._pose)
         self.reset()
+
+    def reload(self) -> None:
+        """Puts the robot into the world again, which has been emptied; joints are at their starting positions."""
+        self._load()
+        self._set_up()
 
     @property
     def gripper_joints(self) -> list[RobotJoint]:

@@ -3,30 +3,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Any
 
-from modular_framework_core.state_api.constructor_keys import StateKeys
-from modular_framework_core.state_api.framework_state import FrameworkState
-from modular_framework_states.manager_clients import Kind, ManagerError, file_request
+from modular_framework_states.manager_files import ManagerFileState
 
 
-class Store(FrameworkState):
-    """Writes what a manager holds to a file.
-
-    Args:
-        kind: Kind of messages.
-        path: A .yaml file; a relative path starts in the folder of the managers, below ``$ROS_HOME``.
-        **keys: Outcomes and userdata keys of any state.
-    """
-
-    def __init__(self, kind: Kind, path: str, **keys: Unpack[StateKeys]) -> None:
-        super().__init__(**keys)
-        self._kind, self._path = kind, str(path)
+class Store(ManagerFileState):
+    """Writes what a manager holds to a file."""
 
     def execute(self, userdata: Any) -> str:
         """Saves the messages of the manager."""
-        try:
-            file_request("save", self._kind, self._path)
-        except ManagerError as error:
-            return self.fail(str(error))
-        return self.succeed()
+        return self._run("save")

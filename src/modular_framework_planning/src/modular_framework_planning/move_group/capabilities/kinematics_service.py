@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
 from modular_framework_planning.move_group.ik_targets import combined_solutions, ik_targets, solvers_of
+from modular_framework_planning.move_group.pipeline_parameters import launch_seed
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
 LONGEST_TIMEOUT_S = 10.0
@@ -88,7 +90,9 @@ class KinematicsService(MoveGroupCapability):
 
     @staticmethod
     def _timeout(request: Any) -> float | None:
-        """Returns the requested timeout; None for the group's own."""
+        """Returns the requested timeout; None for the group's own, none at all where /seed is set."""
+        if launch_seed() is not None:
+            return math.inf  # numbers of tries bound the search: the clock must not decide
         asked = request.timeout.to_sec()
         return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
 

@@ -32,6 +32,9 @@ class RunningMotion(Protocol):
     def is_done(self) -> bool:
         """Whether the controller reports success; raises PlanningError when it failed."""
 
+    def has_begun(self) -> bool:
+        """Whether the controller has taken the motion up, or refused it."""
+
     def cancel(self) -> None:
         """Asks the controller to stop; nothing happens when it has ended."""
 
@@ -145,6 +148,10 @@ class ActionMotion:
             f"controller '{self._spec.name}' ended with {GoalStatus.to_string(state)}"
             f"{'' if code is None else f', error_code {code}'}: {text or 'no text'}",
         )
+
+    def has_begun(self) -> bool:
+        """Whether the goal is no longer pending."""
+        return self._client.get_state() != GoalStatus.PENDING
 
     def cancel(self) -> None:
         """Cancels the goal."""

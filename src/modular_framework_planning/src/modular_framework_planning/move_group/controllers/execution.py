@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,17 +27,21 @@ from modular_framework_planning.move_group.controllers.action_controllers import
 )
 from modular_framework_planning.move_group.controllers.fake_controllers import FakeControllers
 from modular_framework_planning.move_group.controllers.ros_control import RosControlControllers
-from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
+from modular_framework_planning.move_group.monitors.scene_monitor import STATE_PERIOD_S, SceneMonitor
 from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, GRIPPER, choose_controllers
 from modular_framework_planning.trajectory_execution.execution_settings import (
     ExecutionSettings,
     parse_execution_settings,
 )
 from modular_framework_planning.trajectory_execution.path_watch import PathWatch
+from modular_framework_ros.calls import wait_until
 
 SETTLE_TIMEOUT_S = 1.0
 SETTLED_RAD = 1.0e-4
+SETTLE_STATES = round(SETTLE_TIMEOUT_S / STATE_PERIOD_S)
+"""Most states that are waited for where time is held."""
 STOP_TIMEOUT_S = 1.0
+BEGIN_TIMEOUT_S = 5.0
 START_STATE_TIMEOUT_S = 0.5
 SIMPLE_MANAGER = "moveit_simple_controller_manager/MoveItSimpleControllerManager"
 FAKE_MANAGER = "moveit_fake_controller_manager/MoveItFakeControllerManager"
@@ -252,8 +256,12 @@ class TrajectoryExecution:
         begun = rospy.Time.now()
         running: list[tuple[MotionPart, RunningMotion]] = []
         try:
-            for part in parts:
-                running.append((part, manager.begin(part)))
+            # with held time all parts begin at the same time; one part needs no hold
+            with self._monitor.time.held("begin of a motion", during_motions=True) if len(parts) > 1 else nullcontext():
+                for part in parts:
+                    running.append((part, manager.begin(part)))
+                if len(parts) > 1 and self._monitor.time.enabled:
+                    wait_until(lambda: all(motion.has_begun() for _, motion in running), BEGIN_TIMEOUT_S)
             while running:
                 if cancelled.is_set() or stop.is_set() or rospy.is_shutdown():
                     raise PlanningError(ErrorCode.PREEMPTED, "the motion was stopped on request")
@@ -281,12 +289,16 @@ class TrajectoryExecution:
 
     def _settle(self, joint_names: list[str]) -> None:
         """Waits until the joints stand still, so that the next plan starts from where the robot stays."""
-        index = self._monitor.model.index
+        monitor, index = self._monitor, self._monitor.model.index
         numbers = [index[name] for name in joint_names if name in index]
-        end = rospy.Time.now() + rospy.Duration(SETTLE_TIMEOUT_S)
-        before = self._monitor.positions()[numbers]
-        while rospy.Time.now() < end and self._monitor.wait_for_next_state(SETTLE_TIMEOUT_S):
-            now = self._monitor.positions()[numbers]
+        monitor.catch_up()  # where time is held, the same states are compared whenever messages arrive
+        end, states = rospy.Time.now() + rospy.Duration(SETTLE_TIMEOUT_S), 0
+        before = monitor.positions()[numbers]
+        while states < SETTLE_STATES if monitor.time.enabled else rospy.Time.now() < end:
+            if not monitor.wait_for_next_state(SETTLE_TIMEOUT_S):
+                return
+            states += 1
+            now = monitor.positions()[numbers]
             if np.abs(now - before).max() < SETTLED_RAD:
                 return
             before = now

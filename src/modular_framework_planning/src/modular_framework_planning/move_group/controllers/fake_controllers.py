@@ -161,6 +161,10 @@ class FakeMotion:
             )
         return not away
 
+    def has_begun(self) -> bool:
+        """A fake controller begins at once."""
+        return True
+
     def cancel(self) -> None:
         """Stops at the present positions."""
         self._stopped.set()

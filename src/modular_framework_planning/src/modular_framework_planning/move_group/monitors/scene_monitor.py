@@ -29,6 +29,11 @@ from modular_framework_planning.move_group.node_settings import SceneMonitorSett
 from modular_framework_planning.planning_scene.padding import Padding
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_ros.calls import CallError
+from modular_framework_ros.simulated_time import SimulatedTime
+
+STATE_PERIOD_S = 0.02
+"""Simulated time that passes from one joint state to the next that is waited for, where time is held [s]."""
 
 
 class SceneMonitor:
@@ -56,6 +61,8 @@ class SceneMonitor:
         self._history = JointHistory(model.endless)
         self._stamps: dict[int, rospy.Time] = {}
         self._arrivals = 0
+        self._latest: rospy.Time | None = None
+        self.time = SimulatedTime()
         self._arrived = threading.Condition()
         base = set(model.base.variables if model.base else ())  # joint_states does not have it
         needless = model.follower_joints | base
@@ -176,6 +183,7 @@ class SceneMonitor:
             self._stamps.update({self.model.index[name]: message.header.stamp for name in changed})
         with self._arrived:
             self._arrivals += 1
+            self._latest = message.header.stamp
             self._arrived.notify_all()
 
     def positions_at(self, stamp_s: float, timeout_s: float) -> Any:
@@ -207,7 +215,19 @@ class SceneMonitor:
                 )
             with self._arrived:
                 self._arrived.wait(min(remaining, 0.1))
+        self.catch_up()
         self._warn_of_unseen_base()
+
+    def catch_up(self) -> None:
+        """Where simulated time is held: waits until objects and joints are those of the time at which it stands.
+
+        Raises:
+            PlanningError: they did not come.
+        """
+        try:
+            self.time.catch_up(lambda: self._latest)
+        except CallError as error:
+            raise PlanningError(ErrorCode.ROBOT_STATE_STALE, str(error)) from error
 
     def _warn_of_unseen_base(self) -> None:
         """Warns where tf does not show a planar or floating base; as in MoveIt that stops no plan."""
@@ -226,7 +246,14 @@ class SceneMonitor:
         )
 
     def wait_for_next_state(self, timeout_s: float) -> bool:
-        """Waits for one more joint_states message; false when none came in time."""
+        """Waits for one more joint_states message; false when none came in time.
+
+        Where simulated time may be held, lets a little of it pass, and waits for the state after that.
+        """
+        if self.time.enabled:
+            self.time.sleep(STATE_PERIOD_S)
+            self.catch_up()
+            return True
         with self._arrived:
             seen = self._arrivals
             return self._arrived.wait_for(lambda: self._arrivals > seen, timeout_s)

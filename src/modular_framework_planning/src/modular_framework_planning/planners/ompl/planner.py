@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -62,7 +63,8 @@ class OmplPlanner:
             if problem.edge_is_valid(start, goal, problem.settings.finest_step):
                 return PlannedPath(np.vstack([start, goal]))
         if problem.constraints is not None and constraints_are_tight(problem):
-            return ConstrainedSearch(problem, step).run()
+            most_states = problem.request.most_iterations
+            return ConstrainedSearch(problem, step, most_states=math.inf if most_states is None else most_states).run()
         if problem.repeatable and problem.planner_id in THREADED:
             raise PlanningError(
                 ErrorCode.PLANNING_FAILED,
@@ -251,6 +253,8 @@ class _Search:
         limit = self._limit
         if limit is None and problem.repeatable and problem.planner_id in ANYTIME:
             limit = problem.settings.seeded_iterations
+        if limit is None:
+            limit = problem.request.most_iterations
         if limit is None:
             return ob.PlannerTerminationCondition(problem.interrupted)
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -19,28 +18,17 @@ SMALLEST_RADIUS = 1.0e-4  # [m]
 SMALLEST_SINE = 1.0e-3  # of the angle between two directions that are to span a plane
 
 
-class PosePath(Protocol):
-    """A path of a link; `share` runs from 0 to 1."""
-
-    @property
-    def translation_length(self) -> float:
-        """Length of the origin's way [m]."""
-
-    @property
-    def turn(self) -> Array:
-        """Whole rotation as axis times angle [rad], in the frame of the start."""
-
-    def pose(self, share: float) -> Transform:
-        """Returns the link's pose in the planning frame."""
-
-
 def _turned(start: Transform, turn: Array, share: float) -> Array:
     return start.rotation @ pin.exp3(share * turn)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinePath:
-    """A straight line between two poses."""
+    """A straight line between two poses.
+
+    Attributes:
+        turn: whole rotation as axis times angle [rad], in the frame of the start.
+    """
 
     start: Transform
     end: Transform
@@ -69,6 +57,7 @@ class ArcPath:
     """A circular arc between two poses.
 
     Attributes:
+        turn: whole rotation as axis times angle [rad], in the frame of the start.
         centre: of the circle [m].
         first, second: unit vectors towards the start and, at a right angle to it, in the direction of motion.
         angle: of the arc, above 0 [rad].
@@ -95,6 +84,10 @@ class ArcPath:
         angle = share * self.angle
         point = self.centre + radius * (np.cos(angle) * self.first + np.sin(angle) * self.second)
         return pin.SE3(_turned(self.start, self.turn, share), point)
+
+
+PosePath = LinePath | ArcPath
+"""A path of a link; `share` runs from 0 to 1."""
 
 
 def _invalid(reason: str) -> PlanningError:

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Names requests by what they ask, so that their seeds do not depend on the sequence in which threads send them."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import Counter
+
+import numpy as np
+
+from modular_framework_planning.planning_interface.planning_request import JointGoal, PlanningRequest, PoseGoal
+
+
+def request_digest(request: PlanningRequest) -> str:
+    """Returns a text that differs where group, start, goals or planner of two requests do."""
+    digest = hashlib.sha256(np.asarray(request.scene.positions, dtype=float).tobytes())
+    for text in (request.group, request.pipeline_id, request.planner_id, *map(_goal_text, request.goals)):
+        digest.update(f"\0{text}".encode())
+    return digest.hexdigest()
+
+
+def _goal_text(goal: object) -> str:
+    match goal:
+        case JointGoal():
+            return " ".join(f"{name} {float(value).hex()}" for name, value in sorted(goal.positions.items()))
+        case PoseGoal():
+            numbers = np.asarray(goal.target.homogeneous, dtype=float).ravel()
+            return f"{goal.link} {' '.join(float(value).hex() for value in numbers)}"
+    return type(goal).__name__
+
+
+class RequestCounts:
+    """Counts how often the same was asked; counts anew once time goes back, as with a simulation that begins again.
+
+    Threads may share it. A request that is repeated gets another number, so that it is not planned the same way again.
+    """
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._last_s = 0.0
+        self._lock = threading.Lock()
+
+    def count(self, digest: str, time_s: float) -> int:
+        """Returns how often this was asked before.
+
+        Args:
+            digest: names what is asked.
+            time_s: time of the ROS clock [s].
+        """
+        with self._lock:
+            if time_s < self._last_s:
+                self._counts.clear()
+            self._last_s = time_s
+            number = self._counts[digest]
+            self._counts[digest] += 1
+            return number

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Holds simulated time while a node computes, and lets it pass while the node waits.
+
+With the parameter ``/wait_for_planning`` a simulation lets nodes hold its time. What a node waits for then has to be
+asked for: time that is held passes only while a controller carries out a goal, or while ``SimulatedTime.sleep`` asks
+for it. Without the parameter, and on a real robot, nothing is held, and waits are those of the ROS clock.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import rospy
+from simulation_time_msgs.srv import AdvanceTime, AdvanceTimeRequest, AdvanceTimeResponse, HoldTime, HoldTimeRequest
+
+from modular_framework_ros.calls import CallError, request_service, wait_until
+
+WAIT_PARAMETER = "/wait_for_planning"
+HOLD_SERVICE = "/gazebo/hold_time"
+ADVANCE_SERVICE = "/gazebo/advance_time"
+LEASE_S = 10.0
+RENEWALS = 5
+"""Renewals of a hold within its lease."""
+ANSWER_TIMEOUT_S = 40.0
+SLOWEST_FACTOR = 0.02
+SAME_TIME_S = 1.0e-6
+CLOCK_TIMEOUT_S, CLOCK_JUMP_S = 1.0, 1.0
+
+
+class SimulatedTime:
+    """A client of the time of the simulation; threads may share it.
+
+    Parameters: ``/wait_for_planning`` (bool, false), read at the first use.
+    Services called: ``/gazebo/hold_time`` (simulation_time_msgs/HoldTime), ``/gazebo/advance_time``
+        (simulation_time_msgs/AdvanceTime).
+    """
+
+    def __init__(self) -> None:
+        self._enabled: bool | None = None
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the simulation lets nodes hold its time."""
+        if self._enabled is None:
+            self._enabled = bool(rospy.get_param(WAIT_PARAMETER, False))
+        return self._enabled
+
+    @contextmanager
+    def held(self, owner: str, during_motions: bool = False) -> Iterator[None]:
+        """Holds simulated time as long as the context lasts; a hold whose process dies ends after LEASE_S.
+
+        Args:
+            owner: whose hold it is; made unique by the name of the node.
+            during_motions: whether time stands still while controllers carry out goals, too.
+
+        Raises:
+            CallError: the simulation does not hold its time.
+        """
+        if not self.enabled:
+            yield
+            return
+        name = f"{rospy.get_name()} {owner} {threading.get_ident()}"
+        request = HoldTimeRequest(owner=name, lease_s=LEASE_S, during_motions=during_motions)
+        _hold(request)
+        over = threading.Event()
+        renewing = threading.Thread(target=_renew, args=(request, over), daemon=True, name=f"hold of {owner}")
+        renewing.start()
+        try:
+            yield
+        finally:
+            over.set()
+            renewing.join()
+            if not rospy.is_shutdown():
+                _hold(HoldTimeRequest(owner=name, lease_s=0.0))
+
+    def sleep(self, duration_s: float) -> None:
+        """Waits until simulated time has passed by a duration [s], which lets it pass where it is held.
+
+        Where it is held, the clock of this node shows the time of then on return.
+
+        Raises:
+            CallError: it does not pass.
+        """
+        if self.enabled:
+            self._advance(duration_s)
+        else:
+            rospy.sleep(duration_s)
+
+    def catch_up(self, latest: Callable[[], rospy.Time | None] = lambda: None, timeout_s: float = 3.0) -> None:
+        """Waits until clock, planning scene, and what the caller receives are as the world is now; not without holds.
+
+        Args:
+            latest: stamp of the latest message that the caller received; None before the first, and where it receives
+                none.
+            timeout_s: longest wait for that message [s of real time].
+
+        Raises:
+            CallError: the simulation does not answer, or no message came.
+        """
+        if not self.enabled:
+            return
+        answer = self._advance(0.0)
+        now_s = answer.stamp.to_sec()
+
+        def is_of_now() -> bool:
+            stamp = latest()
+            late_s = None if stamp is None else stamp.to_sec() - now_s
+            return late_s is not None and (abs(late_s) < SAME_TIME_S if answer.held else late_s > -SAME_TIME_S)
+
+        if latest() is not None and not wait_until(is_of_now, timeout_s, 0.002):
+            raise CallError(
+                f"no message of the simulated time {now_s:.3f} s came within {timeout_s:g} s; the latest is of "
+                f"{latest()}; is its publisher running?"
+            )
+
+    def wait_until(self, condition: Callable[[], bool], timeout_s: float, period_s: float) -> bool:
+        """Waits for a condition that simulated time brings about; returns whether it held in time.
+
+        Args:
+            condition: asked after each period, with the time of then standing still.
+            timeout_s: longest wait [s of simulated time].
+            period_s: time between two questions [s].
+        """
+        passed_s = 0.0
+        while not condition():
+            if passed_s >= timeout_s or rospy.is_shutdown():
+                return False
+            self.sleep(period_s)
+            passed_s += period_s
+        return True
+
+    @staticmethod
+    def _advance(duration_s: float) -> AdvanceTimeResponse:
+        request = AdvanceTimeRequest(duration=rospy.Duration.from_sec(duration_s))
+        answer = request_service(ADVANCE_SERVICE, AdvanceTime, request, ANSWER_TIMEOUT_S + duration_s / SLOWEST_FACTOR)
+        if not answer.success:
+            raise CallError(f"service '{ADVANCE_SERVICE}': {answer.message}")
+        if answer.held and not rospy.rostime.is_wallclock():
+            wait_until(lambda: _clock_shows(answer.stamp.to_sec()), CLOCK_TIMEOUT_S, 0.001)
+        return answer
+
+
+def _clock_shows(time_s: float) -> bool:
+    """Returns whether the clock of this node has come to a time at which the simulation stood [s]."""
+    late_s = rospy.get_time() - time_s
+    return -SAME_TIME_S < late_s < CLOCK_JUMP_S  # further on, it is from before the world began again
+
+
+def _hold(request: HoldTimeRequest) -> None:
+    answer = request_service(HOLD_SERVICE, HoldTime, request, ANSWER_TIMEOUT_S)
+    if not answer.success:
+        raise CallError(f"service '{HOLD_SERVICE}': {answer.message}")
+
+
+def _renew(request: HoldTimeRequest, over: threading.Event) -> None:
+    while not over.wait(LEASE_S / RENEWALS):
+        try:
+            _hold(request)
+        except CallError as error:
+            rospy.logwarn("the hold of simulated time is not renewed: %s", error)
+            return

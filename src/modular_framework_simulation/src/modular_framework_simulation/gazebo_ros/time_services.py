@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Services with which nodes hold simulated time, let it pass, and begin again with the world as at the start."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from simulation_time_msgs.srv import AdvanceTime, AdvanceTimeResponse, HoldTime, HoldTimeResponse
+from std_srvs.srv import Trigger, TriggerResponse
+
+from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.gazebo_ros import ros_names
+from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
+from modular_framework_simulation.loop.simulation_loop import Hook, SimulationLoop
+from modular_framework_simulation.loop.snapshots import WorldSnapshot
+from modular_framework_simulation.loop.time_holds import Advance, HoldError
+from modular_framework_simulation.loop.world_digest import WorldDigest
+
+_ANSWER_TIMEOUT_S = 30.0
+_WAIT_SLICE_S = 0.2
+_LONGEST_ADVANCE_S = 3600.0
+_SLOWEST_FACTOR = 0.02
+"""Simulated over real time below which a request for time to pass is given up."""
+
+
+class TimeServices:
+    """Advertises and answers /gazebo/hold_time, /gazebo/advance_time, /gazebo/restart and /gazebo/state_digest.
+
+    Args:
+        loop: The simulation loop.
+        scene: Is brought in step with the world before an answer is given.
+        take_snapshot: Copies the state of the world; called by the loop's thread.
+        may_hold: Whether time may be held: the parameter /wait_for_planning.
+        digest: Hashes every step; None where nobody asks for that.
+    """
+
+    def __init__(
+        self,
+        loop: SimulationLoop,
+        scene: PlanningScenePublisher,
+        take_snapshot: Callable[[], WorldSnapshot],
+        may_hold: bool,
+        digest: WorldDigest | None = None,
+    ) -> None:
+        self._loop, self._scene, self._take_snapshot, self._may_hold = loop, scene, take_snapshot, may_hold
+        self._digest = digest
+        if digest is not None:
+            loop.add_hook(Hook(1, digest.add))
+        self._services: list[rospy.Service] = []
+
+    def connect(self) -> None:
+        """Advertises the services."""
+        for name, kind, answer in (
+            (ros_names.HOLD_TIME, HoldTime, self._on_hold),
+            (ros_names.ADVANCE_TIME, AdvanceTime, self._on_advance),
+            (ros_names.RESTART, Trigger, self._on_restart),
+        ):
+            self._services.append(rospy.Service(name, kind, answer))
+        if self._digest is not None:
+            self._services.append(rospy.Service(ros_names.STATE_DIGEST, Trigger, self._on_digest))
+
+    def close(self) -> None:
+        """Closes the services; may be called twice."""
+        while self._services:
+            self._services.pop().shutdown("the simulation ends")
+
+    def _in_loop(self, what: str, work: Callable[[], Any]) -> Any:
+        return self._loop.requests.call(what, work, _ANSWER_TIMEOUT_S)
+
+    def _on_hold(self, request: Any) -> HoldTimeResponse:
+        holds = self._loop.holds
+
+        def work() -> Any:
+            if request.lease_s == 0.0:
+                holds.release(request.owner)
+            else:
+                holds.hold(request.owner, request.lease_s, request.during_motions)
+            return self._stamp()
+
+        try:
+            if not self._may_hold:
+                raise HoldError("the simulation was started without /wait_for_planning: time passes all the time")
+            return HoldTimeResponse(success=True, stamp=self._in_loop(ros_names.HOLD_TIME, work))
+        except (HoldError, SimulationError) as error:
+            rospy.logerr("%s: %s", ros_names.HOLD_TIME, error)
+            return HoldTimeResponse(success=False, message=str(error))
+
+    def _on_advance(self, request: Any) -> AdvanceTimeResponse:
+        try:
+            duration_s = request.duration.to_sec()
+            if not 0.0 <= duration_s <= _LONGEST_ADVANCE_S:
+                raise HoldError(f"duration is {duration_s:g} s; allowed is 0 to {_LONGEST_ADVANCE_S:g} s")
+            if duration_s > 0.0:
+                self._let_pass(duration_s)
+            stamp, held = self._catch_up()
+            return AdvanceTimeResponse(success=True, stamp=stamp, held=held)
+        except (HoldError, SimulationError) as error:
+            rospy.logerr("%s: %s", ros_names.ADVANCE_TIME, error)
+            return AdvanceTimeResponse(success=False, message=str(error))
+
+    def _let_pass(self, duration_s: float) -> None:
+        """Waits until a duration has passed, in whole physics steps, or the world has begun again."""
+        step_s, holds = self._loop.world.settings.time_step_s, self._loop.holds
+        count = max(1, math.ceil(duration_s / step_s - 1e-6))
+        asked: Advance = self._in_loop(ros_names.ADVANCE_TIME, lambda: holds.advance(self._loop.world.steps + count))
+        waited_s, limit_s = 0.0, _ANSWER_TIMEOUT_S + duration_s / _SLOWEST_FACTOR
+        while not asked.passed.wait(_WAIT_SLICE_S):
+            waited_s += _WAIT_SLICE_S
+            if waited_s > limit_s or rospy.is_shutdown():
+                self._loop.requests.post(lambda: holds.give_up(asked))
+                state = "paused" if self._loop.paused else f"held by {', '.join(holds.owners) or 'nobody'}"
+                raise HoldError(f"{duration_s:g} s did not pass within {waited_s:.0f} s of real time; time is {state}")
+
+    def _catch_up(self) -> tuple[rospy.Time, bool]:
+        """Returns the time of now, and whether it is held; if so, once the planning scene is that of now."""
+        stamp, held, snapshot = self._in_loop(ros_names.ADVANCE_TIME, self._now)
+        if snapshot is not None:
+            self._scene.bring_up_to_date(snapshot)
+        return stamp, held
+
+    def _now(self) -> tuple[rospy.Time, bool, WorldSnapshot | None]:
+        held, world = self._loop.held, self._loop.world
+        is_news = held and not self._scene.is_up_to_date(world.time_ns, world.revision)
+        return self._stamp(), held, self._take_snapshot() if is_news else None
+
+    def _on_restart(self, _request: Any) -> TriggerResponse:
+        try:
+            self._in_loop(ros_names.RESTART, self._loop.restart)
+        except SimulationError as error:
+            rospy.logerr("%s: %s", ros_names.RESTART, error)
+            return TriggerResponse(success=False, message=str(error))
+        return TriggerResponse(success=True, message="the world is as at the start")
+
+    def _on_digest(self, _request: Any) -> TriggerResponse:
+        digest = self._digest
+        assert digest is not None
+        found = self._in_loop(ros_names.STATE_DIGEST, lambda: (*digest.checkpoints, digest.now()))
+        return TriggerResponse(success=True, message=json.dumps([[item.step, item.digest] for item in found]))
+
+    def _stamp(self) -> rospy.Time:
+        return rospy.Time(*divmod(self._loop.world.time_ns, 1_000_000_000))

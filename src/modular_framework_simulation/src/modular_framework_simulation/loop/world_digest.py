@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A hash of the motion of everything in the world, to compare two runs bit for bit and to find where they part."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from dataclasses import dataclass
+
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.robot_body import RobotBody
+
+CHECKPOINT_STEPS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """The hash of all steps up to one of them."""
+
+    step: int
+    digest: str
+
+
+class WorldDigest:
+    """Hashes joint positions and velocities of the robot, and poses of the models, after every physics step.
+
+    Args:
+        world: The models.
+        robot: The robot; None for a world without one.
+    """
+
+    def __init__(self, world: PhysicsWorld, robot: RobotBody | None) -> None:
+        self._world, self._robot = world, robot
+        self._hash = hashlib.sha256()
+        self._last_step = 0
+        self.checkpoints: list[Checkpoint] = []
+
+    def add(self) -> None:
+        """Adds the state after a step; the world's first step begins a new hash."""
+        step = self._world.steps
+        if step <= self._last_step:
+            self._hash, self.checkpoints = hashlib.sha256(), []
+        self._last_step = step
+        values = (
+            [] if self._robot is None else [x for item in self._robot.read() for x in (item.position, item.velocity)]
+        )
+        for name in self._world.names():
+            body = self._world.body(name)
+            if not body.static:
+                pose = body.state().pose
+                values += (*pose.position, *pose.quaternion)
+        self._hash.update(struct.pack(f"<q{len(values)}d", step, *values))
+        if step % CHECKPOINT_STEPS == 0:
+            self.checkpoints.append(self.now())
+
+    def now(self) -> Checkpoint:
+        """Returns the hash of all steps so far."""
+        return Checkpoint(self._last_step, self._hash.hexdigest())
