@@ -33,7 +33,7 @@ def test_refuses_an_unsupported_system_and_points_to_docker(tmp_path: Path, rele
 def test_refuses_an_unknown_command_and_lists_the_known_ones() -> None:
     answer = run_install("instal")
     assert answer.returncode == 1
-    assert "unknown command 'instal'" in answer.stderr and "run, test, shell" in answer.stderr
+    assert "unknown command 'instal'" in answer.stderr and "run, experiment, test, shell" in answer.stderr
 
 
 @pytest.mark.parametrize("folder", ["my checkout", "a:b", "price$", "it's"])

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modular_framework_benchmark.experiments.design import digest_of, lay_out
-from modular_framework_benchmark.experiments.distributions import Choice, Normal, Uniform, draw, generator_of
+from modular_framework_benchmark.experiments.distributions import Choice, Normal, Uniform, generator_of
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
 
@@ -107,15 +107,15 @@ def test_an_object_stands_on_its_surface_however_it_is_turned(tmp_path: Path) ->
 
 @given(low=st.floats(-10, 10), size=st.floats(0, 10), key=st.integers())
 def test_a_number_of_a_range_is_inside_it_and_the_same_for_the_same_key(low: float, size: float, key: int) -> None:
-    found = draw(Uniform(low, low + size), generator_of(key, "x"))
+    found = Uniform(low, low + size).draw(generator_of(key, "x"))
     assert low - 1e-6 <= found <= low + size + 1e-6
-    assert found == draw(Uniform(low, low + size), generator_of(key, "x"))
+    assert found == Uniform(low, low + size).draw(generator_of(key, "x"))
 
 
 def test_distributions_have_their_means_and_spreads() -> None:
-    normal = [draw(Normal(2.0, 0.5), generator_of(key)) for key in range(4000)]
+    normal = [Normal(2.0, 0.5).draw(generator_of(key)) for key in range(4000)]
     mean = sum(normal) / len(normal)
     assert mean == pytest.approx(2.0, abs=0.04)
     assert math.sqrt(sum((one - mean) ** 2 for one in normal) / len(normal)) == pytest.approx(0.5, abs=0.03)
-    chosen = [draw(Choice((1.0, 2.0)), generator_of(key)) for key in range(1000)]
+    chosen = [Choice((1.0, 2.0)).draw(generator_of(key)) for key in range(1000)]
     assert set(chosen) == {1.0, 2.0} and 420 < chosen.count(1.0) < 580

@@ -127,7 +127,7 @@ def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: 
     )
     entry = "{function: mine.py:swing, better: lower, unit: rad, kind: time}"
     experiment = read(PICK.replace("[success, task_time]", f"[success, {entry}]"), tmp_path)
-    own = experiment.metrics[1]
+    own = experiment.description.metrics[1]
     assert (own.name, own.better, own.unit, own.kind) == ("swing", Direction.LOWER, "rad", MetricKind.TIME)
     assert experiment.measures == ("success", {"name": "swing", "function": f"{tmp_path / 'mine.py'}:swing"})
     assert (
@@ -138,9 +138,9 @@ def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: 
 
 
 def test_a_duration_is_limited_by_the_time_of_an_episode_unless_the_file_says_otherwise(tmp_path: Path) -> None:
-    assert [one.limit for one in read(PICK, tmp_path).metrics] == [None, 60.0]
+    assert [one.limit for one in read(PICK, tmp_path).description.metrics] == [None, 60.0]
     text = PICK.replace("task_time]", "{metric: task_time, limit: 12}]")
-    assert read(text, tmp_path).metrics[1].limit == 12.0
+    assert read(text, tmp_path).description.metrics[1].limit == 12.0
 
 
 def test_a_sequential_rule_is_read(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.scheduling.marked_processes import marked_processes
 from modular_framework_benchmark.scheduling.run_lock import RunLock
 
-KILLS = 20
+KILLS = 8
 TEXT = """
 experiment: plans
 mode: planning
@@ -48,11 +48,19 @@ def folder(tmp_path: Path) -> Path:
 
 
 def start(
-    folder: Path, command: str, *arguments: str, runner: str = "NodeRunner", episode_s: float = 0.05
+    folder: Path,
+    command: str,
+    *arguments: str,
+    runner: str = "NodeRunner",
+    episode_s: float = 0.05,
+    ignored_signals: tuple[int, ...] = (),
 ) -> subprocess.Popen[str]:
     """Starts a command with a fake runner, as rosrun does."""
     code = f"import sys; from modular_framework_benchmark.commands.ros_run_command import {command} as c; "
     code += "sys.exit(c(sys.argv[1:]))"
+    # the tests may run in the background of a script, whose shell has SIGINT ignored
+    ignored = "".join(f"signal.signal({int(kind)}, signal.SIG_IGN); " for kind in ignored_signals)
+    code = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {ignored}{code}"
     environment = os.environ | {
         "PYTHONPATH": f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}",
         "FAKE_RUNS": str(folder / "runs"),
@@ -75,7 +83,7 @@ def finished(folder: Path) -> int:
     return 0
 
 
-def test_twenty_kills_at_random_moments_lose_nothing_and_run_nothing_twice(folder: Path) -> None:
+def test_kills_at_random_moments_lose_nothing_and_run_nothing_twice(folder: Path) -> None:
     generator = random.Random(5)
     mark = RunLock(str(folder / "plans.db")).run
     kills = 0
@@ -131,6 +139,16 @@ def test_a_signal_ends_the_run_and_what_it_has_started_and_says_how_to_go_on(fol
         assert process.returncode == 130
         assert "every episode that had ended is stored. To go on: rosrun modular_framework_benchmark resume" in errors
         assert marked_processes(f"{RunLock(str(folder / 'plans.db')).run}/") == []
+
+
+def test_a_run_of_nohup_outlives_the_terminal(folder: Path) -> None:
+    process = start(folder, "run_experiment", "experiment.yaml", ignored_signals=(signal.SIGHUP,))
+    while not finished(folder):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    process.send_signal(signal.SIGHUP)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
 
 
 def test_a_second_run_of_a_database_is_refused_while_the_first_one_runs(folder: Path) -> None:

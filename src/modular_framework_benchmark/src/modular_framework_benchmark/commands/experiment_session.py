@@ -12,12 +12,13 @@ from types import FrameType
 
 from modular_framework_benchmark.commands.mode_runners import runner_factory
 from modular_framework_benchmark.commands.stopping_rules import RunSettings, stopping_rule
+from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.results.database import ResultDatabase
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import LocalPool, Pool
 from modular_framework_benchmark.scheduling.progress import Progress
 
-EXIT_INTERRUPTED = 130
+EXIT_FAILED, EXIT_INTERRUPTED = 1, 130
 COMMAND = "rosrun modular_framework_benchmark"
 
 
@@ -73,7 +74,8 @@ class ExperimentSession:
                 from modular_framework_benchmark.scheduling.dask_pool import DaskPool  # Dask takes a second to import
 
                 return DaskPool(self._options.scheduler, make_runner, self._run_mark, logs)
-            return LocalPool(make_runner, self._options.workers or self._settings.workers, self._run_mark, logs)
+            workers = min(self._options.workers or self._settings.workers, run.pending)
+            return LocalPool(make_runner, workers, self._run_mark, logs)
 
         print(
             f"{self._name}: {run.pending} of {self._stored.planned} episodes to run; results in {self._options.target}"
@@ -84,8 +86,7 @@ class ExperimentSession:
                 end = run.run(make_pool, progress)
             except KeyboardInterrupt:
                 return self._interrupted()
-        self._print_results(end)
-        return 0
+        return self._print_results(end)
 
     def _interrupted(self) -> int:
         resume = f"{COMMAND} resume {shlex.quote(self._options.target)} --experiment {self._name}"
@@ -94,21 +95,27 @@ class ExperimentSession:
         print(f"\nstopped; every episode that had ended is stored. To go on: {resume}", file=sys.stderr)
         return EXIT_INTERRUPTED
 
-    def _print_results(self, end: RunEnd) -> None:
+    def _print_results(self, end: RunEnd) -> int:
+        """Prints the sentences of the comparison and writes the report; fails when no episode says anything."""
+        from modular_framework_benchmark.commands.report_command import write_page  # takes seconds to import
+
         if end.stopped_because:
             print(f"ended before all trials: {end.stopped_because}")
-        from modular_framework_benchmark.statistics.analysis import analyse  # takes seconds to import
-
-        for sentence in analyse(self._database.load(self._number, spans=False)).sentences:
-            print(sentence)
-        print(f"report: {COMMAND} report {shlex.quote(self._options.target)} --experiment {self._name}")
+        page = self._database.folder / f"{self._name}.html"
+        print(*write_page(self._options.target, self._name, page), f"report: {page}", sep="\n")
+        episodes = self._database.load(self._number, spans=False).episodes
+        if len(episodes) and (episodes["status"] == EpisodeStatus.BROKEN.value).all():
+            print(f"error: every episode broke; the first one: {episodes['cause'].iloc[0]}", file=sys.stderr)
+            return EXIT_FAILED
+        return 0
 
 
 class _Signals:
-    """Has SIGTERM and SIGHUP end a run as Ctrl-C does."""
+    """Has SIGTERM and SIGHUP end a run as Ctrl-C does; one that is ignored, as nohup asks for, stays ignored."""
 
     def __enter__(self) -> None:
-        self._before = {kind: signal.signal(kind, _interrupt) for kind in (signal.SIGTERM, signal.SIGHUP)}
+        caught = [kind for kind in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(kind) is not signal.SIG_IGN]
+        self._before = {kind: signal.signal(kind, _interrupt) for kind in caught}
 
     def __exit__(self, *_: object) -> None:
         for kind, handler in self._before.items():

@@ -22,7 +22,7 @@ COMPONENTS = {
     "task": {"task", "generation", "planning", "execution", "grasp"},
     "planning": {"planning"},
     "kinematics": {"kinematics"},
-    "grasps": {"generation", "grasp"},
+    "grasps": {"generation"},
 }
 """The components whose metrics a mode has, beside success."""
 

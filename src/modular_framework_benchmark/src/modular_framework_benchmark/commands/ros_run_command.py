@@ -88,7 +88,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.dry_run:
         print(design_text(experiment, episodes))
         return 0
-    target = options.database or f"{experiment.name}.db"
+    target = options.database or f"{experiment.description.name}.db"
     with RunLock(target) as lock, open_database(target, create=True) as database:
         number = database.add_experiment(experiment.described(digest_of(experiment, episodes)), episodes)
         return _session(database, number, target, lock, options, experiment).run()

@@ -12,9 +12,8 @@ from typing import Any
 
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
 from modular_framework_benchmark.episodes.snapshot import machine, machine_load, versions
-from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack
+from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
 from modular_framework_benchmark.metrics.recording_files import (
-    grasped_at,
     objects_of,
     read_descriptions,
     read_joints,
@@ -26,7 +25,7 @@ from modular_framework_benchmark.metrics.registry import measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 
 TASK_RECORDS = "task_records"
-PARTS = (("start", "ready"), ("task", "task"), ("check", "recorded"))
+PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
 """Parts of an episode in their order, and the moment at which each ends."""
 
 
@@ -44,6 +43,7 @@ class EpisodeEnd:
         cause: Why it did not succeed.
         answer: What the recorder answered.
         stop_s: How long it took to stop the stack [s].
+        target: Name of the object that success is about; "" for none.
     """
 
     spec: EpisodeSpec
@@ -55,6 +55,7 @@ class EpisodeEnd:
     cause: str = ""
     answer: Mapping[str, Any] = field(default_factory=dict)
     stop_s: float = 0.0
+    target: str = ""
 
     def broken(self, cause: str) -> EpisodeEnd:
         """Returns the end of an episode that could not be run."""
@@ -63,6 +64,14 @@ class EpisodeEnd:
     def ended(self, status: EpisodeStatus, cause: str, answer: Mapping[str, Any]) -> EpisodeEnd:
         """Returns the end of an episode that ran."""
         return replace(self, status=status, cause=cause, answer=answer)
+
+    def with_target(self, target: str) -> EpisodeEnd:
+        """Returns it with the name of the object that success is about."""
+        return replace(self, target=target)
+
+    def with_video_fault(self, fault: str) -> EpisodeEnd:
+        """Returns it with the reason why there is no video; "" if there is one."""
+        return replace(self, answer={**self.answer, "video_fault": fault})
 
     def stopped(self, stop_s: float) -> EpisodeEnd:
         """Returns it with the time that stopping took [s]."""
@@ -82,6 +91,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         outcome=str(answer.get("outcome", "")),
         cause=end.cause,
         states=states,
+        task_started_s=float(answer.get("task_started_s", 0.0)),
         task_s=answer.get("task_s"),
         task_wall_s=answer.get("task_wall_s"),
         reports=reports_of(recording),
@@ -89,9 +99,9 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         hand=_hand(end.folder, joints) if answer.get("held") else None,
         tracking=read_tracking(end.folder),
         objects=objects_of(recording),
-        target=recording.get("target", ""),
-        grasped_at_s=grasped_at(recording),
+        target=end.target,
         held=bool(answer.get("held", False)),
+        shake=Shake(**answer["shake"]) if answer.get("shake") else None,
         folder=end.folder,
     )
     measured = measure(end.spec.settings.get("metrics") or (), measurements)
@@ -130,6 +140,7 @@ def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
         "settings": dict(end.spec.settings),
         "parameters": end.answer.get("parameters_digest", ""),
         "final_objects": end.answer.get("final", {}),
+        **{key: end.answer[key] for key in ("shake_fault", "video_fault", "world_digest") if end.answer.get(key)},
         **({"metric_faults": dict(faults)} if faults else {}),
     }
 

@@ -7,12 +7,13 @@ It takes requests from its standard input and writes its answers to its standard
 
 from __future__ import annotations
 
+import contextlib
 import json
 import queue
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,22 +21,30 @@ from typing import Any
 import rosgraph
 import rospy
 from controller_manager_msgs.srv import ListControllers
+from simulation_time_msgs.srv import AdvanceTime, AdvanceTimeRequest
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from modular_framework_benchmark.episodes.ros_recording import write_parameters, write_recording
+from modular_framework_benchmark.episodes.bag import NODE as BAG_NODE
+from modular_framework_benchmark.episodes.bag import BagRecording
+from modular_framework_benchmark.episodes.errors import BagError, EpisodeAbortedError
+from modular_framework_benchmark.episodes.ros_recording import model_samples, write_parameters, write_recording
 from modular_framework_benchmark.episodes.ros_samples import Samples
+from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, WorldError, spawn
-from modular_framework_ros.calls import CallError, request_service
+from modular_framework_core.task_runner.ros_episode import EpisodeError, begin_episode
+from modular_framework_ros.calls import CallError, request_service, wait_until
+from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
 
 POLL_S = 0.02
-START_SERVICE = "/task/start"
+SETTLE_S = 0.5
+SAMPLE_S, SAMPLES_TIMEOUT_S = 0.02, 2.0
+SERVICE_TIMEOUT_S, STOP_TIMEOUT_S = 60.0, 3.0
+START_SERVICE, STOP_SERVICE = "/task/start", "/task/stop"
 LIST_CONTROLLERS = "/controller_manager/list_controllers"
-GENERATION_SIGNAL = "/grasp_generated"
-
-
-class EpisodeAbortedError(RuntimeError):
-    """The episode was ended from outside."""
+GENERATION_SIGNAL, GENERATION_SERVICE = "/grasp_generated", "/generate_grasps"
+GENERATION_SERVICE_S = 30.0
+"""How long after the signal a method's service is waited for [s]: on a busy machine it connects for seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +56,8 @@ class EpisodeRequest:
         objects: What to put into the world: `name`, `model`, `position`, `rpy`.
         target: Object that success is about; "" for none.
         hold_s: Simulated time after the end of the task when the world is looked at [s].
+        shake_s: Simulated time for which the object is shaken after that [s].
+        bag: Whether all topics are recorded to a bag.
         method: Whether the launch has a method that generates grasps.
         controllers: Names of the controllers that must run before the task starts.
         parameters: ROS parameters to set before.
@@ -57,6 +68,8 @@ class EpisodeRequest:
     objects: list[dict[str, Any]]
     target: str
     hold_s: float
+    shake_s: float
+    bag: bool
     method: bool
     controllers: list[str]
     parameters: dict[str, Any]
@@ -74,6 +87,7 @@ class EpisodeRecorder:
         """
         self._aborted = aborted
         self._samples = Samples()
+        self._time = SimulatedTime()
         self._ends: queue.Queue[dict[str, Any]] = queue.Queue()
 
     def connect(self) -> None:
@@ -84,64 +98,129 @@ class EpisodeRecorder:
 
     def run(self, request: EpisodeRequest) -> dict[str, Any]:
         """Runs an episode, and returns how the task ended and what became of the object."""
-        parts = {"start": time.monotonic() - request.begun}
+        answer: dict[str, Any] = {"parts": {}, "zero": 0.0, "outcome": "", "reason": ""}
         for name, value in request.parameters.items():
             rospy.set_param(name, value)
         self._wait_for_stack(request)
-        while not self._ends.empty():
-            self._ends.get_nowait()
+        self._reached(request, answer, "up")
         self._samples.connect()
-        self._samples.clear()
-        for entry in request.objects:
-            spawn(entry)
-        self._samples.clear()
-        zero = rospy.get_time()
-        parts["ready"] = time.monotonic() - request.begun
-        answer: dict[str, Any] = {"parts": parts, "zero": zero, "outcome": "", "reason": ""}
-        try:
-            self._run_task(request, answer)
-        except EpisodeAbortedError:
-            answer["aborted"] = True
-        answer |= write_recording(Path(request.folder), self._samples, request, zero)
-        answer["parameters_digest"] = write_parameters(Path(request.folder))
-        parts["recorded"] = time.monotonic() - request.begun
+        folder = Path(request.folder)
+        with self._bag(folder, request.bag), self._time.held("episode"):
+            try:
+                self._begin(request, answer)
+                self._run_task(request, answer)
+                self._check(request, answer)
+            except EpisodeAbortedError:
+                answer["aborted"] = True
+                self._stop_task()
+            spawned = {entry["name"]: entry["model"] for entry in request.objects}
+            answer |= write_recording(folder, self._samples, spawned, answer)
+        answer["parameters_digest"] = write_parameters(folder)
+        self._reached(request, answer, "recorded")
         return answer
 
+    @contextlib.contextmanager
+    def _bag(self, folder: Path, wanted: bool) -> Iterator[None]:
+        """Records a bag as long as the context lasts, once rosbag has subscribed to the topics."""
+        if not wanted:
+            yield
+            return
+        with contextlib.closing(BagRecording(folder)) as bag:
+
+            def subscribed() -> bool:
+                bag.check()
+                return _is_subscribed("/joint_states", f"/{BAG_NODE}")
+
+            self._wait(subscribed)
+            yield
+            bag.check()
+
+    @staticmethod
+    def _reached(request: EpisodeRequest, answer: dict[str, Any], part: str) -> None:
+        """Notes when a part of the episode ended [s since it began]."""
+        answer["parts"][part] = time.monotonic() - request.begun
+
+    def _begin(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
+        """Puts the objects into the world, which begins again where its time can be held."""
+
+        def spawn_all() -> None:
+            self._samples.clear()
+            answer["zero"] = self._now()
+            for entry in request.objects:
+                spawn(entry)
+
+        if self._time.enabled:
+            begin_episode(spawn_all, SETTLE_S)
+        else:
+            spawn_all()
+            self._time.sleep(SETTLE_S)
+        self._reached(request, answer, "ready")
+
     def _run_task(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
-        started = request_service(START_SERVICE, Trigger, Trigger._request_class(), timeout_s=30.0)
+        """Runs the task to its end."""
+        while not self._ends.empty():
+            self._ends.get_nowait()
+        answer["task_started_s"] = self._now() - answer["zero"]
+        started, begin = request_service(START_SERVICE, Trigger, Trigger._request_class(), 30.0), time.monotonic()
         if not started.success:
             raise WorldError(f"the task did not start: {started.message}")
-        begin = time.monotonic()
-        end = self._next_end()
+        self._wait(lambda: not self._ends.empty())
+        end = self._ends.get_nowait()
         answer |= {
             "outcome": end["outcome"],
             "reason": end["reason"],
             "task_succeeded": end["succeeded"],
             "task_wall_s": time.monotonic() - begin,
-            "task_s": rospy.get_time() - answer["zero"],
+            "task_s": self._now() - answer["zero"] - answer["task_started_s"],
         }
-        answer["parts"]["task"] = time.monotonic() - request.begun
-        until = rospy.get_time() + (request.hold_s if request.target else 0.0)
-        self._wait(lambda: rospy.get_time() >= until)
-        answer["simulated_s"] = rospy.get_time() - answer["zero"]
+        self._reached(request, answer, "task")
+
+    def _check(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
+        """Looks what is held after the hold time, and shakes it where that was asked for."""
+        if request.target:
+            self._time.sleep(request.hold_s)
+        answer["checked_s"] = self._now() - answer["zero"]
+        answer["held"] = bool(request.target) and request.target in self._samples.held
+        if request.shake_s > 0.0 and answer["held"]:
+            try:
+                started_s = shake(self._samples, request.shake_s) - answer["zero"]
+                answer["shake"] = {"started_s": started_s, "duration_s": request.shake_s}
+            except (ShakeError, CallError) as error:
+                answer["shake_fault"] = str(error)
+        answer["simulated_s"] = self._now() - answer["zero"]
+        latest_s = answer["zero"] + answer["simulated_s"] - SAMPLE_S
+        models = model_samples(answer["zero"], answer["simulated_s"])[1] if self._time.enabled else 0
+        wait_until(
+            lambda: self._samples.latest_s() >= latest_s and len(self._samples.models) >= models, SAMPLES_TIMEOUT_S
+        )
+        self._reached(request, answer, "checked")
+
+    def _now(self) -> float:
+        """Returns the time of the simulation; its own where it stands still, for the clock arrives later [s]."""
+        if not self._time.enabled:
+            return rospy.get_time()
+        answer = request_service(ADVANCE_SERVICE, AdvanceTime, AdvanceTimeRequest(), SERVICE_TIMEOUT_S)
+        return float(answer.stamp.to_sec())
+
+    def _stop_task(self) -> None:
+        """Stops the task, so that it writes what its states did."""
+        try:
+            request_service(STOP_SERVICE, Trigger, Trigger._request_class(), STOP_TIMEOUT_S)
+        except CallError:
+            return
+        wait_until(lambda: not self._ends.empty(), STOP_TIMEOUT_S)
 
     def _wait_for_stack(self, request: EpisodeRequest) -> None:
-        master = rosgraph.Master(rospy.get_name())
-        wanted = [START_SERVICE, *([SPAWN_SERVICE] if request.objects else [])]
-        wanted += [LIST_CONTROLLERS] if request.controllers else []
-
-        def is_up() -> bool:
-            publishers, _, services = master.getSystemState()
-            names = {name for name, _ in services}
-            signals = not request.method or any(topic == GENERATION_SIGNAL for topic, _ in publishers)
-            return signals and all(name in names for name in wanted)
-
-        self._wait(is_up)
+        """Waits until the task can start: its node, the simulation, the controllers and the method are up."""
+        wanted = {START_SERVICE, *([SPAWN_SERVICE] if request.objects else [])}
+        wanted |= {LIST_CONTROLLERS} if request.controllers else set()
+        self._wait(lambda: wanted <= _services())
         self._wait(lambda: set(request.controllers) <= _running_controllers())
-
-    def _next_end(self) -> dict[str, Any]:
-        self._wait(lambda: not self._ends.empty())
-        return self._ends.get_nowait()
+        if request.method:
+            self._wait(lambda: _is_published(GENERATION_SIGNAL))
+            # a method offers the service soon after, or it has none
+            until = time.monotonic() + GENERATION_SERVICE_S
+            self._wait(lambda: GENERATION_SERVICE in _services() or time.monotonic() > until)
 
     def _on_status(self, message: String) -> None:
         status = json.loads(message.data)
@@ -152,6 +231,18 @@ class EpisodeRecorder:
         while not condition():
             if self._aborted.wait(POLL_S):
                 raise EpisodeAbortedError
+
+
+def _services() -> set[str]:
+    return {name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]}
+
+
+def _is_published(topic: str) -> bool:
+    return any(name == topic for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[0])
+
+
+def _is_subscribed(topic: str, node: str) -> bool:
+    return any(name == topic and node in nodes for name, nodes in rosgraph.Master(rospy.get_name()).getSystemState()[1])
 
 
 def _running_controllers() -> set[str]:
@@ -190,7 +281,7 @@ def main() -> int:
             answer = recorder.run(EpisodeRequest(**request))
         except EpisodeAbortedError:
             answer = {"aborted": True}
-        except (WorldError, CallError, rospy.ROSException) as error:
+        except (WorldError, EpisodeError, BagError, CallError, rospy.ROSException) as error:
             answer = {"fault": str(error)}
         print(json.dumps(answer), flush=True)
         aborted.clear()

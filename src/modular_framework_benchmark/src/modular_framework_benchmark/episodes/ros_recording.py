@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import rosgraph
 import rospy
 
 from modular_framework_benchmark.episodes.ros_samples import Samples
@@ -18,38 +21,43 @@ from modular_framework_benchmark.metrics.recording_files import PARAMETERS, RECO
 OF_A_RUN = ("run_id", "roslaunch", "seed")
 """Parameters that differ between episodes of the same configuration."""
 
+MODELS_PERIOD_S = 0.02
+SAME_TIME_S = 1e-6
 POSE_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
-def write_recording(folder: Path, samples: Samples, request: Any, zero: float) -> dict[str, Any]:
+def write_recording(
+    folder: Path, samples: Samples, spawned: Mapping[str, str], answer: Mapping[str, Any]
+) -> dict[str, Any]:
     """Writes the files of an episode.
 
     Args:
         folder: Where to write them.
         samples: What was collected.
-        request: What was run: `objects` and `target`.
-        zero: ROS time at which the episode's recording begins [s].
+        spawned: The models of the objects that were put into the world, by name.
+        answer: `zero`: ROS time at which the recording begins [s]; `task_started_s`, `checked_s`,
+            `simulated_s`: when the task was started, success was checked, everything had ended [s since then].
 
     Returns:
-        `lifted_m`, `held` and `final`: what became of the objects.
+        `final`: pose of each object then; `lifted`: how much higher each of `spawned` was than when the task started.
     """
-    names = [entry["name"] for entry in request.objects]
-    poses = _object_poses(samples, zero)
-    tracking = _tracking(samples, zero)
-    trajectory = _trajectory(samples, tracking, zero)
-    trajectory = _with_objects(trajectory, poses)
+    zero, end_s = float(answer["zero"]), float(answer.get("simulated_s", np.inf))
+    poses = _object_poses(samples, list(spawned), answer)
+    tracking = _within(_tracking(samples, zero), end_s)
+    trajectory = _with_objects(_within(_trajectory(samples, tracking, zero), end_s), poses)
     trajectory.to_parquet(folder / TRAJECTORY)
     tracking.to_parquet(folder / TRACKING)
-    grasped = [[time_s - zero, text] for time_s, text in samples.grasped]
     content = {
         "objects": {name: rows.to_dict("list") for name, rows in poses.items()},
-        "spawned": names,
-        "target": request.target,
-        "grasped": grasped,
+        "spawned": dict(spawned),
         "reports": [*_planning(samples, zero), *_actions(samples, zero), *_components(samples, zero)],
     }
     (folder / RECORDING).write_text(json.dumps(content))
-    return _final(poses, grasped, request.target)
+    checked_s = float(answer.get("checked_s", np.inf))
+    final = {name: _at(rows, checked_s) for name, rows in poses.items() if len(rows)}
+    started_s = float(answer.get("task_started_s", 0.0))
+    lifted = {name: final[name][2] - _at(poses[name], started_s)[2] for name in spawned if name in final}
+    return {"final": final, "lifted": lifted}
 
 
 def write_parameters(folder: Path) -> str:
@@ -58,7 +66,8 @@ def write_parameters(folder: Path) -> str:
     Args:
         folder: Where to write `parameters.json`.
     """
-    parameters = rospy.get_param("/")
+    # rospy answers from its cache, which may hold a part of them only
+    parameters = rosgraph.Master(rospy.get_name()).getParam("/")
     text = json.dumps(parameters, sort_keys=True, indent=1)
     (folder / PARAMETERS).write_text(text)
     for name in OF_A_RUN:
@@ -66,28 +75,53 @@ def write_parameters(folder: Path) -> str:
     return hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()
 
 
-def _final(poses: dict[str, pd.DataFrame], grasped: list[list[Any]], target: str) -> dict[str, Any]:
-    held = bool(target) and bool(grasped) and target in str(grasped[-1][1]).split(",")
-    track = poses.get(target)
-    lifted = float(track["z"].iloc[-1] - track["z"].iloc[0]) if track is not None and len(track) else None
-    final = {
-        name: [float(rows[column].iloc[-1]) for column in POSE_COLUMNS] for name, rows in poses.items() if len(rows)
-    }
-    return {"lifted_m": lifted, "held": held, "final": final}
+def _within(rows: pd.DataFrame, end_s: float) -> pd.DataFrame:
+    """Returns the samples after the begin of an episode, before which the world was another one, up to its end."""
+    return rows[(rows["time_s"] > SAME_TIME_S) & (rows["time_s"] < end_s + SAME_TIME_S)].reset_index(drop=True)
 
 
-def _object_poses(samples: Samples, zero: float) -> dict[str, pd.DataFrame]:
-    """Returns the poses of the objects that move or could, by name: what stands still all the time has one row."""
+def _at(rows: pd.DataFrame, time_s: float) -> list[float]:
+    """Returns the pose at the last sample up to a time, or at the first."""
+    row = max(int(np.searchsorted(rows["time_s"].to_numpy(), time_s, side="right")) - 1, 0)
+    return [float(rows[column].iloc[row]) for column in POSE_COLUMNS]
+
+
+def _object_poses(samples: Samples, names: Sequence[str], answer: Mapping[str, Any]) -> dict[str, pd.DataFrame]:
+    """Returns the poses of all models, by name; what stands still all the time has one row."""
+    # a message from before the episode has not all objects yet
+    messages = [(stamp, message) for stamp, message in samples.models if set(names) <= set(message.name)]
     rows: dict[str, list[tuple[float, ...]]] = {}
-    for time_s, message in samples.models:
+    for time_s, (_, message) in zip(_sample_times(messages, answer), messages, strict=True):
         for name, pose in zip(message.name, message.pose, strict=True):
             place, turn = pose.position, pose.orientation
-            rows.setdefault(name, []).append((time_s - zero, place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
+            rows.setdefault(name, []).append((time_s, place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
     frames = {name: pd.DataFrame(found, columns=["time_s", *POSE_COLUMNS]) for name, found in rows.items()}
     return {
         name: frame if len(frame[list(POSE_COLUMNS)].drop_duplicates()) > 1 else frame.iloc[[0]]
         for name, frame in frames.items()
     }
+
+
+def model_samples(zero: float, end_s: float) -> tuple[int, int]:
+    """Returns the number of the first sample of the models in an episode, and how many there are.
+
+    The simulation sends them at whole multiples of `MODELS_PERIOD_S`.
+
+    Args:
+        zero: ROS time at which the recording begins [s].
+        end_s: Its end [s since then].
+    """
+    first = math.floor(zero / MODELS_PERIOD_S + SAME_TIME_S) + 1
+    return first, math.floor((zero + end_s) / MODELS_PERIOD_S + SAME_TIME_S) - first + 1
+
+
+def _sample_times(messages: Sequence[tuple[float, Any]], answer: Mapping[str, Any]) -> list[float]:
+    """Returns times of messages of the world, which have no stamp: counted, or where one is lost when they came."""
+    zero = float(answer["zero"])
+    first, count = model_samples(zero, float(answer.get("simulated_s", -1.0)))
+    if len(messages) == count:
+        return [(first + number) * MODELS_PERIOD_S - zero for number in range(count)]
+    return [stamp - zero for stamp, _ in messages]
 
 
 def _tracking(samples: Samples, zero: float) -> pd.DataFrame:
@@ -153,26 +187,22 @@ def _planning(samples: Samples, zero: float) -> list[dict[str, Any]]:
     for wall, report in samples.planning:
         if report["kind"] not in ("plan", "cartesian_path", "sequence"):
             continue
-        succeeded = report["error_code"] == 1
+        work = {
+            "component": "planning",
+            "name": str(report.get("request_name") or report["kind"]),
+            "succeeded": report["error_code"] == 1,
+            "reason": report["reason"],
+        }
         wall_s = float(report.get("planning_time_s") or 0.0)
-        motion = next((path for path in shown if succeeded and _belongs(path, report)), None)
+        motion = next((path for path in shown if work["succeeded"] and _belongs(path, report)), None)
         if motion is not None:
             shown.remove(motion)
-        reports.append(
-            {
-                "component": "planning",
-                "name": str(report.get("request_name") or report["kind"]),
-                "succeeded": succeeded,
-                "reason": report["reason"],
-                "started_s": report.get("started", report["time"]) - zero,
-                "ended_s": report["time"] - zero,
-                "wall_begin": wall - wall_s,
-                "wall_s": wall_s,
-                "figures": {"planning_time_s": wall_s}
-                | {key: report[key] for key in ("clearance_m", "attempts") if isinstance(report.get(key), int | float)},
-                "motion": _motion(motion.trajectory[-1].joint_trajectory) if motion is not None else None,
-            }
-        )
+        figures = {"planning_time_s": wall_s} | {
+            key: report[key] for key in ("clearance_m", "attempts") if isinstance(report.get(key), int | float)
+        }
+        times_s = (report.get("started", report["time"]) - zero, report["time"] - zero)
+        trajectory = motion.trajectory[-1].joint_trajectory if motion is not None else None
+        reports.append(_report(work, times_s, (wall - wall_s, wall), figures, trajectory))
     return reports
 
 
@@ -193,36 +223,49 @@ def _actions(samples: Samples, zero: float) -> list[dict[str, Any]]:
     reports = []
     for ended in samples.actions:
         trajectory = getattr(getattr(ended["goal"], "trajectory", None), "joint_trajectory", None)
-        reports.append(
-            {
-                "component": ended["component"],
-                "name": ended["component"],
-                "succeeded": ended["succeeded"],
-                "reason": ended["reason"],
-                "started_s": ended["ros"] - zero,
-                "ended_s": ended["ros_end"] - zero,
-                "wall_begin": ended["wall"],
-                "wall_s": ended["wall_end"] - ended["wall"],
-                "figures": {},
-                "motion": _motion(trajectory) if trajectory is not None else None,
-            }
-        )
+        times_s = (ended["ros"] - zero, ended["ros_end"] - zero)
+        wall_s = (ended["wall"], ended["wall_end"])
+        reports.append(_report(ended, times_s, wall_s, {}, trajectory))
     return reports
 
 
 def _components(samples: Samples, zero: float) -> list[dict[str, Any]]:
     return [
-        {
-            "component": report["component"],
-            "name": report["name"],
-            "succeeded": report["succeeded"],
-            "reason": report["reason"],
-            "started_s": report["started"] - zero,
-            "ended_s": report["ended"] - zero,
-            "wall_begin": wall - report["wall_s"],
-            "wall_s": report["wall_s"],
-            "figures": report["figures"],
-            "motion": None,
-        }
+        _report(
+            report,
+            (report["started"] - zero, report["ended"] - zero),
+            (wall - report["wall_s"], wall),
+            report["figures"],
+        )
         for wall, report in samples.components
     ]
+
+
+def _report(
+    work: dict[str, Any],
+    times_s: tuple[float, float],
+    wall_s: tuple[float, float],
+    figures: dict[str, float],
+    trajectory: Any = None,
+) -> dict[str, Any]:
+    """Returns the report of a piece of work: a :class:`ComponentReport` as it is written, and when it began.
+
+    Args:
+        work: What did it, `component` and maybe `name`, and how it ended, `succeeded` and `reason`.
+        times_s: Its start and end since the recording began, simulated time [s].
+        wall_s: Its start and end by the machine's clock [s].
+        figures: Its own figures.
+        trajectory: trajectory_msgs/JointTrajectory of its motion; None without one.
+    """
+    return {
+        "component": work["component"],
+        "name": work.get("name", work["component"]),
+        "succeeded": work["succeeded"],
+        "reason": work["reason"],
+        "started_s": times_s[0],
+        "ended_s": times_s[1],
+        "wall_begin": wall_s[0],
+        "wall_s": wall_s[1] - wall_s[0],
+        "figures": figures,
+        "motion": None if trajectory is None else _motion(trajectory),
+    }

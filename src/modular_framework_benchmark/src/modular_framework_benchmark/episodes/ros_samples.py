@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -36,7 +37,6 @@ class Samples:
     Attributes:
         joints: Joint states.
         models: (simulated time [s], gazebo_msgs/ModelStates).
-        grasped: (simulated time [s], name of the held objects).
         controllers: (name of the controller, its state).
         planning: (real time [s], report of move_group).
         paths: Motions that move_group shows.
@@ -66,6 +66,15 @@ class Samples:
             self.components: list[tuple[float, dict[str, Any]]] = []
             self.actions: list[dict[str, Any]] = []
             self._goals.clear()
+
+    @property
+    def held(self) -> frozenset[str]:
+        """Names of the objects that grippers hold now."""
+        return frozenset(self._last_grasped.split(",")) - {""}
+
+    def latest_s(self) -> float:
+        """Returns the stamp of the latest joint state [s]; minus infinity before the first."""
+        return float(self.joints[-1].header.stamp.to_sec()) if self.joints else -math.inf
 
     def connect(self) -> None:
         """Subscribes to everything that is there now; may be called again."""
@@ -101,10 +110,14 @@ class Samples:
 
     def _on_grasped(self, message: String) -> None:
         self._last_grasped = message.data
-        self.grasped.append((rospy.get_time(), message.data))
 
     def _on_goal(self, component: str, message: Any) -> None:
-        begin = {"component": component, "wall": time.monotonic(), "ros": rospy.get_time(), "goal": message.goal}
+        begin = {
+            "component": component,
+            "wall": time.monotonic(),
+            "ros": message.header.stamp.to_sec(),
+            "goal": message.goal,
+        }
         with self._lock:
             self._goals[message.goal_id.id] = begin
 
@@ -119,7 +132,12 @@ class Samples:
             reason = "" if succeeded else message.status.text or f"error code {code}"
             self.actions.append(
                 begin
-                | {"wall_end": time.monotonic(), "ros_end": rospy.get_time(), "succeeded": succeeded, "reason": reason}
+                | {
+                    "wall_end": time.monotonic(),
+                    "ros_end": message.header.stamp.to_sec(),
+                    "succeeded": succeeded,
+                    "reason": reason,
+                }
             )
 
 

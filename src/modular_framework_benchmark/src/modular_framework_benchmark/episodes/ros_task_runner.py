@@ -3,35 +3,41 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import roslaunch.core
-import roslaunch.rlutil
-import rospkg
-
-from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make_record
+from modular_framework_benchmark.episodes.episode_record import TASK_RECORDS, EpisodeEnd, make_record
+from modular_framework_benchmark.episodes.episode_video import make_video_apart
+from modular_framework_benchmark.episodes.errors import SettingsError
+from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
 from modular_framework_benchmark.episodes.snapshot import machine_load
-from modular_framework_benchmark.episodes.stack import Stack, StackError
-from modular_framework_benchmark.episodes.task_settings import SettingsError, TaskSettings, read_settings
+from modular_framework_benchmark.episodes.stack import Stack, StackError, StackLaunch
+from modular_framework_benchmark.episodes.task_settings import TaskSettings, read_settings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_core.launching.launch_arguments import METHOD, argument_values, check_arguments, known_arguments
-from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
 
-OWN_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
-"""Launch arguments that every episode sets, where the launch file has them."""
 ABORT_TIMEOUT_S = 15.0
 """How long the recorder has to write what it has when an episode is ended [s]."""
 
 
 class TaskEpisodeRunner:
-    """Runs episodes, one after the other."""
+    """Runs episodes, one after the other.
+
+    A stack whose world can begin again is kept for the next episode; that one starts its own where it launches
+    something else, or where the stack did not come to its end in order.
+    """
+
+    def __init__(self) -> None:
+        """Starts nothing."""
+        self._stack: Stack | None = None
+        self._launched: StackLaunch | None = None
+        self._resolved: dict[str, StackLaunch] = {}
 
     def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
-        """Runs an episode, within its time limit, and leaves no process.
+        """Runs an episode within its time limit.
 
         Args:
             spec: What to run.
@@ -43,83 +49,71 @@ class TaskEpisodeRunner:
         end = EpisodeEnd(spec, folder, time.time(), time.monotonic(), machine_load())
         try:
             settings = read_settings(spec)
-            launch = _resolved_launch(settings)
-        except (
-            ControllerFileError,
-            SettingsError,
-            roslaunch.core.RLException,
-            rospkg.ResourceNotFound,
-            OSError,
-        ) as error:
+            launch = self._launch_of(settings)
+        except SettingsError as error:
+            self.close()
             return make_record(end.broken(str(error)))
-        stack = Stack(settings.package, settings.launch_file, launch.arguments, self._parameters(settings), folder)
+        stack = self._stack_for(launch)
         try:
             end = self._run_on(stack, settings, launch, end)
         finally:
             stop = time.monotonic()
-            stack.stop()
-        return make_record(end.stopped(time.monotonic() - stop))
+            stack.write_log(folder / "log.txt")
+            ended = end.status in (EpisodeStatus.SUCCEEDED, EpisodeStatus.FAILED)
+            if not (settings.warm and launch.can_restart and ended and stack.alive()):
+                self.close()
+        end = end.stopped(time.monotonic() - stop)
+        if settings.record_video and "zero" in end.answer:
+            end = end.with_video_fault(make_video_apart(folder))
+        return make_record(end)
 
     def close(self) -> None:
-        """Ends what was kept for further episodes; may be called twice."""
+        """Stops the stack that is kept; leaves no process. May be called twice."""
+        if self._stack is not None:
+            self._stack.stop()
+        self._stack = self._launched = None
 
-    def _parameters(self, settings: TaskSettings) -> dict[str, Any]:
-        return {"/task/wait_for_start": True, **settings.parameters}
+    def _launch_of(self, settings: TaskSettings) -> StackLaunch:
+        """Returns what an episode launches; launch files are read once, for that takes as long as a warm begin."""
+        parts = (settings.package, settings.launch_file, dict(settings.arguments), dict(settings.parameters))
+        key = json.dumps(parts, sort_keys=True)
+        if key not in self._resolved:
+            self._resolved[key] = resolve_launch(settings)
+        return self._resolved[key]
 
-    def _run_on(self, stack: Stack, settings: TaskSettings, launch: ResolvedLaunch, end: EpisodeEnd) -> EpisodeEnd:
+    def _stack_for(self, launch: StackLaunch) -> Stack:
+        if self._stack is None or self._launched != launch or not self._stack.alive():
+            self.close()
+            self._stack, self._launched = Stack(launch), launch
+        return self._stack
+
+    def _run_on(self, stack: Stack, settings: TaskSettings, launch: StackLaunch, end: EpisodeEnd) -> EpisodeEnd:
         request = {
             "folder": str(end.folder),
             "objects": [asdict(placed) for placed in settings.objects],
             "target": settings.success.object,
             "hold_s": settings.success.hold_s,
+            "shake_s": settings.shake_s,
+            "bag": settings.record_bag,
             "method": launch.has_method,
             "controllers": list(launch.controllers),
-            "parameters": {"/seed": end.spec.seed, "/task/record_directory": str(end.folder / "task_records")},
+            "parameters": {"/seed": end.spec.seed, "/task/record_directory": str(end.folder / TASK_RECORDS)},
             "begun": end.begun_monotonic,
         }
+        end = end.with_target(settings.success.object)
         left_s = settings.time_limit_s - (time.monotonic() - end.begun_monotonic)
         try:
             answer = stack.ask(request, left_s)
         except StackError as error:
-            stack.abort(0.5)
             return end.broken(str(error))
         except TimeoutError:
             answer = stack.abort(ABORT_TIMEOUT_S) or {}
-            cause = f"no end within {settings.time_limit_s:g} s; {_doing(stack)}"
+            cause = f"no end within {settings.time_limit_s:g} s; {stack.last_words()}"
             return end.ended(EpisodeStatus.TIMED_OUT, cause, answer)
         if "fault" in answer:
-            return end.broken(str(answer["fault"]))
+            return end.broken(stack.cause_of(str(answer["fault"])))
         cause = _failure(settings, answer)
         return end.ended(EpisodeStatus.FAILED if cause else EpisodeStatus.SUCCEEDED, cause, answer)
-
-
-@dataclass(frozen=True, slots=True)
-class ResolvedLaunch:
-    """What a launch file and its arguments say of the stack.
-
-    Attributes:
-        arguments: All arguments to give.
-        has_method: Whether there is a method that generates grasps.
-        controllers: Names of the controllers it starts.
-    """
-
-    arguments: Mapping[str, str]
-    has_method: bool
-    controllers: tuple[str, ...]
-
-
-def _resolved_launch(settings: TaskSettings) -> ResolvedLaunch:
-    path = roslaunch.rlutil.resolve_launch_arguments([settings.package, settings.launch_file])[0]
-    known = known_arguments(path)
-    arguments = {**settings.arguments, **{name: value for name, value in OWN_ARGUMENTS.items() if name in known}}
-    given = [f"{name}:={value}" for name, value in arguments.items()]
-    check_arguments(path, given)
-    values = argument_values(path, given)
-    controllers: tuple[str, ...] = ()
-    if values.get("robot_package") and values.get("controller_file"):
-        folder = Path(rospkg.RosPack().get_path(values["robot_package"])) / "controllers"
-        controllers = read_controller_file(folder / values["controller_file"]).controllers
-    return ResolvedLaunch(arguments, bool(values.get(METHOD, "")), controllers)
 
 
 def _failure(settings: TaskSettings, answer: Mapping[str, Any]) -> str:
@@ -129,18 +123,12 @@ def _failure(settings: TaskSettings, answer: Mapping[str, Any]) -> str:
     wanted = settings.success
     if not wanted.object:
         return ""
-    lifted = answer["lifted_m"]
+    lifted, held = answer["lifted"].get(wanted.object), bool(answer["held"])
     if lifted is None:
-        return f"there is no object '{wanted.object}' in the world"
-    if lifted <= wanted.lifted_m or not answer["held"]:
-        return (
-            f"the task claims success, but '{wanted.object}' is {lifted:.3f} m higher {wanted.hold_s:g} s later "
-            f"(wanted: more than {wanted.lifted_m:g} m) and {'still' if answer['held'] else 'not'} in the gripper"
-        )
-    return ""
-
-
-def _doing(stack: Stack) -> str:
-    """Returns what the stack said last."""
-    lines = [line.strip() for line in stack.log().splitlines() if line.strip()]
-    return f"the launch said last: {lines[-1]}" if lines else "the launch said nothing"
+        return f"there is no object '{wanted.object}' in the world; 'success' has to name one of the episode's objects"
+    if lifted > wanted.lifted_m and held:
+        return ""
+    return (
+        f"the task claims success, but '{wanted.object}' is {lifted:.3f} m higher {wanted.hold_s:g} s later "
+        f"(wanted: more than {wanted.lifted_m:g} m) and {'still' if held else 'not'} in the gripper"
+    )

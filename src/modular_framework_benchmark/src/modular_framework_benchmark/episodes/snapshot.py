@@ -14,6 +14,12 @@ from typing import Any
 PACKAGES = ("coal", "numpy", "ompl", "pin", "pybullet", "scipy", "toppra")
 """Packages whose versions change results."""
 
+OF_ONE_EPISODE = (
+    *("seed", "settings", "parameters", "final_objects", "metric_faults"),
+    *("load_before", "load_after", "stolen_s", "busy_s"),
+)
+"""Parts of a snapshot that differ between the episodes of an experiment; the others should not."""
+
 
 @functools.cache
 def versions() -> dict[str, Any]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
 import subprocess
 import sys
@@ -16,17 +15,42 @@ import threading
 import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from modular_framework_core.files.default_folders import framework_home
-from modular_framework_core.launching.launch_session import Launch, LaunchSession
+from modular_framework_core.launching.launch_session import LaunchSession
 
 LAUNCHER = "modular_framework_benchmark.episodes.ros_stack_launcher"
 RECORDER = "modular_framework_benchmark.episodes.ros_episode_recorder"
 POLL_S = 0.02
+NODE_DIED, END_TIMEOUT_S = "process has died", 30.0
 SHARED_FOLDERS = ("convex_parts",)
 """Folders of the framework's home that sessions share: what is computed once for all."""
+
+
+@dataclass(frozen=True, slots=True)
+class StackLaunch:
+    """What is launched; episodes with equal ones can have the same stack.
+
+    Attributes:
+        package: Package of the launch file.
+        launch_file: Its name.
+        arguments: Launch arguments.
+        parameters: ROS parameters over those of the launch files, by absolute name.
+        has_method: Whether there is a method that generates grasps.
+        controllers: Names of the controllers that are started.
+        can_restart: Whether its world can begin again as after a cold start.
+    """
+
+    package: str
+    launch_file: str
+    arguments: Mapping[str, str]
+    parameters: Mapping[str, Any]
+    has_method: bool
+    controllers: tuple[str, ...]
+    can_restart: bool
 
 
 class StackError(RuntimeError):
@@ -50,49 +74,43 @@ def write_parameters(path: Path, parameters: Mapping[str, Any]) -> None:
 class Stack:
     """A launched stack and the recorder beside it."""
 
-    def __init__(
-        self,
-        package: str,
-        launch_file: str,
-        arguments: Mapping[str, str],
-        parameters: Mapping[str, Any],
-        folder: Path,
-    ) -> None:
+    def __init__(self, launch: StackLaunch) -> None:
         """Starts both; does not wait for them.
 
         Args:
-            package: Package of the launch file.
-            launch_file: Its name.
-            arguments: Launch arguments.
-            parameters: ROS parameters over those of the launch files, by absolute name.
-            folder: Folder for the logs of the launch and of the recorder.
+            launch: What to launch.
         """
         self._session = LaunchSession()
         home = Path(self._session.env["ROS_HOME"]) / "modular_framework"
-        home.mkdir(parents=True)
+        temporary = self._session.folder / "tmp"
+        for folder in (home, temporary):
+            folder.mkdir(parents=True)
         for name in SHARED_FOLDERS:
             (framework_home() / name).mkdir(parents=True, exist_ok=True)
             (home / name).symlink_to(framework_home() / name)
+        self._session.env["TMPDIR"] = str(temporary)
         self._session.env.pop("DISPLAY", None)
         parameters_file = self._session.folder / "parameters.launch"
-        write_parameters(parameters_file, parameters)
+        write_parameters(parameters_file, launch.parameters)
         self._launch = self._session.start(
             [
-                *(sys.executable, "-m", LAUNCHER, package, launch_file, str(parameters_file)),
-                *(f"{name}:={value}" for name, value in arguments.items()),
-            ],
-            folder / "log.txt",
+                *(sys.executable, "-m", LAUNCHER, launch.package, launch.launch_file, str(parameters_file)),
+                *(f"{name}:={value}" for name, value in launch.arguments.items()),
+            ]
         )
-        self._recorder = Recorder(self._session.env, folder / "recorder.txt")
+        self._recorder = Recorder(self._session.env, self._session.folder / "recorder.txt")
+        self._written = 0
 
-    @property
-    def launch(self) -> Launch:
-        """The launch."""
-        return self._launch
+    def write_log(self, path: Path) -> None:
+        """Writes what the launch has printed since the last call."""
+        log = self._launch.log()
+        path.write_text(log[self._written :])
+        self._written = len(log)
 
-    def log(self) -> str:
-        """Returns what the launch has printed so far."""
-        return self._launch.log()
+    def last_words(self) -> str:
+        """Returns what the launch printed last, in a sentence."""
+        lines = [line.strip() for line in self._launch.log().splitlines() if line.strip()]
+        return f"the launch said last: {lines[-1]}" if lines else "the launch said nothing"
 
     def ask(self, request: Mapping[str, Any], timeout_s: float) -> dict[str, Any]:
         """Has the recorder do something, and returns its answer.
@@ -112,9 +130,9 @@ class Stack:
             if answer is not None:
                 return answer
             if not self._launch.alive():
-                raise StackError(self.cause())
+                raise StackError(self._cause())
             if not self._recorder.alive():
-                raise StackError(f"the recorder of the episode died: {self._recorder.last_words()}")
+                raise StackError(self.cause_of(f"the recorder of the episode died: {self._recorder.last_words()}"))
         raise TimeoutError(f"no end within {timeout_s:g} s")
 
     def abort(self, timeout_s: float) -> dict[str, Any] | None:
@@ -126,22 +144,29 @@ class Stack:
         """Returns whether the stack and the recorder run."""
         return self._launch.alive() and self._recorder.alive()
 
-    def cause(self) -> str:
+    def cause_of(self, failure: str) -> str:
+        """Returns why something failed: the death of a node where one has died, for all else follows from it.
+
+        Args:
+            failure: What failed.
+        """
+        end = time.monotonic() + END_TIMEOUT_S
+        while NODE_DIED in self._launch.log() and self._launch.alive() and time.monotonic() < end:
+            time.sleep(POLL_S)  # the launch names the node a moment later
+        return failure if self._launch.alive() else self._cause()
+
+    def _cause(self) -> str:
         """Returns why the launch ended: its own last words."""
-        lines = [line.strip() for line in self.log().splitlines() if line.strip()]
+        lines = [line.strip() for line in self._launch.log().splitlines() if line.strip()]
         own = [number for number, line in enumerate(lines) if line.startswith("run_framework: ")]
         if own:
             return " ".join(lines[own[-1] :]).removeprefix("run_framework: ")
         return f"the launch ended with exit code {self._launch.process.poll()}: {lines[-1] if lines else 'no output'}"
 
     def stop(self) -> None:
-        """Stops everything and leaves no process. May be called twice."""
+        """Stops everything at once and leaves no process and no file. May be called twice."""
+        self._session.kill()
         self._recorder.close()
-        self._session.stop()
-
-    def processes(self) -> list[int]:
-        """Returns the processes of the stack that run now."""
-        return self._session.processes()
 
 
 class Recorder:
@@ -199,10 +224,9 @@ class Recorder:
 
     def close(self) -> None:
         """Ends it. May be called twice."""
-        for pipe in (self._process.stdin, self._process.stdout):
-            with contextlib.suppress(OSError):
-                if pipe is self._process.stdin and pipe is not None:
-                    pipe.close()
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self._process.pid, 9) if self._process.poll() is None else None
+        self._process.kill()
         self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with contextlib.suppress(OSError, ValueError):
+                if pipe is not None:
+                    pipe.close()

@@ -7,14 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
 DEFAULT_LAUNCH = "modular_framework_api/start_framework.launch"
 DEFAULT_TIME_LIMIT_S = 120.0
-
-
-class SettingsError(ValueError):
-    """A setting of an episode has a wrong type or value; the text names it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +57,7 @@ class TaskSettings:
         parameters: ROS parameters by absolute name, set over those of the launch files.
         objects: What is put into the world before the task starts.
         success: What must hold at the end.
-        shake: Simulated time for which the object is shaken after that [s]; 0: it is not.
+        shake_s: Simulated time for which the object is shaken after that [s]; 0: it is not.
         time_limit_s: Longest real time from the start to the end of the task [s].
         record_bag: Whether all topics are recorded to a bag.
         record_video: Whether a video is made.
@@ -73,7 +70,7 @@ class TaskSettings:
     parameters: Mapping[str, Any]
     objects: tuple[PlacedObject, ...]
     success: SuccessCriteria
-    shake: float
+    shake_s: float
     time_limit_s: float
     record_bag: bool
     record_video: bool
@@ -103,7 +100,7 @@ def read_settings(spec: EpisodeSpec) -> TaskSettings:
         parameters=dict(settings.get("parameters") or {}),
         objects=objects,
         success=_success(success, objects),
-        shake=float(success.get("shake", 0.0)),
+        shake_s=float(success.get("shake", 0.0)),
         time_limit_s=float(settings.get("time_limit", DEFAULT_TIME_LIMIT_S)),
         record_bag=bool(record.get("bag", False)),
         record_video=bool(record.get("video", False)),

@@ -52,7 +52,7 @@ def stack_of(settings: Mapping[str, Any]) -> str:
 
 
 def _episode(experiment: Experiment, item: Combination, trial: int, number: int) -> EpisodeSpec:
-    rest = pair_of(item.configuration, experiment.compared)
+    rest = pair_of(item.configuration, experiment.description.compared)
     return EpisodeSpec(
         number=number,
         configuration=dict(item.configuration),
@@ -79,7 +79,7 @@ def _drawn(experiment: Experiment, settings: Mapping[str, Any], rest: str, trial
     return drawn | {
         "metrics": list(experiment.measures),
         "record": dict(experiment.record),
-        "time_limit": experiment.time_limit_s,
+        "time_limit": experiment.description.time_limit_s,
     }
 
 
@@ -90,10 +90,10 @@ def digest_of(experiment: Experiment, episodes: list[EpisodeSpec]) -> str:
     """
     digest = hashlib.sha256()
     head = {
-        "name": experiment.name,
-        "mode": experiment.mode,
-        "compare": experiment.compared,
-        "metrics": [metric.name for metric in experiment.metrics],
+        "name": experiment.description.name,
+        "mode": experiment.description.mode,
+        "compare": experiment.description.compared,
+        "metrics": [metric.name for metric in experiment.description.metrics],
         "files": dict(experiment.files),
     }
     for part in _parts(head, episodes):

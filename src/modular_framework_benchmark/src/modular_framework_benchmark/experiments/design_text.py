@@ -14,11 +14,12 @@ SHOWN = 40
 
 def design_text(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
     """Returns what an experiment varies, what it measures, and its first episodes in the order of the run."""
+    description = experiment.description
     factors = [
-        f"  {factor.name}: {', '.join(factor.levels)}{'  (compared)' if factor.name == experiment.compared else ''}"
-        for factor in experiment.factors
+        f"  {factor.name}: {', '.join(factor.levels)}{'  (compared)' if factor.name == description.compared else ''}"
+        for factor in description.factors
     ]
-    names = [factor.name for factor in experiment.factors]
+    names = [factor.name for factor in description.factors]
     widths = [max(len(name), *(len(spec.configuration[name]) for spec in episodes)) for name in names]
     head = "  ".join(f"{name:<{width}}" for name, width in zip(names, widths, strict=True))
     rows = [
@@ -27,14 +28,14 @@ def design_text(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
         for spec in episodes[:SHOWN]
     ]
     more = [f"   ... and {len(episodes) - SHOWN} more"] if len(episodes) > SHOWN else []
-    longest_h = len(episodes) * experiment.time_limit_s / 3600 / experiment.workers
+    longest_h = len(episodes) * description.time_limit_s / 3600 / experiment.workers
     return "\n".join(
         [
-            f"{experiment.name}: {len(episodes)} episodes = {len(experiment.combinations)} combinations x "
-            f"{experiment.trials} trials; mode {experiment.mode}",
+            f"{description.name}: {len(episodes)} episodes = {len(experiment.combinations)} combinations x "
+            f"{experiment.trials} trials; mode {description.mode}",
             *factors,
-            f"  metrics: {', '.join(metric.name for metric in experiment.metrics)}",
-            f"  at most {longest_h:.1f} h: {experiment.time_limit_s:g} s an episode, workers: {experiment.workers}",
+            f"  metrics: {', '.join(metric.name for metric in description.metrics)}",
+            f"  at most {longest_h:.1f} h: {description.time_limit_s:g} s an episode, workers: {experiment.workers}",
             f"number  trial        seed  {head}".rstrip(),
             *(row.rstrip() for row in rows),
             *more,

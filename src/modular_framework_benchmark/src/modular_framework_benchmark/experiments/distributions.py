@@ -11,6 +11,8 @@ from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 ALLOWED = "a number, [LOW, HIGH], {normal: [MEAN, DEVIATION]} or {choice: [A, B, ...]}"
+DIGITS = 6
+"""Drawn numbers are rounded to this many decimals, so that the record shows what was used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +20,10 @@ class Fixed:
     """Always the same number."""
 
     value: float
+
+    def draw(self, generator: random.Random) -> float:
+        """Returns the number."""
+        return self.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +33,10 @@ class Uniform:
     low: float
     high: float
 
+    def draw(self, generator: random.Random) -> float:
+        """Returns a number between them."""
+        return round(generator.uniform(self.low, self.high), DIGITS)
+
 
 @dataclass(frozen=True, slots=True)
 class Normal:
@@ -35,12 +45,20 @@ class Normal:
     mean: float
     deviation: float
 
+    def draw(self, generator: random.Random) -> float:
+        """Returns a number around the mean."""
+        return round(generator.gauss(self.mean, self.deviation), DIGITS)
+
 
 @dataclass(frozen=True, slots=True)
 class Choice:
     """One of some numbers, all as likely."""
 
     values: tuple[float, ...]
+
+    def draw(self, generator: random.Random) -> float:
+        """Returns one of them."""
+        return generator.choice(self.values)
 
 
 Distribution = Fixed | Uniform | Normal | Choice
@@ -95,16 +113,3 @@ def generator_of(*key: object) -> random.Random:
     """Returns a generator of random numbers that depends on a key alone, on every machine."""
     digest = hashlib.sha256("/".join(str(part) for part in key).encode()).digest()
     return random.Random(int.from_bytes(digest, "big"))
-
-
-def draw(distribution: Distribution, generator: random.Random) -> float:
-    """Returns a number of a distribution, rounded to 1e-6: what the record shows is what was used."""
-    match distribution:
-        case Fixed():
-            return distribution.value
-        case Uniform():
-            return round(generator.uniform(distribution.low, distribution.high), 6)
-        case Normal():
-            return round(generator.gauss(distribution.mean, distribution.deviation), 6)
-        case Choice():
-            return generator.choice(distribution.values)

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from pathlib import Path
 from typing import Any
 
-from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
+from modular_framework_benchmark.records.experiment import ExperimentDescription
 
 
 class StoppingKind(Enum):
@@ -50,46 +49,28 @@ class Combination:
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """An experiment.
+    """An experiment and how it is run.
 
     Attributes:
-        name: Its name.
-        description: What it is about, in a sentence; may be empty.
-        mode: `task`, `planning`, `kinematics` or `grasps`.
-        text: The file, verbatim.
-        source: The file.
-        factors: What is varied.
-        compared: Name of the factor whose levels are the methods.
+        description: What the result database keeps of it; the digest is still empty.
         combinations: What is run in each trial.
         trials: How many trials there are, at most with a sequential rule.
         seed: What scenes and seeds are made from.
         block: Trials between two changes of the method, at the least.
-        metrics: What is measured.
         measures: The metrics as the episodes need them: a name, or {function: absolute FILE.py:NAME, ...} of a user.
         stopping: When it ends.
-        confidence: Level of the intervals.
-        time_limit_s: Longest an episode may take [s].
         workers: How many episodes run at the same time.
         record: Which files an episode keeps: `log`, `trajectories`, `bag`, `video`.
         files: SHA-256 of each file beside it that decides the episodes, by what names it.
     """
 
-    name: str
-    description: str
-    mode: str
-    text: str
-    source: Path
-    factors: tuple[Factor, ...]
-    compared: str
+    description: ExperimentDescription
     combinations: tuple[Combination, ...]
     trials: int
     seed: int
     block: int
-    metrics: tuple[Metric, ...]
     measures: tuple[Any, ...]
     stopping: Stopping
-    confidence: float
-    time_limit_s: float
     workers: int
     record: Mapping[str, bool]
     files: Mapping[str, str]
@@ -100,16 +81,4 @@ class Experiment:
         Args:
             digest: Of what decides its episodes.
         """
-        return ExperimentDescription(
-            name=self.name,
-            mode=self.mode,
-            text=self.text,
-            digest=digest,
-            factors=self.factors,
-            compared=self.compared,
-            metrics=self.metrics,
-            time_limit_s=self.time_limit_s,
-            confidence=self.confidence,
-            sequential=self.stopping.kind is StoppingKind.SEQUENTIAL,
-            source=str(self.source),
-        )
+        return replace(self.description, digest=digest)

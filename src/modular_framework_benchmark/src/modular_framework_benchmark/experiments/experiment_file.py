@@ -25,7 +25,7 @@ from modular_framework_benchmark.experiments.mode_settings import (
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
 from modular_framework_benchmark.experiments.setting_trees import check_references
 from modular_framework_benchmark.experiments.surroundings import Surroundings
-from modular_framework_benchmark.records.experiment import Factor, Metric
+from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
 from modular_framework_core.files.located_yaml import Mapping, Scalar, loads
@@ -119,28 +119,33 @@ class _Reader:
         metrics, measures = self._metrics(float(limit))
         self._note_metric_names(metrics, factors)
         stopping = self._stopping(metrics)
-        description = reading.text(entries["description"], "description") if "description" in entries else ""
+        if "description" in entries:
+            reading.text(entries["description"], "description")
         record = self._record()
         combinations = self._combinations(factors, design)
         if len(reading.faults):
             return None
-        return Experiment(
+        description = ExperimentDescription(
             name=str(name),
-            description=description or "",
             mode=str(self._mode),
             text=self._text,
-            source=self._path.resolve(),
+            digest="",
             factors=tuple(Factor(factor, tuple(levels)) for factor, levels in factors.items()),
             compared=compared,
+            metrics=metrics,
+            time_limit_s=float(limit),
+            confidence=float(numbers["confidence"] or 0.0),
+            sequential=stopping.kind is StoppingKind.SEQUENTIAL,
+            source=str(self._path.resolve()),
+        )
+        return Experiment(
+            description=description,
             combinations=combinations,
             trials=int(numbers["trials"] or 0),
             seed=int(numbers["seed"] or 0),
             block=int(numbers["block"] or 1),
-            metrics=metrics,
             measures=measures,
             stopping=stopping,
-            confidence=float(numbers["confidence"] or 0.0),
-            time_limit_s=float(limit),
             workers=int(numbers["workers"] or 1),
             record=record,
             files=_digests(

@@ -29,11 +29,6 @@ class Level:
     value: Scalar
     settings: Mapping
 
-    @property
-    def label(self) -> str:
-        """Returns its label."""
-        return level_label(self.value)
-
 
 Levels = Map[str, Map[str, Level]]
 """The levels by their labels, by the factor's name."""

@@ -90,7 +90,7 @@ def finish(node: Mapping, values: dict[str, Any], reading: Reading) -> dict[str,
     task = values.get("task")
     if task == DEFAULT_TASK:
         values["task"] = reading.surroundings.task(task, reading.folder)
-    objects = _objects(values["objects"], launch, arguments, reading)
+    objects = placed_objects(values["objects"], launch, arguments, reading)
     wanted = (values["success"] or {}).get("object")
     names = [found.name for found in objects]
     if wanted is not None and wanted not in names:
@@ -100,7 +100,17 @@ def finish(node: Mapping, values: dict[str, Any], reading: Reading) -> dict[str,
     return values | {"objects": objects}
 
 
-def _objects(found: list[ObjectNodes], launch: str, arguments: dict[str, str], reading: Reading) -> list[SceneObject]:
+def placed_objects(
+    found: list[ObjectNodes], launch: str, arguments: dict[str, str], reading: Reading
+) -> list[SceneObject]:
+    """Returns objects with their models' files; notes faults.
+
+    Args:
+        found: The objects as they were read.
+        launch: Launch file whose description package has the models.
+        arguments: Its arguments.
+        reading: Where faults are noted.
+    """
     taken: set[str] = set()
     objects = []
     for item in found:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,14 @@ class SettingKey:
     default: Any = None
     required: bool = False
 
+    def value(self, key: str, mode: str, node: Node_Mapping, reading: Reading) -> Any:
+        """Returns the value of the key in the settings of a mode, and notes where it is missing."""
+        if key in node.entries:
+            return self.read(node.entries[key], reading)
+        if self.required:
+            reading.faults.add(node.location, f"mode {mode} needs the key '{key}', in the file or in every level")
+        return self.default
+
 
 @dataclass(frozen=True, slots=True)
 class Mode:
@@ -57,15 +65,8 @@ def read_settings(mode: str, node: Node_Mapping, reading: Reading) -> dict[str, 
     Returns:
         A value for each key of the mode.
     """
-    values: dict[str, Any] = {}
     before = len(reading.faults)
-    for key, setting in MODES[mode].keys.items():
-        if key in node.entries:
-            values[key] = setting.read(node.entries[key], reading)
-        elif setting.required:
-            reading.faults.add(node.location, f"mode {mode} needs the key '{key}', in the file or in every level")
-        else:
-            values[key] = setting.default
+    values = {key: setting.value(key, mode, node, reading) for key, setting in MODES[mode].keys.items()}
     return MODES[mode].finish(node, values, reading) if len(reading.faults) == before else values
 
 
@@ -151,6 +152,25 @@ def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str]:
     return files
 
 
+def _named_numbers(node: Node, reading: Reading) -> dict[str, float | None] | None:
+    mapping = reading.mapping(node, "method_parameters", "{finger_clearance: 0.01}")
+    if mapping is None:
+        return None
+    return {name: reading.number(value, name, -1e9, 1e9) for name, value in mapping.entries.items()}
+
+
+def _grasp_settings(node: Node_Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
+    """Looks the models up, and checks that the target is one of the objects; it is the first one by default."""
+    objects = launch_settings.placed_objects(values["objects"], launch_settings.DEFAULT_LAUNCH, {}, reading)
+    names = [found.name for found in objects]
+    if not values["objects"]:
+        reading.faults.add(node.entries["objects"].location, "objects is empty; name at least the one to grasp")
+    if values["target"] and values["target"] not in names:
+        reading.faults.add_unknown(node.entries["target"].location, "the target", values["target"], names)
+    with_files = [replace(found, model=str(found.file)) for found in objects]
+    return values | {"objects": with_files, "target": values["target"] or (names[0] if names else "")}
+
+
 def _as_read(node: Node_Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
     return values
 
@@ -198,10 +218,16 @@ MODES: Mapping[str, Mode] = {
     ),
     "grasps": Mode(
         {
-            **_LAUNCH_KEYS,
-            "success": SettingKey(_success({"lifted": 10.0, "hold_time": 3600.0, "shake": 100.0}), {}),
+            "robot": SettingKey(_robot, required=True),
+            "group": SettingKey(_text("group"), required=True),
+            "gripper_joint": SettingKey(_text("gripper_joint"), required=True),
+            "method": SettingKey(_text("method"), required=True),
+            "method_parameters": SettingKey(_named_numbers, {}),
+            "objects": SettingKey(read_objects, required=True),
+            "target": SettingKey(_text("target"), ""),
+            "max_checks": SettingKey(_count("max_checks", 1, 100_000), 40),
         },
-        launch_settings.finish,
+        _grasp_settings,
     ),
 }
 

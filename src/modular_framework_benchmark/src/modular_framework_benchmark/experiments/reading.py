@@ -11,21 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.experiments.surroundings import Surroundings
-from modular_framework_core.files.faults import Fault, FaultList, TaskFault
+from modular_framework_core.files.faults import FaultList, FileFaults, TaskFault
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 MAX_SEED = 2**31 - 1
 
 
-class ExperimentFault(Exception):
-    """An experiment file cannot be used. Carries every fault that was found in it."""
+class ExperimentFault(FileFaults):
+    """An experiment file cannot be used."""
 
-    def __init__(self, faults: Collection[Fault]) -> None:
-        self.faults: tuple[Fault, ...] = tuple(sorted(set(faults)))
-        lines = "\n".join(f"  {fault}" for fault in self.faults)
-        count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
-        super().__init__(f"{count} in the experiment:\n{lines}")
+    kind = "experiment"
 
     @classmethod
     def of(cls, error: TaskFault) -> ExperimentFault:

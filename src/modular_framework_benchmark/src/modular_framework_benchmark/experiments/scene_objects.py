@@ -10,7 +10,6 @@ from typing import Any
 from modular_framework_benchmark.experiments.distributions import (
     Distribution,
     Fixed,
-    draw,
     generator_of,
     read_distribution,
 )
@@ -52,11 +51,10 @@ class SceneObject:
             index: Place of the object in the list.
         """
         numbers = {
-            name: draw(self.pose.get(name, Fixed(0.0)), generator_of(*key, "objects", index, name))
-            for name in POSE_KEYS
+            name: self.pose.get(name, Fixed(0.0)).draw(generator_of(*key, "objects", index, name)) for name in POSE_KEYS
         }
         if self.surface is not None:
-            surface = draw(self.surface, generator_of(*key, "objects", index, "on"))
+            surface = self.surface.draw(generator_of(*key, "objects", index, "on"))
             numbers["z"] = resting_height(self.file, surface, numbers["roll"], numbers["pitch"])
         return {"name": self.name, "model": self.model, **numbers}
 

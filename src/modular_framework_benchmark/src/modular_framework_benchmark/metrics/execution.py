@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -37,9 +38,7 @@ def execution_success(episode: EpisodeMeasurements) -> float | None:
 
 def _tracking_errors(episode: EpisodeMeasurements) -> Array:
     executions = _executions(episode)
-    errors = [
-        (samples.actual - samples.desired)[_within(samples.times_s, executions)].ravel() for samples in episode.tracking
-    ]
+    errors = [samples.errors[_within(samples.times_s, executions)].ravel() for samples in episode.tracking]
     return np.concatenate(errors) if errors else np.empty(0)
 
 
@@ -74,9 +73,9 @@ def executed_length(episode: EpisodeMeasurements) -> float | None:
 
 
 def executed_smoothness(episode: EpisodeMeasurements) -> float | None:
-    """Mean log dimensionless jerk of the executed motions, measured, see `motion_figures.smoothness`."""
+    """Mean log dimensionless jerk of the executed motions, as measured; nearer to 0 is smoother."""
     values = [value for value in _over_motions(episode, motion_figures.smoothness) if value is not None]
-    return sum(values) / len(values) if values else None
+    return math.fsum(values) / len(values) if values else None  # whatever their sequence
 
 
 def greatest_effort(episode: EpisodeMeasurements) -> float | None:

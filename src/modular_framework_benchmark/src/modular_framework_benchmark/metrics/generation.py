@@ -30,6 +30,12 @@ def candidates(episode: EpisodeMeasurements) -> float | None:
     return None if first is None else first.figures.get("candidates")
 
 
+def best_rank(episode: EpisodeMeasurements) -> float | None:
+    """Place of the first grasp that the arm can reach in the method's own order, 1 for the first; None without one."""
+    first = _first(episode)
+    return None if first is None else first.figures.get("best_rank")
+
+
 def reachable_share(episode: EpisodeMeasurements) -> float | None:
     """Share of the grasps checked in the first generation that the arm can reach without collision, 0 to 1."""
     first = _first(episode)

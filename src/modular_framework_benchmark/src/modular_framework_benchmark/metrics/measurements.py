@@ -20,21 +20,6 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
-    """A trajectory.
-
-    Attributes:
-        joints: Names of the joints.
-        times_s: Times of the points since its start, shape (n,) [s].
-        positions: Shape (n, joints) [rad or m].
-    """
-
-    joints: tuple[str, ...]
-    times_s: Array
-    positions: Array
-
-
-@dataclass(frozen=True, slots=True)
 class ComponentReport:
     """What a component reports of one piece of work.
 
@@ -62,21 +47,30 @@ class ComponentReport:
 
 
 @dataclass(frozen=True, slots=True)
-class JointSamples:
-    """Measured joints.
+class Motion:
+    """A trajectory.
 
     Attributes:
         joints: Names of the joints.
-        times_s: Shape (n,) [s].
+        times_s: Times of the points since its start, shape (n,) [s].
         positions: Shape (n, joints) [rad or m].
-        velocities: [rad/s or m/s]; NaN where not measured.
-        efforts: [Nm or N]; NaN where not measured.
-        commands: Commanded positions; NaN before the first command.
     """
 
     joints: tuple[str, ...]
     times_s: Array
     positions: Array
+
+
+@dataclass(frozen=True, slots=True)
+class JointSamples(Motion):
+    """Measured joints; their times count from when the recording began.
+
+    Attributes:
+        velocities: [rad/s or m/s]; NaN where not measured.
+        efforts: [Nm or N]; NaN where not measured.
+        commands: Commanded positions; NaN before the first command.
+    """
+
     velocities: Array
     efforts: Array
     commands: Array
@@ -100,6 +94,11 @@ class TrackingSamples:
     desired: Array
     actual: Array
 
+    @property
+    def errors(self) -> Array:
+        """Actual minus desired, shape (n, joints) [rad or m]."""
+        return self.actual - self.desired
+
 
 @dataclass(frozen=True, slots=True)
 class ObjectTrack:
@@ -120,15 +119,15 @@ class ObjectTrack:
 
 @dataclass(frozen=True, slots=True)
 class Shake:
-    """What became of the object while it was shaken.
+    """When the object was shaken after the task.
 
     Attributes:
+        started_s: When that began [s].
         duration_s: How long it was shaken [s].
-        held_s: How long it stayed in the gripper [s], at most `duration_s`.
     """
 
+    started_s: float
     duration_s: float
-    held_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +140,7 @@ class EpisodeMeasurements:
         outcome: Outcome of the task; "" without one.
         cause: Why it did not succeed.
         states: What the states did, by wall time since the episode began.
+        task_started_s: When the task was started [s].
         task_s: Simulated time from the start of the task to its end [s]; None if it did not end.
         task_wall_s: The same in real time [s].
         reports: What the components reported, in the order they ended.
@@ -149,9 +149,8 @@ class EpisodeMeasurements:
         objects: Tracks of the objects, by name.
         hand: Track of the link that the gripper is fixed to; None if it is not known.
         target: Name of the object that success is about; "" without one.
-        grasped_at_s: When the gripper held the target first; None if never.
-        held: Whether the target was in the gripper at the end.
-        shake: Result of the shake; None where it was not asked for.
+        held: Whether the target was in the gripper when success was checked.
+        shake: When it was shaken; None where that was not asked for.
         folder: Folder with the files of the episode.
     """
 
@@ -160,6 +159,7 @@ class EpisodeMeasurements:
     outcome: str = ""
     cause: str = ""
     states: tuple[Span, ...] = ()
+    task_started_s: float = 0.0
     task_s: float | None = None
     task_wall_s: float | None = None
     reports: tuple[ComponentReport, ...] = ()
@@ -168,7 +168,6 @@ class EpisodeMeasurements:
     objects: Mapping[str, ObjectTrack] = field(default_factory=dict)
     hand: ObjectTrack | None = None
     target: str = ""
-    grasped_at_s: float | None = None
     held: bool = False
     shake: Shake | None = None
     folder: Path | None = None

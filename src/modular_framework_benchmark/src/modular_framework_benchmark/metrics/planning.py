@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 from modular_framework_benchmark.metrics import motion_figures
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, Motion
 
@@ -12,7 +14,7 @@ def _motions(episode: EpisodeMeasurements) -> list[Motion]:
 
 
 def _mean(values: list[float]) -> float | None:
-    return sum(values) / len(values) if values else None
+    return math.fsum(values) / len(values) if values else None  # whatever their sequence
 
 
 def planning_time(episode: EpisodeMeasurements) -> float | None:
@@ -39,7 +41,7 @@ def planning_success(episode: EpisodeMeasurements) -> float | None:
 
 
 def path_length(episode: EpisodeMeasurements) -> float | None:
-    """Mean length of the planned paths through joint space [rad], see `motion_figures.path_length`."""
+    """Mean length of the planned paths through joint space [rad]."""
     return _mean([motion_figures.path_length(motion.positions) for motion in _motions(episode)])
 
 
@@ -49,7 +51,7 @@ def motion_duration(episode: EpisodeMeasurements) -> float | None:
 
 
 def smoothness(episode: EpisodeMeasurements) -> float | None:
-    """Mean log dimensionless jerk of the planned motions, see `motion_figures.smoothness`."""
+    """Mean log dimensionless jerk of the planned motions; nearer to 0 is smoother."""
     values = [motion_figures.smoothness(motion.times_s, motion.positions) for motion in _motions(episode)]
     return _mean([value for value in values if value is not None])
 
@@ -63,6 +65,6 @@ def clearance(episode: EpisodeMeasurements) -> float | None:
 
 
 def attempts(episode: EpisodeMeasurements) -> float | None:
-    """How many plans were asked for, successful or not; None without any."""
+    """How many plans were asked for, successful or not."""
     reports = episode.of_component("planning")
     return float(len(reports)) if reports else None

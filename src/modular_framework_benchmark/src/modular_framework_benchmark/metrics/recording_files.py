@@ -82,13 +82,6 @@ def objects_of(recording: Mapping[str, Any]) -> dict[str, ObjectTrack]:
     }
 
 
-def grasped_at(recording: Mapping[str, Any]) -> float | None:
-    """Returns when the target was held first [s]; None if never."""
-    target = recording.get("target", "")
-    times = [time_s for time_s, names in recording.get("grasped", ()) if target and target in names.split(",")]
-    return float(times[0]) if times else None
-
-
 def read_joints(folder: Path) -> JointSamples | None:
     """Returns the measured joints; None if none were recorded."""
     path = folder / TRAJECTORY

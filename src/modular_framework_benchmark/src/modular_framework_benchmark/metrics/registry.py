@@ -55,6 +55,7 @@ _ALL = (
     _registered(generation.generation_success, "generation", _RATE, _HIGHER),
     _registered(generation.candidates, "generation", _VALUE, _HIGHER),
     _registered(generation.reachable_share, "generation", _VALUE, _HIGHER),
+    _registered(generation.best_rank, "generation", _VALUE, _LOWER),
     _registered(planning.planning_time, "planning", _TIME, _LOWER, "s"),
     _registered(planning.search_time, "planning", _TIME, _LOWER, "s"),
     _registered(planning.planning_success, "planning", _VALUE, _HIGHER),

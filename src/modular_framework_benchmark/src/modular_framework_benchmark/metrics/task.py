@@ -28,6 +28,6 @@ def task_wall_time(episode: EpisodeMeasurements) -> float | None:
 
 
 def failed_states(episode: EpisodeMeasurements) -> float | None:
-    """How many executions of states failed, also those the task recovered from; None without a task."""
+    """How many executions of states failed, also those the task recovered from."""
     states = [span for span in episode.states if span.kind == "state"]
     return float(sum(span.failed for span in states)) if states else None

@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from modular_framework_benchmark.episodes.snapshot import machine, versions
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
 from modular_framework_benchmark.metrics.registry import MetricError, measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
@@ -65,6 +66,10 @@ def measured_record(
         simulated_s=None,
         metrics=measured.values,
         spans=(span,),
-        snapshot={"metric_faults": dict(measured.faults)} if measured.faults else {},
+        snapshot={
+            **versions(),
+            "machine": machine(),
+            **({"metric_faults": dict(measured.faults)} if measured.faults else {}),
+        },
         folder=str(folder),
     )

@@ -21,12 +21,14 @@ class Robot:
         kinematics: Settings of inverse kinematics, by group.
         planning: `robot_description_planning`: limits and default scaling factors.
         pipelines: Parameters of each planning pipeline, by its name.
+        urdf: Its description, as text.
     """
 
     model: RobotModel
     kinematics: Mapping[str, KinematicsSettings] = field(default_factory=dict)
     planning: Mapping[str, Any] = field(default_factory=dict)
     pipelines: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    urdf: str = ""
 
     def solvers(self) -> KinematicsPool:
         """Returns the inverse kinematics of its groups."""

@@ -19,12 +19,11 @@ import pinocchio as pin
 
 from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.errors import ModeError
-from modular_framework_benchmark.modes.measured_record import Stopwatch, broken_record, measured_record
+from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.modes.parameters import parameters_below
 from modular_framework_benchmark.modes.robots import Robot
-from modular_framework_benchmark.modes.ros_robots import load_robot
+from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings, settings_from
@@ -48,28 +47,19 @@ class _PoseResult:
         return self.position_error_m < POSITION_TOLERANCE_M and self.rotation_error_rad < ROTATION_TOLERANCE_RAD
 
 
-class KinematicsEpisodeRunner:
-    """Runs episodes of the mode `kinematics`; belongs to one process."""
+class KinematicsEpisodeRunner(ModelEpisodeRunner):
+    """Runs episodes of the mode `kinematics`."""
 
     def __init__(self) -> None:
-        """Starts nothing: robots are loaded for the first episode that needs them."""
-        self._robots: dict[str, Robot] = {}
+        """Starts nothing."""
+        super().__init__()
         self._solvers: dict[str, InverseKinematics] = {}
 
-    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
-        """Solves the poses of one trial.
-
-        Args:
-            spec: What to run; the experiment file of its mode has the settings.
-            folder: Folder of the episode; nothing is written there, the figures are all there is.
-        """
-        watch = Stopwatch()
-        try:
-            robot, solver = self._prepare(spec.settings)
-            started_s = watch.elapsed_s()
-            results = _solve_poses(robot, solver, spec)
-        except (ModeError, ModelError, PlanningError) as error:
-            return broken_record(spec, str(error), watch)
+    def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
+        """Solves the poses of one trial; nothing is written, the figures are all there is."""
+        robot, solver = self._prepare(spec.settings)
+        started_s = watch.elapsed_s()
+        results = _solve_poses(robot, solver, spec)
         unsolved, ended_s = [number for number, result in enumerate(results) if not result.is_solved], watch.elapsed_s()
         report = ComponentReport(
             component="kinematics",
@@ -86,14 +76,8 @@ class KinematicsEpisodeRunner:
         status = EpisodeStatus.FAILED if unsolved else EpisodeStatus.SUCCEEDED
         return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)
 
-    def close(self) -> None:
-        """Ends nothing: there are no processes."""
-
     def _prepare(self, settings: Mapping[str, Any]) -> tuple[Robot, InverseKinematics]:
-        robot_key = json.dumps(settings["robot"], sort_keys=True)
-        if robot_key not in self._robots:
-            self._robots[robot_key] = load_robot(settings["robot"])
-        robot = self._robots[robot_key]
+        robot = self.robot(settings["robot"])
         keys = ("robot", "group", "solver", "timeout", "parameters")
         key = json.dumps([settings.get(name) for name in keys], sort_keys=True)
         if key not in self._solvers:

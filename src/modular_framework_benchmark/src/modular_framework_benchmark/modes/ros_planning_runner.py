@@ -18,10 +18,10 @@ import pyarrow.parquet as pq
 
 from modular_framework_benchmark.metrics.measurements import ComponentReport, Motion
 from modular_framework_benchmark.modes.errors import ModeError
-from modular_framework_benchmark.modes.measured_record import Stopwatch, broken_record, measured_record
+from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.modes.parameters import merged, parameters_below
 from modular_framework_benchmark.modes.robots import Robot
-from modular_framework_benchmark.modes.ros_robots import load_robot
+from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
@@ -54,27 +54,18 @@ class _Prepared:
     seeded: SeededPlanning
 
 
-class PlanningEpisodeRunner:
-    """Runs episodes of the mode `planning`; belongs to one process."""
+class PlanningEpisodeRunner(ModelEpisodeRunner):
+    """Runs episodes of the mode `planning`."""
 
     def __init__(self) -> None:
-        """Starts nothing: robots and processes are made for the first episode that needs them."""
-        self._robots: dict[str, Robot] = {}
+        """Starts nothing: processes are made for the first episode that needs them."""
+        super().__init__()
         self._prepared: dict[str, _Prepared] = {}
 
-    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
-        """Plans one problem.
-
-        Args:
-            spec: What to run; the experiment file of its mode has the settings.
-            folder: Folder for the planned motion, `trajectory.parquet`.
-        """
-        watch = Stopwatch()
-        try:
-            prepared = self._prepare(spec.settings)
-            problem = _read_problem(spec.settings, prepared.model)
-        except (ModeError, PlanningError) as error:
-            return broken_record(spec, str(error), watch)
+    def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
+        """Plans one problem, and writes the motion to `trajectory.parquet` in the folder."""
+        prepared = self._prepare(spec.settings)
+        problem = _read_problem(spec.settings, prepared.model)
         started_s, answer, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
         try:
             answer = prepared.seeded.plan(prepared.pipeline, problem.request, spec.seed)
@@ -101,24 +92,19 @@ class PlanningEpisodeRunner:
         for prepared in self._prepared.values():
             prepared.seeded.close()
         self._prepared.clear()
+        super().close()
 
     def _prepare(self, settings: Mapping[str, Any]) -> _Prepared:
         """Returns the robot and the process that plans; made once for all episodes that need the same."""
         keys = ("robot", "pipeline", "planner", "planner_parameters", "parameters")
         key = json.dumps([settings.get(name) for name in keys], sort_keys=True)
         if key not in self._prepared:
-            robot = self._robot(settings["robot"])
+            robot = self.robot(settings["robot"])
             spec = _pipeline_spec(robot, settings)
             pipeline = spec.build(robot.model, robot.solvers())
             _check_planner(pipeline, str(settings["planner"]))
             self._prepared[key] = _Prepared(robot.model, pipeline, SeededPlanning(robot.model, [spec]))
         return self._prepared[key]
-
-    def _robot(self, robot: str | Mapping[str, Any]) -> Robot:
-        key = json.dumps(robot, sort_keys=True)
-        if key not in self._robots:
-            self._robots[key] = load_robot(robot)
-        return self._robots[key]
 
 
 def _pipeline_spec(robot: Robot, settings: Mapping[str, Any]) -> PipelineSpec:

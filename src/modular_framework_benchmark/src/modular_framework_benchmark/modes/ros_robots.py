@@ -49,7 +49,8 @@ def _from_files(files: Mapping[str, Any]) -> Robot:
     if set(files) != {"urdf", "srdf"}:
         raise ModeError(f"robot: found {', '.join(map(str, files)) or 'nothing'}; give both urdf and srdf, and no more")
     urdf, srdf = Path(str(files["urdf"])), Path(str(files["srdf"]))
-    return Robot(RobotModel(urdf.read_text(), srdf.read_text(), {}, _MeshesBeside(urdf.parent)))
+    text = urdf.read_text()
+    return Robot(RobotModel(text, srdf.read_text(), {}, _MeshesBeside(urdf.parent)), urdf=text)
 
 
 def _from_package(package: str) -> Robot:
@@ -67,6 +68,7 @@ def _from_package(package: str) -> Robot:
         settings_from(configs.robot_description_kinematics.get("robot_description_kinematics", {})),
         {**planning, **configs.pilz_cartesian_limits.get("robot_description_planning", {})},
         _pipelines(configs.planning_pipelines),
+        urdf,
     )
 
 

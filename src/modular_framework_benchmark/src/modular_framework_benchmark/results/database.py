@@ -311,11 +311,11 @@ class ResultDatabase:
         with self._reading() as connection:
             return result_tables.span_totals(connection, number, self._description(connection, number))
 
-    def snapshot_values(self, number: int) -> dict[str, list[tuple[Any, int]]]:
+    def snapshot_values(self, number: int, leave_out: Collection[str] = ()) -> dict[str, list[tuple[Any, int]]]:
         """Returns the different values of each part of the snapshots, with the number of episodes that had each."""
         with self._reading() as connection:
             self._description(connection, number)
-            return result_tables.snapshot_values(connection, number)
+            return result_tables.snapshot_values(connection, number, leave_out)
 
     def _description(self, connection: Connection, number: int) -> ExperimentDescription:
         if number not in self._descriptions:

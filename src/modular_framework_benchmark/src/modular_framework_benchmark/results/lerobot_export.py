@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from modular_framework_benchmark.metrics.recording_files import read_descriptions
 from modular_framework_benchmark.records.episode import EpisodeRecord
 from modular_framework_benchmark.results.database import ResultDatabase
 from modular_framework_benchmark.results.errors import ExportError
 from modular_framework_benchmark.results.lerobot_dataset import LeRobotWriter
 from modular_framework_benchmark.results.lerobot_frames import TRAJECTORY_FILE, read_frames
 from modular_framework_benchmark.results.lerobot_videos import find_videos
+from modular_framework_urdf import xml_text
 
 DEFAULT_RATE = 30
 
@@ -68,7 +70,7 @@ def export_lerobot(
             record = database.record(number, int(episode))
             if not chosen(record):
                 continue
-            writer = writer or LeRobotWriter(folder, frames_per_second, str(record.snapshot.get("robot", "unknown")))
+            writer = writer or LeRobotWriter(folder, frames_per_second, robot_of(database, record))
             try:
                 _add(writer, database, record, frames_per_second)
             except ExportError as error:
@@ -90,6 +92,12 @@ def _add(writer: LeRobotWriter, database: ResultDatabase, record: EpisodeRecord,
     folder = database.folder / record.folder
     frames = read_frames(folder / TRAJECTORY_FILE, frames_per_second)
     writer.add(frames, find_videos(folder), task_of(record), succeeded=record.succeeded)
+
+
+def robot_of(database: ResultDatabase, record: EpisodeRecord) -> str:
+    """Returns the name of the robot of an episode: that of its recorded description, else `unknown`."""
+    urdf, _ = read_descriptions(database.folder / record.folder)
+    return (urdf and xml_text.parse(urdf, "the recorded robot description").get("name")) or "unknown"
 
 
 def task_of(record: EpisodeRecord) -> str:

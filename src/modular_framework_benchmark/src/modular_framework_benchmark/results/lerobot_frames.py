@@ -89,7 +89,7 @@ def read_frames(path: Path, frames_per_second: int) -> EpisodeFrames:
     if missing:
         raise ExportError(
             f"{path}: has no values for {', '.join(sorted(missing))}; allowed: columns <joint>/position and "
-            "<joint>/command with numbers; record the episode again"
+            "<joint>/command with numbers, as episodes of the mode task record them"
         )
     arrays = {name: np.stack(parts, axis=1).astype(np.float32) for name, parts in values.items()}
     return EpisodeFrames(float(times[0]), arrays, {name: tuple(parts) for name, parts in names.items()})

@@ -8,11 +8,10 @@ import json
 import platform
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, column, func, insert, select, table, update
+from sqlalchemy import Connection, RowMapping, column, func, insert, select, table, update
 
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.records.experiment import ExperimentDescription
@@ -29,14 +28,6 @@ from modular_framework_benchmark.results.schema import DESCRIPTIONS, EPISODES, E
 
 UNKNOWN_VERSION = "0.0.0"
 """What Planner Arena is shown until the first episode says its version."""
-
-
-@dataclass(frozen=True, slots=True)
-class _StoredEpisode:
-    number: int
-    trial: int
-    seed: int
-    settings: str
 
 
 def store_experiment(
@@ -108,14 +99,12 @@ def _new_episodes(
     return added
 
 
-def _stored_episodes(connection: Connection, number: int) -> dict[str, _StoredEpisode]:
+def _stored_episodes(connection: Connection, number: int) -> dict[str, RowMapping]:
     columns = EPISODES.c
     rows = connection.execute(
-        select(columns.key, columns.number, columns.trial, columns.seed, columns.settings).where(
-            columns.descriptionid == number
-        )
+        select(columns.key, columns.seed, columns.settings).where(columns.descriptionid == number)
     )
-    return {key: _StoredEpisode(*rest) for key, *rest in rows}
+    return {row["key"]: row for row in rows.mappings()}
 
 
 def _difference(old: ExperimentDescription, new: ExperimentDescription) -> str:
@@ -126,15 +115,15 @@ def _difference(old: ExperimentDescription, new: ExperimentDescription) -> str:
     return "" if was == now else f"its factors were {', '.join(sorted(was))} and are now {', '.join(sorted(now))}"
 
 
-def _first_difference(stored: Mapping[str, _StoredEpisode], specs: Mapping[str, EpisodeSpec]) -> str:
+def _first_difference(stored: Mapping[str, RowMapping], specs: Mapping[str, EpisodeSpec]) -> str:
     for key, episode in stored.items():
         spec = specs.get(key)
         if spec is None:
             return f"episode {key!r} is in the database and no longer in the experiment"
-        if spec.seed != episode.seed:
-            return f"the seed of episode {key!r} was {episode.seed} and is now {spec.seed}"
-        if to_json(spec.settings) != episode.settings:
-            was, now = json.loads(episode.settings), json.loads(to_json(spec.settings))
+        if spec.seed != episode["seed"]:
+            return f"the seed of episode {key!r} was {episode['seed']} and is now {spec.seed}"
+        if to_json(spec.settings) != episode["settings"]:
+            was, now = json.loads(episode["settings"]), json.loads(to_json(spec.settings))
             names = sorted(name for name in was | now if was.get(name) != now.get(name))
             name = names[0]
             return f"{name!r} of episode {key!r} was {was.get(name)!r} and is now {now.get(name)!r}"

@@ -109,8 +109,15 @@ def span_totals(connection: Connection, number: int, description: ExperimentDesc
     return sums.groupby(names, as_index=False, sort=True)[["count", "ended", "failed", "total_s"]].sum()
 
 
-def snapshot_values(connection: Connection, number: int) -> dict[str, list[tuple[Any, int]]]:
+def snapshot_values(
+    connection: Connection, number: int, leave_out: Collection[str] = ()
+) -> dict[str, list[tuple[Any, int]]]:
     """Reads what the episodes ran with.
+
+    Args:
+        connection: The database.
+        number: Identifier of the experiment.
+        leave_out: Names of the snapshots that are not read.
 
     Returns:
         For each name of the snapshots, its different values, each with the number of episodes that had it, the most
@@ -127,7 +134,10 @@ def snapshot_values(connection: Connection, number: int) -> dict[str, list[tuple
         for value in json.loads(text).values():
             counts[value] = counts.get(value, 0) + count
     found: dict[str, list[tuple[Any, int]]] = {}
-    for value in connection.execute(select(SNAPSHOT_VALUES).order_by(SNAPSHOT_VALUES.c.id)):
+    columns = SNAPSHOT_VALUES.c
+    for value in connection.execute(
+        select(columns.id, columns.name, columns.value).where(columns.name.not_in(leave_out)).order_by(columns.id)
+    ):
         if value.id in counts:
             found.setdefault(value.name, []).append((json.loads(value.value), counts[value.id]))
     return {name: sorted(values, key=lambda each: -each[1]) for name, values in sorted(found.items())}

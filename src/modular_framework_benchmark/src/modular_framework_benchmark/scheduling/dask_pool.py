@@ -24,6 +24,7 @@ from modular_framework_benchmark.scheduling.worker_process import WorkerStartErr
 
 POLL_S = 0.25
 """Time between two looks of a task whether it is still wanted [s]."""
+CONNECT_TIMEOUT_S = 20.0
 NO_WORKER_TIMEOUT_S = 120.0
 
 
@@ -40,7 +41,7 @@ class DaskPool:
     def __init__(self, address: str, make_runner: RunnerFactory, run: str, logs: Path) -> None:
         self._make_runner, self._run, self._logs = make_runner, run, logs
         try:
-            self._client: Any = distributed.Client(address, timeout=20)  # type: ignore[no-untyped-call]
+            self._client: Any = distributed.Client(address, timeout=CONNECT_TIMEOUT_S)  # type: ignore[no-untyped-call]
             self._client.wait_for_workers(1, timeout=NO_WORKER_TIMEOUT_S)
         except (OSError, ValueError, TimeoutError) as error:
             raise SchedulerError(

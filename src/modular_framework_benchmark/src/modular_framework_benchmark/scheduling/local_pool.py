@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Callable
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Protocol
@@ -56,6 +57,7 @@ class LocalPool:
     def __init__(self, make_runner: RunnerFactory, workers: int, run: str, logs: Path, prefix: str = "worker_") -> None:
         self._make_runner, self._run, self._logs = make_runner, run, logs
         self._workers: dict[str, WorkerProcess | None] = {f"{prefix}{number + 1}": None for number in range(workers)}
+        self._ready: set[str] = set()
 
     def free(self) -> list[str]:
         """Returns the names of the idle workers."""
@@ -70,12 +72,23 @@ class LocalPool:
         self._begin(slot, spec, folder, tries=1)
 
     def _begin(self, slot: str, spec: EpisodeSpec, folder: Path, tries: int) -> None:
+        if slot not in self._ready:
+            self._start(slot)
         worker = self._workers[slot]
-        if worker is None:
-            worker = WorkerProcess(slot, self._make_runner, self._run, self._logs / f"{slot}.log")
-            worker.start()
-            self._workers[slot] = worker
+        assert worker is not None
         worker.begin(spec, folder, tries)
+
+    def _start(self, slot: str) -> None:
+        """Waits until a worker is ready; all of them are launched at once, so that they import together."""
+        for name, worker in self._workers.items():
+            if worker is None:
+                launched = WorkerProcess(name, self._make_runner, self._run, self._logs / f"{name}.log")
+                launched.launch()
+                self._workers[name] = launched
+        worker = self._workers[slot]
+        assert worker is not None
+        worker.wait_until_ready()
+        self._ready.add(slot)
 
     def wait(self, timeout_s: float) -> list[EpisodeRecord]:
         """Returns the records of episodes that have ended. An episode whose worker died runs again, once.
@@ -120,17 +133,19 @@ class LocalPool:
     def _end(self, worker: WorkerProcess) -> None:
         worker.kill()
         self._workers[worker.name] = None
+        self._ready.discard(worker.name)
 
     def close(self) -> None:
         """Ends the workers; those that are idle end what they keep running by themselves."""
-        for name, worker in self._workers.items():
-            if worker is not None:
-                worker.close()
-            self._workers[name] = None
+        self._end_all(WorkerProcess.close)
 
     def kill(self) -> None:
         """Ends the workers and what they run."""
+        self._end_all(WorkerProcess.kill)
+
+    def _end_all(self, end: Callable[[WorkerProcess], None]) -> None:
         for name, worker in self._workers.items():
             if worker is not None:
-                worker.kill()
+                end(worker)
             self._workers[name] = None
+        self._ready.clear()

@@ -29,7 +29,8 @@ def main(arguments: list[str]) -> int:
     connection = Connection(int(arguments[0]))
     threading.Thread(target=_end_with_parent, args=(int(arguments[1]),), daemon=True).start()
     try:
-        sys.path[:] = connection.recv()
+        # behind its own: catkin packages put their sources in front, where their generated messages are missing
+        sys.path += [path for path in connection.recv() if path not in sys.path]
         make_runner: RunnerFactory = connection.recv()
         runner = make_runner()
     except EOFError:

@@ -66,12 +66,8 @@ class WorkerProcess:
         self._connection: Connection | None = None
         self._lifeline = -1
 
-    def start(self) -> None:
-        """Starts the process, and waits until it can run episodes.
-
-        Raises:
-            WorkerStartError: It cannot.
-        """
+    def launch(self) -> None:
+        """Starts the process; `wait_until_ready` has to be called before it can run episodes."""
         ours, theirs = socket.socketpair()
         watched, self._lifeline = os.pipe()
         self._log_file.parent.mkdir(parents=True, exist_ok=True)
@@ -88,14 +84,18 @@ class WorkerProcess:
         theirs.close()
         os.close(watched)
         self._connection = Connection(ours.detach())
-        self._wait_until_ready()
-
-    def _wait_until_ready(self) -> None:
-        assert self._connection is not None
-        try:
+        with contextlib.suppress(OSError):
             self._connection.send(sys.path)
             self._connection.send(self._make_runner)
-            problem = self._connection.recv() if self._connection.poll(START_TIMEOUT_S) else "it does not answer"
+
+    def wait_until_ready(self) -> None:
+        """Waits until it can run episodes.
+
+        Raises:
+            WorkerStartError: It cannot.
+        """
+        try:
+            problem = self.connection.recv() if self.connection.poll(START_TIMEOUT_S) else "it does not answer"
         except (EOFError, OSError):
             problem = f"it ended: {self._last_words()}"
         if problem is not None:

@@ -76,6 +76,11 @@ class EpisodeCounts:
     censored: int
     missing: int
 
+    @property
+    def unmeasured_share(self) -> float | None:
+        """Share of the episodes without a value within the limit, from 0 to 1; None without episodes."""
+        return (self.missing + self.censored) / self.episodes if self.episodes else None
+
 
 @dataclass(frozen=True, slots=True)
 class MethodSummary:
@@ -145,27 +150,53 @@ class PairCounts:
     broken: int
     missing: int
 
+    @property
+    def pairs_per_unit(self) -> float:
+        """Mean number of pairs that share a seed; 0 without pairs."""
+        return self.pairs / self.units if self.units else 0.0
+
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
-    """A pair of methods by a metric.
+class PairFigures:
+    """The figures of a pair of methods by a metric.
 
     Attributes:
         first: One level of the compared factor.
         second: The other level.
-        metric: Name of the metric.
-        unit: Its unit; "" for none and for rates.
-        levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
         counts: What was compared.
+        levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
         first_estimate: Figure of the first method over what was compared; None without data.
         second_estimate: That of the second.
-        difference: First minus second with its interval, in the metric's unit (0.12 for 12 points of a rate).
+        difference: First minus second with its interval, in the metric's unit (0.12 for 12 points of a rate); None
+            without data.
         p_value: P value of the test; None without data.
-        p_corrected: The same after the correction for many comparisons.
-        correction: The correction, in words: `Holm, 6 comparisons`.
         test: Name of the test.
         effect: Size of the effect.
         improvement: Probability that the first is better in a pair, ties counting half.
+    """
+
+    first: str
+    second: str
+    counts: PairCounts
+    levels: str = ""
+    first_estimate: float | None = None
+    second_estimate: float | None = None
+    difference: Estimate | None = None
+    p_value: float | None = None
+    test: str = ""
+    effect: Effect | None = None
+    improvement: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison(PairFigures):
+    """A pair of methods by a metric, with what it shows.
+
+    Attributes:
+        metric: Name of the metric.
+        unit: Its unit; "" for none and for rates.
+        p_corrected: The p value after the correction for many comparisons; None without data.
+        correction: The correction, in words: `Holm, 6 comparisons`.
         verdict: What is shown: a difference only where the corrected p value and the interval both say so.
         verdict_without_broken: The same with the pairs of broken episodes left out; None where there are none.
         pairs_needed: How many pairs in all would show `difference_planned` with 80 % power; None if already there or
@@ -175,21 +206,10 @@ class Comparison:
         notes: What a reader must know beside it: censored, missing, broken, unfinished.
     """
 
-    first: str
-    second: str
     metric: str
     unit: str
-    levels: str
-    counts: PairCounts
-    first_estimate: float | None
-    second_estimate: float | None
-    difference: Estimate | None
-    p_value: float | None
     p_corrected: float | None
     correction: str
-    test: str
-    effect: Effect | None
-    improvement: float | None
     verdict: Verdict
     verdict_without_broken: Verdict | None
     pairs_needed: int | None

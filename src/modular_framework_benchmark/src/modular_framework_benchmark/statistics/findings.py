@@ -11,48 +11,26 @@ from statsmodels.stats.proportion import proportion_effectsize
 
 from modular_framework_benchmark.records.experiment import Metric, MetricKind
 from modular_framework_benchmark.statistics import rates, sequential, values
-from modular_framework_benchmark.statistics.comparison import Effect, Estimate, Interval, PairCounts
+from modular_framework_benchmark.statistics.comparison import Effect, Estimate, Interval, PairCounts, PairFigures
 from modular_framework_benchmark.statistics.observations import EpisodeTable, Observations, Pairs
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding(PairFigures):
     """A comparison before the correction for many.
 
     Attributes:
         metric: What is compared.
-        first: One method.
-        second: The other.
-        counts: What was compared.
-        first_estimate: Figure of the first over what was compared; None without data.
-        second_estimate: That of the second.
-        difference: First minus second with its interval; None without data.
-        p_value: Of the test; None without data.
-        test: Its name.
-        effect: Size of the effect.
-        improvement: Probability that the first is better.
         spread: What the number of pairs for a difference depends on: share of pairs that differ (rates with a seed for
             each pair), else standard deviation of the differences of units. None where unpaired.
         without_broken: The same without the pairs of broken episodes; None where there are none.
-        levels: Levels of other factors it is restricted to.
     """
 
     metric: Metric
-    first: str
-    second: str
-    counts: PairCounts
-    first_estimate: float | None = None
-    second_estimate: float | None = None
-    difference: Estimate | None = None
-    p_value: float | None = None
-    test: str = ""
-    effect: Effect | None = None
-    improvement: float | None = None
     spread: float | None = None
     without_broken: Finding | None = None
-    levels: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +84,7 @@ def _paired(metric: Metric, first: str, second: str, matched: Pairs, settings: S
         pairs=count, units=len(differences), first_episodes=count, second_episodes=count,
         unmatched=matched.unmatched, censored=matched.censored, broken=matched.broken_episodes, missing=matched.missing,
     )  # fmt: skip
-    finding = Finding(metric, first, second, counts)
+    finding = Finding(first, second, counts, metric=metric)
     if not count:
         return finding
     p_value, test, interval = _test(metric, matched, differences, settings)
@@ -126,32 +104,34 @@ def _paired(metric: Metric, first: str, second: str, matched: Pairs, settings: S
     return replace(finding, without_broken=_paired(metric, first, second, matched.without_broken(), settings))
 
 
-def _test(metric: Metric, matched: Pairs, differences: Floats, settings: Settings) -> tuple[float, str, Interval]:
+def _test(
+    metric: Metric, matched: Pairs, differences: Floats, settings: Settings
+) -> tuple[float, str, Interval | None]:
     """Returns the p value, the test's name and the interval of a paired difference."""
     rate, alone = metric.kind is MetricKind.RATE, len(differences) == len(matched.first)
     if settings.sequential:
         return _test_at_any_time(metric, matched, differences, settings)
     if rate and alone:
         outcomes = rates.Discordance.of(matched.first, matched.second)
-        interval = rates.paired_interval(outcomes, settings.confidence)
-        return rates.paired_p_value(outcomes), "McNemar's exact test", interval
+        found = rates.paired_interval(outcomes, settings.confidence)
+        return rates.paired_p_value(outcomes), "McNemar's exact test", found
     interval = values.mean_interval(differences, matched.unit_strata(), settings.confidence, settings.generator)
     if rate:
-        interval = replace(interval, low=max(interval.low, -1.0), high=min(interval.high, 1.0))
+        interval = interval and replace(interval, low=max(interval.low, -1.0), high=min(interval.high, 1.0))
         return values.sign_flip_p_value(differences, settings.generator), "sign flip test of seeds", interval
     return values.paired_p_value(differences), "Wilcoxon signed rank test", interval
 
 
 def _test_at_any_time(
     metric: Metric, matched: Pairs, differences: Floats, settings: Settings
-) -> tuple[float, str, Interval]:
+) -> tuple[float, str, Interval | None]:
     if metric.kind is MetricKind.RATE:
         p_value = sequential.anytime_p_value(differences)
         return p_value, "betting test, valid at any time", sequential.anytime_interval(differences, settings.confidence)
     p_value = sequential.anytime_p_value(np.sign(differences))
     test = "betting sign test, valid at any time"
     if len(differences) < 2:
-        return p_value, test, Interval(-np.inf, np.inf, settings.confidence, "none: a single value")
+        return p_value, test, None
     return p_value, test, sequential.asymptotic_interval(differences, settings.confidence)
 
 
@@ -164,9 +144,10 @@ def _unpaired(
         censored=int(sum(each.censored.sum() for each in seen)), broken=int(sum(each.broken.sum() for each in seen)),
         missing=0,
     )  # fmt: skip
-    finding = Finding(metric, first, second, counts)
+    finding = Finding(first, second, counts, metric=metric)
     if not len(kept[0]) or not len(kept[1]):
         return finding
+    interval: Interval | None
     if metric.kind is MetricKind.RATE:
         one, other = ((int(each.sum()), len(each)) for each in kept)
         p_value, test = rates.unpaired_p_value(one, other), rates.unpaired_test_name(len(kept[0]) + len(kept[1]))

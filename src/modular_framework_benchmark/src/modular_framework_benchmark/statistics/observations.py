@@ -4,9 +4,11 @@
 The one place that decides what an episode counts for that failed, timed out, broke or has no value:
 
 - success: every episode that is not a success is a failure, a broken one too;
-- a metric with a limit: an episode without a value counts at the limit, a value beyond the limit does too, and so does
-  every episode without success if the metric is one of the whole task (outside the mode `task`: whatever the metric);
-- any other metric: an episode without a value is missing. It is left out of the figures, and counted.
+- a metric with a limit: an episode without success and without a value counts at the limit, a value beyond the limit
+  does too, and so does every episode without success if the metric is one of the whole task (outside the mode `task`:
+  whatever the metric);
+- any other metric, one that no episode has a value of, and a success without a value: missing. It is left out of the
+  figures, and counted.
 """
 
 from __future__ import annotations
@@ -267,7 +269,8 @@ def _censored(values: Floats, succeeded: Flags, metric: Metric, mode: str) -> Fl
         return np.zeros(len(values), dtype=bool)
     beyond = values >= metric.limit if metric.better is Direction.LOWER else values <= metric.limit
     whole_episode = metric.component == "task" or mode != "task"
-    return np.isnan(values) | beyond | (~succeeded if whole_episode else False)
+    measured = not np.isnan(values).all()  # else nothing reports it, such as the hold time without a shake
+    return beyond | (~succeeded & (whole_episode | (np.isnan(values) & measured)))
 
 
 def _strata(results: ExperimentResults) -> NDArray[np.int64]:

@@ -81,7 +81,17 @@ def pairs_for_value(difference: float, deviation: float, error_rate: float = 0.0
         error_rate: Two-sided, that of this comparison after the correction for many.
         power: Share of experiments that are to show it.
     """
-    size = difference / deviation
+    size = float(f"{difference / deviation:.3g}")
+    return _pairs_for_size(size, error_rate, power)
+
+
+SMALLEST_SIGNED_RANK = 6
+"""Fewest pairs with which the signed rank test can have a p value below 0.05."""
+
+
+@lru_cache(maxsize=4096)
+def _pairs_for_size(size: float, error_rate: float, power: float) -> int | None:
+    """Returns the number of pairs for a difference in standard deviations; rounded sizes are asked for repeatedly."""
     if size < 1e-3:
         return None
     if size > 5.0:
@@ -89,7 +99,3 @@ def pairs_for_value(difference: float, deviation: float, error_rate: float = 0.0
     pairs = TTestPower().solve_power(effect_size=size, alpha=error_rate, power=power)
     needed = math.ceil(float(np.squeeze(pairs)) / SIGNED_RANK_EFFICIENCY)
     return max(needed, SMALLEST_SIGNED_RANK) if needed <= MOST_PAIRS else None
-
-
-SMALLEST_SIGNED_RANK = 6
-"""Fewest pairs with which the signed rank test can have a p value below 0.05."""

@@ -25,9 +25,9 @@ def claim(metric: Metric, better: str, worse: str, difference: Estimate, counts:
 
 def no_claim(metric: Metric, first: str, second: str, difference: Estimate, counts: PairCounts) -> str:
     """Returns the sentence of a difference that is not shown; the arguments are those of `claim`."""
-    return (
-        f"no difference in {words(metric)} shown between {first} and {second} ({figures(metric, difference, counts)})"
-    )
+    corrected = ", corrected for all comparisons" if ends_outside_zero(difference.interval) else ""
+    between = f"{first} and {second}{corrected}"
+    return f"no difference in {words(metric)} shown between {between} ({figures(metric, difference, counts)})"
 
 
 def nothing_to_compare(metric: Metric, first: str, second: str, reason: str) -> str:
@@ -45,13 +45,13 @@ def planned(metric: Metric, pairs: int, difference: float) -> str:
 def figures(metric: Metric, difference: Estimate, counts: PairCounts) -> str:
     """Returns a difference, its interval and the number of episodes, as in brackets behind a statement."""
     interval = difference.interval
-    if interval is None or not math.isfinite(interval.low) or not math.isfinite(interval.high):
+    if interval is None:
         return f"{amount(metric, difference.value, signed=True)}, no interval, {_episodes(counts)}"
     scale = 100.0 if metric.kind is MetricKind.RATE else 1.0
     digits = _digits(scale * interval.low, scale * interval.high)
     low, high = (_number(scale * end, digits) for end in (interval.low, interval.high))
     return (
-        f"{amount(metric, difference.value, signed=True, digits=digits)}, {100 * interval.confidence:g} % interval "
+        f"{amount(metric, difference.value, signed=True, digits=digits)}, {100 * interval.confidence:.3g} % interval "
         f"{low} to {high}, {_episodes(counts)}"
     )
 
@@ -65,10 +65,10 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
     unit = " %" if metric.kind is MetricKind.RATE else f" {metric.unit}".rstrip()
     interval, spread = estimate.interval, "no interval"
     digits = _digits(0.0, scale * estimate.value)
-    if interval is not None and math.isfinite(interval.low) and math.isfinite(interval.high):
+    if interval is not None:
         digits = _digits(scale * interval.low, scale * interval.high)
         low, high = (_number(scale * end, digits) for end in (interval.low, interval.high))
-        spread = f"{100 * interval.confidence:g} % interval {low} to {high}"
+        spread = f"{100 * interval.confidence:.3g} % interval {low} to {high}"
     of = "" if metric.kind is MetricKind.RATE else f" {estimate.name} of"
     return (
         f"{method}:{of} {words(metric)} {_number(scale * estimate.value, digits)}{unit} ({spread}, "

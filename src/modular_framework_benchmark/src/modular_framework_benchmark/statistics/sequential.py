@@ -24,6 +24,8 @@ _SIZES, _WEIGHTS = special.roots_legendre(64)
 _LOG_WEIGHTS = np.log(_WEIGHTS / _WEIGHTS.sum())
 GRID = 401
 """Candidates for the true difference from -1 to 1, between which an end of the interval is then refined."""
+LARGEST_PART = 1_000_000
+"""Numbers that are held at once to compute the capital against all candidates: 8 MB."""
 
 
 def log_capital(differences: Floats, counts: Floats, true_difference: float = 0.0) -> Floats:
@@ -37,9 +39,19 @@ def log_capital(differences: Floats, counts: Floats, true_difference: float = 0.
     Returns:
         Logarithm of the capital, 0 at the start, shape (...).
     """
-    largest = np.where(_SIZES < 0.0, 1.0 / (1.0 - true_difference), 1.0 / (1.0 + true_difference))
-    gains = np.log1p((_SIZES * largest)[:, None] * (differences - true_difference)[None, :])
-    return np.asarray(special.logsumexp(counts @ gains.T + _LOG_WEIGHTS, axis=-1))
+    return np.asarray(special.logsumexp(counts @ _gains(differences, true_difference).T + _LOG_WEIGHTS, axis=-1))
+
+
+def _gains(differences: Floats, true_difference: float | Floats) -> Floats:
+    """Returns the logarithm of what each size of the bet wins with each difference, shape (..., sizes, k).
+
+    Args:
+        differences: The differences of a pair, shape (k,).
+        true_difference: What is bet against, a number or shape (..., 1, 1).
+    """
+    sizes = _SIZES[:, None]
+    largest = np.where(sizes < 0.0, 1.0 / (1.0 - true_difference), 1.0 / (1.0 + true_difference))
+    return np.asarray(np.log1p(sizes * largest * (differences - true_difference)))
 
 
 def anytime_p_value(differences: Floats, bound: float = 1.0) -> float:
@@ -71,14 +83,22 @@ def anytime_interval(differences: Floats, confidence: float, bound: float = 1.0)
 
     def limit(end: float) -> float:
         grid = np.linspace(middle, end, GRID)[1:-1]
-        kept = [candidate for candidate in grid if excess(candidate) < 0.0]
-        inner = kept[-1] if kept else middle
+        kept = np.flatnonzero(_log_capitals(seen, counts.astype(float), grid) < most)
+        inner = float(grid[kept[-1]]) if len(kept) else middle
         outer = inner + (end - middle) / (GRID - 1)
         if abs(outer) >= 1.0 or excess(outer) < 0.0 or excess(inner) > 0.0:
             return float(np.clip(outer, -1.0, 1.0))
         return float(optimize.brentq(excess, inner, outer))
 
     return Interval(bound * limit(-1.0), bound * limit(1.0), confidence, "betting, valid at any time")
+
+
+def _log_capitals(differences: Floats, counts: Floats, candidates: Floats) -> Floats:
+    """Returns the logarithm of the capital against each candidate for the true difference, shape (candidates,)."""
+    parts = np.array_split(candidates, -(-len(candidates) * len(_SIZES) * len(differences) // LARGEST_PART))
+    return np.concatenate(
+        [special.logsumexp(_gains(differences, part[:, None, None]) @ counts + _LOG_WEIGHTS, axis=-1) for part in parts]
+    )
 
 
 def asymptotic_interval(differences: Floats, confidence: float, planned: int = 100) -> Interval:

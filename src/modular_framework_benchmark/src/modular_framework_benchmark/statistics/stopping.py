@@ -41,16 +41,6 @@ class StoppingRule(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class AllPlanned:
-    """Runs every planned episode: the rule of experiments with a fixed number of them."""
-
-    def decide(self, results: ExperimentResults) -> StoppingDecision:
-        """Returns a stop once every planned episode is finished."""
-        finished, planned = len(results.episodes), results.planned
-        return StoppingDecision(finished >= planned, f"{finished} of {planned} episodes are finished")
-
-
-@dataclass(frozen=True, slots=True)
 class AnytimeValid:
     """Stops when the comparisons of a metric are decided, by tests that hold at any time.
 

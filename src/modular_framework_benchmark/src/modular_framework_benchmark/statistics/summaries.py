@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from modular_framework_benchmark.records.experiment import Metric, MetricKind
 from modular_framework_benchmark.statistics import sentences
-from modular_framework_benchmark.statistics.comparison import Estimate, MethodSummary
+from modular_framework_benchmark.statistics.comparison import Estimate, Interval, MethodSummary
 from modular_framework_benchmark.statistics.findings import figure_name
 from modular_framework_benchmark.statistics.observations import EpisodeTable
 from modular_framework_benchmark.statistics.rates import rate_interval
@@ -69,6 +69,7 @@ def _with_quartiles(
 def _estimate(metric: Metric, values: Floats, confidence: float, generator: np.random.Generator) -> Estimate | None:
     if not len(values):
         return None
+    interval: Interval | None
     if metric.kind is MetricKind.RATE:
         interval = rate_interval(int(values.sum()), len(values), confidence)
     else:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
@@ -23,8 +25,10 @@ SMALLEST_BOOTSTRAP = 8
 """With fewer values, resamples are too often all alike; Student's t stands for the bootstrap."""
 
 
-def mean_interval(values: Floats, strata: Integers, confidence: float, generator: np.random.Generator) -> Interval:
-    """Returns the interval of a mean: the symmetric studentised bootstrap, stratified.
+def mean_interval(
+    values: Floats, strata: Integers, confidence: float, generator: np.random.Generator
+) -> Interval | None:
+    """Returns the interval of a mean, by the symmetric studentised bootstrap, stratified; None of a single value.
 
     It is used for paired differences because it keeps its level with few and with skewed values, where percentile and
     BCa bootstraps are too narrow (docs/statistics.md has the figures).
@@ -39,7 +43,7 @@ def mean_interval(values: Floats, strata: Integers, confidence: float, generator
     groups = _strata(values, strata)
     mean, deviation = float(np.mean(values)), _standard_error(groups)
     if len(values) == 1:
-        return Interval(-np.inf, np.inf, confidence, "none: a single value")
+        return None
     if deviation <= 1e-12 * max(1.0, abs(mean)):
         return Interval(mean, mean, confidence, "all values are equal")
     factor = float(stats.t.isf((1 - confidence) / 2, len(values) - len(groups)))
@@ -79,10 +83,12 @@ def interquartile_mean_interval(
     def middle_of(*groups: Floats, axis: int = -1) -> Floats:
         return np.asarray(stats.trim_mean(np.concatenate(groups, axis=axis), 0.25, axis=axis))
 
-    found = stats.bootstrap(
-        tuple(_strata(values, strata)), middle_of, vectorized=True, n_resamples=RESAMPLES, batch=500,
-        confidence_level=confidence, method="BCa", rng=generator,
-    ).confidence_interval  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a middle half that is all equal: see below
+        found = stats.bootstrap(
+            tuple(_strata(values, strata)), middle_of, vectorized=True, n_resamples=RESAMPLES, batch=500,
+            confidence_level=confidence, method="BCa", rng=generator,
+        ).confidence_interval  # fmt: skip
     if not np.isfinite([found.low, found.high]).all():  # the middle half is a single value in every jackknife sample
         return Interval(middle, middle, confidence, "the middle half is all equal")
     return Interval(float(found.low), float(found.high), confidence, f"BCa bootstrap, {RESAMPLES} resamples")
@@ -104,8 +110,8 @@ def sign_flip_p_value(differences: Floats, generator: np.random.Generator) -> fl
         differences: Independent differences, shape (n,).
         generator: What the flips are drawn with when there are too many for all of them.
     """
-    if not np.any(differences):
-        return 1.0
+    if len(differences) < 2 or not np.any(differences):
+        return 1.0  # of a single difference, either sign is as far from 0
 
     def difference_of_means(first: Floats, second: Floats, axis: int = -1) -> Floats:
         return np.asarray(np.mean(first, axis=axis) - np.mean(second, axis=axis))
@@ -125,14 +131,16 @@ def unpaired_p_value(first: Floats, second: Floats) -> float:
     return float(stats.mannwhitneyu(first, second).pvalue)
 
 
-def unpaired_interval(first: Floats, second: Floats, confidence: float) -> Interval:
-    """Returns the interval of the difference of two means, Welch's; without bounds where a method has one value."""
+def unpaired_interval(first: Floats, second: Floats, confidence: float) -> Interval | None:
+    """Returns the interval of the difference of two means, Welch's; None where a method has a single value."""
     if min(len(first), len(second)) < 2:
-        return Interval(-np.inf, np.inf, confidence, "none: a single value")
+        return None
     difference = float(np.mean(first) - np.mean(second))
     if max(np.ptp(first), np.ptp(second)) == 0.0:
         return Interval(difference, difference, confidence, "all values are equal")
-    found = stats.ttest_ind(first, second, equal_var=False).confidence_interval(confidence)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of values that are nearly equal: the interval is narrow
+        found = stats.ttest_ind(first, second, equal_var=False).confidence_interval(confidence)
     return Interval(float(found.low), float(found.high), confidence, "Welch")
 
 

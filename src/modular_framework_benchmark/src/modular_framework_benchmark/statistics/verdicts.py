@@ -8,12 +8,12 @@ same side as the difference. The first keeps the stated error; the second keeps 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import sentences
-from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, Interval, Verdict
+from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, Interval, PairFigures, Verdict
 from modular_framework_benchmark.statistics.findings import Finding
 from modular_framework_benchmark.statistics.power import pairs_for_rate, pairs_for_value
 
@@ -41,21 +41,11 @@ def conclude(
     plannable = verdict is Verdict.NOT_SHOWN and not results.description.sequential
     needed, planned = _plan(finding, error_rate * share) if plannable else (None, None)
     return Comparison(
-        first=finding.first,
-        second=finding.second,
+        **{field.name: getattr(finding, field.name) for field in fields(PairFigures)},
         metric=finding.metric.name,
         unit=finding.metric.unit,
-        levels=finding.levels,
-        counts=finding.counts,
-        first_estimate=finding.first_estimate,
-        second_estimate=finding.second_estimate,
-        difference=finding.difference,
-        p_value=finding.p_value,
         p_corrected=p_corrected,
         correction=_correction(share),
-        test=finding.test,
-        effect=finding.effect,
-        improvement=finding.improvement,
         verdict=verdict,
         verdict_without_broken=without,
         pairs_needed=needed,
@@ -116,11 +106,8 @@ def _reversed(difference: Estimate) -> Estimate:
 
 def _plan(finding: Finding, error_rate: float) -> tuple[int | None, float | None]:
     """Returns how many pairs would show which difference; None where that many are there already or it is unknown."""
-    if not finding.spread or not finding.counts.units:
-        return None, None
-    per_unit = finding.counts.pairs / finding.counts.units
-    difference = _planned_difference(finding)
-    if not difference:
+    per_unit, difference = finding.counts.pairs_per_unit, _planned_difference(finding)
+    if not finding.spread or not per_unit or not difference:
         return None, None
     if finding.metric.kind is MetricKind.RATE and per_unit == 1.0:
         needed = pairs_for_rate(difference, finding.spread, error_rate)
@@ -176,12 +163,10 @@ def _counted(metric: Metric, finding: Finding) -> tuple[str, ...]:
         f"{counts.censored} of {episodes} episodes count at {sentences.limit(metric)}" if counts.censored else "",
         f"{sentences.count(counts.missing, 'pair')} left out because an episode has no value" if counts.missing else "",
         f"{sentences.count(counts.unmatched, 'episode')} without a partner" if counts.unmatched else "",
-        f"{counts.pairs} pairs of {counts.units} seeds: pairs of a seed count as one" if _shared(finding) else "",
+        f"{counts.pairs} pairs of {counts.units} seeds: pairs of a seed count as one"
+        if counts.pairs_per_unit > 1.0
+        else "",
     )
-
-
-def _shared(finding: Finding) -> bool:
-    return finding.counts.units < finding.counts.pairs
 
 
 def _broken(finding: Finding, verdicts: tuple[Verdict, Verdict | None]) -> str:

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command `compare`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from modular_framework_benchmark.commands.reporting import run_reporting
+from modular_framework_benchmark.reports.errors import ReportError
+from modular_framework_benchmark.reports.regression import Change, compare_experiments
+from modular_framework_benchmark.reports.regression_page import regression_page, regression_text
+from modular_framework_benchmark.reports.report_files import write_file
+from modular_framework_benchmark.reports.report_source import open_source
+
+REGRESSED = 1
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compares two experiments; returns 0, 1 for a regression that --fail-on-regression asked for, 2 for an error."""
+    return run_reporting(_parser(), arguments, _compare)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="compare",
+        description="Says what got better and what got worse between two experiments with the same factors. Episodes "
+        "with the same method, levels, trial and seed are compared in pairs.",
+        epilog="Exit code: 0; 1 with --fail-on-regression when something got worse; 2 when they cannot be compared.",
+    )
+    parser.add_argument("before", help="result database of the earlier experiment: a file, or a URL of SQLAlchemy")
+    parser.add_argument("after", nargs="?", help="that of the later one; default: the same database")
+    parser.add_argument("--experiment", metavar="NAME", help="the earlier experiment, where its database has several")
+    parser.add_argument("--with", dest="other", metavar="NAME", help="the later experiment; default: the same name")
+    parser.add_argument("--into", type=Path, metavar="FILE", help="also write an HTML page")
+    parser.add_argument("--fail-on-regression", action="store_true", help="exit code 1 when something got worse")
+    return parser
+
+
+def _compare(given: argparse.Namespace) -> int:
+    if given.after is None and not (given.experiment and given.other and given.experiment != given.other):
+        raise ReportError("one database is given; name two of its experiments: --experiment NAME --with NAME")
+    with (
+        open_source(given.before, given.experiment) as before,
+        open_source(given.after or given.before, given.other or given.experiment) as after,
+    ):
+        regression = compare_experiments(before.results, after.results)
+        print(regression_text(regression), end="")
+        if given.into is not None:
+            write_file(given.into, regression_page(regression, before.database.label, after.database.label).encode())
+            print(f"compare: wrote {given.into}", file=sys.stderr)
+    return REGRESSED if given.fail_on_regression and regression.count(Change.WORSE) else 0

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command `export`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from modular_framework_benchmark.commands.reporting import database_parser, run_reporting
+from modular_framework_benchmark.records.episode import EpisodeRecord
+from modular_framework_benchmark.records.experiment import ExperimentDescription
+from modular_framework_benchmark.reports.report_source import find_experiment
+from modular_framework_benchmark.results.database import ResultDatabase, open_database
+from modular_framework_benchmark.results.errors import ExportError
+from modular_framework_benchmark.results.exported_tables import TableFormat, export_tables
+from modular_framework_benchmark.results.lerobot_export import DEFAULT_RATE, export_lerobot
+
+MOST_REASONS = 5
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exports an experiment; returns 0, or 2 when it could not."""
+    return run_reporting(_parser(), arguments, _export)
+
+
+def _export(given: argparse.Namespace) -> int:
+    if given.lerobot is None and (given.rate is not None or given.where or given.succeeded):
+        raise ExportError("--rate, --where and --succeeded are for --lerobot; leave them out, or name its folder")
+    with open_database(given.database, read_only=True) as database:
+        number = find_experiment(database, given.experiment)
+        for table_format in TableFormat:
+            folder = getattr(given, table_format.value)
+            if folder is not None:
+                for path in export_tables(database.load(number), folder, table_format):
+                    print(path)
+        if given.lerobot is not None:
+            _export_lerobot(database, number, given)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = database_parser(
+        "export",
+        "Writes the episodes of an experiment for other programs. Nothing that is there is overwritten.",
+    )
+    kinds = parser.add_mutually_exclusive_group(required=True)
+    kinds.add_argument("--csv", type=Path, metavar="FOLDER", help="episodes and spans as CSV, what was run as JSON")
+    kinds.add_argument("--parquet", type=Path, metavar="FOLDER", help="episodes and spans as Parquet")
+    kinds.add_argument("--lerobot", type=Path, metavar="FOLDER", help="recorded motions and videos, for learners")
+    learners = parser.add_argument_group("with --lerobot")
+    learners.add_argument("--rate", type=int, metavar="HZ", help=f"frames a second [{DEFAULT_RATE}]")
+    learners.add_argument(
+        "--where", action="append", default=[], metavar="FACTOR=LEVEL", help="only these; may be given several times"
+    )
+    learners.add_argument("--succeeded", action="store_true", help="only episodes that succeeded")
+    return parser
+
+
+def _export_lerobot(database: ResultDatabase, number: int, given: argparse.Namespace) -> None:
+    description = next(stored.description for stored in database.experiments() if stored.id == number)
+    levels = _chosen_levels(given.where, description)
+
+    def chosen(record: EpisodeRecord) -> bool:
+        if given.succeeded and not record.succeeded:
+            return False
+        return all(record.spec.configuration[name] == level for name, level in levels.items())
+
+    rate = DEFAULT_RATE if given.rate is None else given.rate
+    summary = export_lerobot(database, number, given.lerobot, frames_per_second=rate, chosen=chosen)
+    print(f"{given.lerobot}: {summary.episodes} episodes, {summary.frames} frames at {rate} Hz")
+    if summary.skipped:
+        print(f"export: {len(summary.skipped)} episodes are left out:", file=sys.stderr)
+    for episode, reason in list(summary.skipped.items())[:MOST_REASONS]:
+        print(f"  episode {episode}: {reason}", file=sys.stderr)
+
+
+def _chosen_levels(given: Sequence[str], description: ExperimentDescription) -> Mapping[str, str]:
+    """Returns the levels that were asked for, by factor.
+
+    Raises:
+        ExportError: There is no such factor or level.
+    """
+    allowed = {factor.name: factor.levels for factor in description.factors}
+    levels = {}
+    for text in given:
+        name, _, level = text.partition("=")
+        if level not in allowed.get(name, ()):
+            listed = "; ".join(f"{factor}={' or '.join(found)}" for factor, found in allowed.items())
+            raise ExportError(f"--where {text}: the experiment has no such level; allowed: {listed}")
+        levels[name] = level
+    return levels

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command `report`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from modular_framework_benchmark.commands.reporting import database_parser, run_reporting
+from modular_framework_benchmark.reports.errors import ReportError
+from modular_framework_benchmark.reports.html_page import report_page
+from modular_framework_benchmark.reports.image_export import FORMATS, figure_image, find_browser, find_figure
+from modular_framework_benchmark.reports.paper_tables import latex_table, markdown_table
+from modular_framework_benchmark.reports.report_content import ReportContent, gather
+from modular_framework_benchmark.reports.report_files import write_file
+from modular_framework_benchmark.reports.report_source import open_source
+from modular_framework_benchmark.reports.tables import overview_table
+
+TABLES = {"markdown": markdown_table, "latex": latex_table}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Reports an experiment; returns 0, or 2 when it could not."""
+    return run_reporting(_parser(), arguments, _report)
+
+
+def write_page(target: str, experiment: str, into: Path) -> tuple[str, ...]:
+    """Writes the report page of an experiment; returns the sentences that compare its methods.
+
+    Args:
+        target: Result database, as the user named it.
+        experiment: Its name in the database.
+        into: File of the page.
+
+    Raises:
+        ReportError: It cannot be written.
+        ResultsError: The database cannot be read.
+    """
+    with open_source(target, experiment) as opened:
+        content = gather(opened.results, opened.source(into.absolute().parent))
+        write_file(into, report_page(content, opened.database.label).encode())
+    return tuple(content.analysis.sentences)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = database_parser(
+        "report",
+        "Says which method is better, at what, and how sure that is: one HTML page from a result database. "
+        "With --figure or --table it writes that part alone.",
+    )
+    parser.add_argument(
+        "--into", type=Path, metavar="FILE", help="what is written; default: named after the experiment"
+    )
+    parser.add_argument(
+        "--figure",
+        metavar="NAME[.png|.pdf]",
+        help="write this figure as an image, PNG if nothing is said; 'list' names those there are",
+    )
+    parser.add_argument("--table", choices=sorted(TABLES), help="print the table of methods for a paper")
+    return parser
+
+
+def _report(given: argparse.Namespace) -> int:
+    if given.figure and given.table:
+        raise ReportError("--figure and --table are both given; give one of them")
+    figure, image_format = _figure_and_format(given.figure or "")
+    if figure and figure != "list":
+        find_browser()  # before the work of a large database
+    with open_source(given.database, given.experiment) as opened:
+        name = opened.results.description.name
+        into = given.into or Path(f"{name}_{figure}.{image_format}" if figure else f"{name}.html")
+        content = gather(opened.results, opened.source(into.absolute().parent))
+        if given.table:
+            return _write_table(content, given)
+        if figure == "list":
+            print(*(f"{figure.name:32} {figure.title}" for figure in content.figures), sep="\n")
+            return 0
+        if figure:
+            write_file(into, figure_image(find_figure(content.figures, figure), image_format))
+        else:
+            write_file(into, report_page(content, opened.database.label).encode())
+    for sentence in content.analysis.sentences[:3]:
+        print(sentence)
+    print(f"report: wrote {into}", file=sys.stderr)
+    return 0
+
+
+def _figure_and_format(text: str) -> tuple[str, str]:
+    """Returns the name of a figure and the format of its image.
+
+    Raises:
+        ReportError: There is no such format.
+    """
+    name, _, ending = text.partition(".")
+    if ending and ending not in FORMATS:
+        raise ReportError(f"--figure {text}: '{ending}' is no format; allowed: {', '.join(FORMATS)}")
+    return name, ending or FORMATS[0]
+
+
+def _write_table(content: ReportContent, given: argparse.Namespace) -> int:
+    text = TABLES[given.table](overview_table(content))
+    if given.into is None:
+        print(text, end="")
+    else:
+        write_file(given.into, text.encode())
+    return 0

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shakes what a robot holds, through the action of its arm's own trajectory controller."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from modular_framework_benchmark.episodes.ros_samples import Samples
+from modular_framework_benchmark.episodes.shake_motion import limits_in_order, shake_motion
+from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_ros.calls import wait_for_action, wait_for_result
+from modular_framework_urdf.urdf_reader import read_urdf
+
+ACTION_TIMEOUT_S = 30.0
+SLOWEST_FACTOR = 0.05
+"""Simulated over real time on a busy machine."""
+
+
+class ShakeError(RuntimeError):
+    """The object could not be shaken; the text says why."""
+
+
+def shake(samples: Samples, duration_s: float) -> float:
+    """Shakes the arm and waits until that has ended.
+
+    Args:
+        samples: What controllers and joints said so far.
+        duration_s: For how long [s of simulated time].
+
+    Returns:
+        ROS time at which it began [s].
+
+    Raises:
+        ShakeError: There is no trajectory controller, or it refuses the motion or leaves it.
+        CallError: The controller does not answer.
+    """
+    controller, joints, positions = _arm(samples)
+    times, points, speeds = shake_motion(positions, _speed_limits(joints), duration_s)
+    action = f"/{controller}/follow_joint_trajectory"
+    client = SteadyActionClient(action, FollowJointTrajectoryAction)
+    wait_for_action(client, action, ACTION_TIMEOUT_S)
+    trajectory = JointTrajectory(joint_names=joints)
+    trajectory.points = [
+        JointTrajectoryPoint(positions=point, velocities=speed, time_from_start=rospy.Duration.from_sec(time_s))
+        for time_s, point, speed in zip(times.tolist(), points.tolist(), speeds.tolist(), strict=True)
+    ]
+    begun = rospy.get_time()
+    client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
+    if wait_for_result(client, ACTION_TIMEOUT_S + duration_s / SLOWEST_FACTOR) != GoalStatus.SUCCEEDED:
+        raise ShakeError(f"controller '{controller}' did not shake the arm: {client.get_goal_status_text()}")
+    return begun
+
+
+def _arm(samples: Samples) -> tuple[str, list[str], Any]:
+    """Returns the trajectory controller with the most joints, these, and where they are."""
+    latest = {name: message for name, message in samples.controllers}
+    if not latest:
+        raise ShakeError("no trajectory controller publishes its state; an arm is shaken through one")
+    name = max(latest, key=lambda controller: (len(latest[controller].joint_names), controller))
+    message = latest[name]
+    return name, list(message.joint_names), np.array(message.desired.positions)
+
+
+def _speed_limits(joints: list[str]) -> Any:
+    robot = read_urdf(str(rospy.get_param("/robot_description")))
+    limits = {joint.name: joint.limit.velocity for joint in robot.joints if joint.limit is not None}
+    return limits_in_order(joints, {name: value for name, value in limits.items() if value})

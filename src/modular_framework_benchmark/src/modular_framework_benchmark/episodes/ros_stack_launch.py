@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Works out from the settings of an episode what is launched, before anything is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import roslaunch.core
+import roslaunch.rlutil
+import rospkg
+
+from modular_framework_benchmark.episodes.errors import SettingsError
+from modular_framework_benchmark.episodes.stack import StackLaunch
+from modular_framework_benchmark.episodes.task_settings import TaskSettings
+from modular_framework_core.launching.launch_arguments import METHOD, argument_values, check_arguments, known_arguments
+from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
+
+OWN_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
+"""Launch arguments of every episode, where the launch file has them."""
+DEFAULT_ARGUMENTS = {"wait_for_planning": "true", "real_time_factor": "0"}
+"""Launch arguments of episodes that do not set them: simulated time waits for computations, and else runs as fast as
+it can, so that an episode does not depend on how busy the machine is."""
+TRUTHS = ("true", "1")
+
+
+def resolve_launch(settings: TaskSettings) -> StackLaunch:
+    """Returns what an episode launches.
+
+    Raises:
+        SettingsError: There is no such launch file, or an argument is wrong.
+    """
+    try:
+        path = roslaunch.rlutil.resolve_launch_arguments([settings.package, settings.launch_file])[0]
+        known = known_arguments(path)
+        arguments = {name: value for name, value in DEFAULT_ARGUMENTS.items() if name in known}
+        arguments |= settings.arguments
+        arguments |= {name: value for name, value in OWN_ARGUMENTS.items() if name in known}
+        given = [f"{name}:={value}" for name, value in arguments.items()]
+        check_arguments(path, given)
+        values = argument_values(path, given)
+        controllers: tuple[str, ...] = ()
+        if values.get("robot_package") and values.get("controller_file"):
+            folder = Path(rospkg.RosPack().get_path(values["robot_package"])) / "controllers"
+            controllers = read_controller_file(folder / values["controller_file"]).controllers
+    except (roslaunch.core.RLException, rospkg.ResourceNotFound, ControllerFileError, OSError) as error:
+        raise SettingsError(f"setting 'launch' {settings.package}/{settings.launch_file}: {error}") from error
+    return StackLaunch(
+        settings.package,
+        settings.launch_file,
+        arguments,
+        {"/task/wait_for_start": True, **settings.parameters},
+        bool(values.get(METHOD, "")),
+        controllers,
+        values.get("wait_for_planning", "").lower() in TRUTHS,
+    )

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs grasp generation methods on scenes with objects, without simulation and without a ROS master.
+
+A method finds its candidates; the best of them are then checked as a grasp generator has move_group do it: inverse
+kinematics at pregrasp, grasp and postgrasp pose, free of collisions.
+"""
+
+from __future__ import annotations
+
+import heapq
+import importlib
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.metrics.measurements import ComponentReport
+from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_benchmark.modes.grasp_reach import GraspReach
+from modular_framework_benchmark.modes.measured_record import Stopwatch, broken_record, measured_record
+from modular_framework_benchmark.modes.method_parameters import GivenNumbers
+from modular_framework_benchmark.modes.robots import Robot
+from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
+from modular_framework_benchmark.modes.ros_robots import load_robot
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspMethod, GraspQuery
+from modular_framework_core.grasp_generation.gripper_geometry import (
+    GripperGeometry,
+    GripperGeometryError,
+    measure_gripper,
+)
+from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    """What episodes with the same robot and hand share."""
+
+    robot: Robot
+    solver: InverseKinematics
+    gripper: GripperGeometry
+
+
+class GraspEpisodeRunner:
+    """Runs episodes of the mode `grasps`; belongs to one process."""
+
+    def __init__(self) -> None:
+        """Starts nothing: robots are loaded for the first episode that needs them."""
+        self._prepared: dict[str, _Prepared] = {}
+
+    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
+        """Finds the grasps of one scene.
+
+        Args:
+            spec: What to run; the experiment file of its mode has the settings.
+            folder: Folder of the episode; nothing is written there, the figures are all there is.
+        """
+        watch, settings = Stopwatch(), spec.settings
+        try:
+            prepared = self._prepare(settings)
+            scene = grasp_scene(prepared.robot.model, settings["objects"], str(settings["target"]))
+            numbers = GivenNumbers(settings.get("method_parameters") or {})
+            method = load_method(str(settings["method"]), numbers)
+            started_s, start = watch.elapsed_s(), time.perf_counter()
+            candidates = _candidates(method, scene, prepared.gripper, spec.seed)
+            search_s = time.perf_counter() - start
+            numbers.check_all_read()
+            reached = _reached(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
+        except (ModeError, ModelError, PlanningError) as error:
+            return broken_record(spec, str(error), watch)
+        found = [place for place, travel in enumerate(reached, start=1) if travel is not None]
+        outcome = "reachable" if found else ("out_of_reach" if candidates else "no_grasp")
+        report = ComponentReport(
+            component="generation",
+            name=str(settings["target"]),
+            succeeded=bool(found),
+            reason=_reason(method, candidates, reached, outcome),
+            started_s=started_s,
+            ended_s=watch.elapsed_s(),
+            wall_s=search_s,
+            figures=_figures(candidates, reached, found),
+        )
+        status = EpisodeStatus.SUCCEEDED if found else EpisodeStatus.FAILED
+        return measured_record(spec, status, outcome, report, folder, watch)
+
+    def close(self) -> None:
+        """Ends nothing: there are no processes."""
+
+    def _prepare(self, settings: Mapping[str, Any]) -> _Prepared:
+        """Returns the robot, its inverse kinematics and its hand; made once for all episodes that need the same."""
+        key = json.dumps([settings[name] for name in ("robot", "group", "gripper_joint")], sort_keys=True)
+        if key not in self._prepared:
+            robot = load_robot(settings["robot"])
+            group = robot.model.group(str(settings["group"]))
+            if not group.is_chain:
+                chains = ", ".join(name for name, item in robot.model.groups.items() if item.is_chain)
+                raise ModeError(f"group '{group.name}' is no chain; grasps need one of {chains or 'none'}")
+            try:
+                gripper = measure_gripper(robot.urdf, group.tip_link, str(settings["gripper_joint"]))
+            except GripperGeometryError as error:
+                raise ModeError(f"gripper_joint '{settings['gripper_joint']}': {error}") from error
+            self._prepared[key] = _Prepared(robot, robot.solvers().solver(group.name), gripper)
+        return self._prepared[key]
+
+
+def load_method(reference: str, numbers: GivenNumbers) -> GraspMethod:
+    """Makes a method.
+
+    Args:
+        reference: MODULE:CLASS, such as `top_down_grasps.ros_top_down_node:TopDownMethod`; the class takes what reads
+            its parameters.
+        numbers: What reads its parameters.
+
+    Raises:
+        ModeError: It cannot be imported.
+    """
+    module, _, name = reference.partition(":")
+    try:
+        made: GraspMethod = getattr(importlib.import_module(module), name)(numbers)
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise ModeError(
+            f"method '{reference}' cannot be imported ({error}); allowed: MODULE:CLASS of a grasp method, such as "
+            "top_down_grasps.ros_top_down_node:TopDownMethod"
+        ) from error
+    return made
+
+
+def _candidates(method: GraspMethod, scene: GraspScene, gripper: GripperGeometry, seed: int) -> list[GraspCandidate]:
+    """Returns the candidates of all parts of the target, best first."""
+    found_in = []
+    for target in scene.targets:
+        beside = tuple(part for part in (*scene.targets, *scene.others) if part.name != target.name)
+        found_in.append(method.candidates(GraspQuery(target, beside, target.bottom, gripper, seed)))
+    return list(heapq.merge(*found_in, key=lambda candidate: -candidate.quality))
+
+
+def _reached(prepared: _Prepared, scene: GraspScene, candidates: list[GraspCandidate]) -> list[float | None]:
+    """Returns the joint travel of each candidate; None for one out of reach."""
+    if not candidates:
+        return []
+    reach = GraspReach(prepared.robot, prepared.solver, prepared.gripper, scene.planning_scene)
+    return [reach.joint_travel(candidate) for candidate in candidates]
+
+
+def _figures(candidates: list[GraspCandidate], reached: list[float | None], found: list[int]) -> dict[str, float]:
+    """Returns the figures of `metrics.generation`."""
+    figures = {"candidates": float(len(candidates)), "checked": float(len(reached)), "reachable": float(len(found))}
+    return figures | ({"best_rank": float(found[0])} if found else {})
+
+
+def _reason(method: GraspMethod, candidates: list[GraspCandidate], reached: list[float | None], outcome: str) -> str:
+    match outcome:
+        case "reachable":
+            return ""
+        case "out_of_reach":
+            return f"none of the {len(reached)} grasps that were checked, of {len(candidates)}, is reachable"
+        case _:
+            return f"no part of it can be grasped {method.manner}"

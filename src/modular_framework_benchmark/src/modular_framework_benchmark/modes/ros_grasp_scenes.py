@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scene of an episode of the mode `grasps`: models at their poses, as the simulation shows them to move_group."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject, SceneObjectError, scene_object
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.messages.scene_conversions import apply_collision_object
+from modular_framework_planning.planning_scene.planning_scene import PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.gazebo_ros.conversions import link_to_collision_object
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_reader import read_model_text
+from modular_framework_simulation.models.sdf_resources import Resources, no_packages
+
+
+@dataclass(frozen=True, slots=True)
+class GraspScene:
+    """What stands around the robot.
+
+    Attributes:
+        planning_scene: All objects, for the collision checker.
+        targets: Parts of the object to grasp.
+        others: Parts of all other objects.
+    """
+
+    planning_scene: PlanningScene
+    targets: tuple[SceneObject, ...]
+    others: tuple[SceneObject, ...]
+
+
+def grasp_scene(model: RobotModel, objects: Sequence[Mapping[str, Any]], target: str) -> GraspScene:
+    """Returns the scene of an episode; the robot is in its default state.
+
+    Args:
+        model: The robot.
+        objects: {name, model: FILE, x, y, z [m], roll, pitch, yaw [rad]} each, in the planning frame.
+        target: Name of the object to grasp.
+
+    Raises:
+        ModeError: A model cannot be used, or has nothing that can be grasped.
+    """
+    scene = empty_scene(model, model.default_positions())
+    targets: list[SceneObject] = []
+    others: list[SceneObject] = []
+    for item in objects:
+        try:
+            for message in _messages(item, model.planning_frame):
+                scene = apply_collision_object(scene, message)
+                part = scene_object(message)
+                if part is not None:
+                    (targets if item["name"] == target else others).append(part)
+        except (DescriptionError, SceneObjectError, PlanningError, OSError) as error:
+            raise ModeError(f"object '{item['name']}': {error}") from error
+    if not targets:
+        raise ModeError(f"object '{target}' has no collision shape that can be grasped; choose another target")
+    return GraspScene(scene, tuple(targets), tuple(others))
+
+
+def _messages(item: Mapping[str, Any], frame: str) -> list[Any]:
+    path = Path(str(item["model"]))
+    model = read_model_text(path.read_text(encoding="utf-8"), str(path), Resources((path.parent.parent,), no_packages))
+    xyz, rpy = (tuple(float(item[key]) for key in keys) for keys in (("x", "y", "z"), ("roll", "pitch", "yaw")))
+    placed = Pose.from_xyz_rpy((xyz[0], xyz[1], xyz[2]), (rpy[0], rpy[1], rpy[2]))
+    return [
+        link_to_collision_object(str(item["name"]), link, frame, placed @ link.pose)
+        for link in model.links
+        if link.collisions
+    ]

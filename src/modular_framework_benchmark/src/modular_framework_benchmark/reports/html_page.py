@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lays a report out as one HTML page that needs no other file and no network."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import itertools
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from modular_framework_benchmark.reports import number_text
+from modular_framework_benchmark.reports.figure_style import NamedFigure, words
+from modular_framework_benchmark.reports.report_content import SUCCESS, ReportContent, machine_readable
+from modular_framework_benchmark.reports.tables import (
+    Cell,
+    comparison_table,
+    levels_table,
+    method_table,
+    missing_table,
+    overview_table,
+    spans_table,
+    status_table,
+)
+from modular_framework_benchmark.statistics.comparison import Verdict
+
+MOST_SENTENCES = 10
+SECTIONS = (
+    ("comparison", "Comparison"), ("components", "By component"), ("missing", "Missing values"),
+    ("levels", "Other factors"), ("timelines", "Time"), ("failures", "Failures"),
+    ("progress", "Progress"), ("run", "What was run"), ("words", "How to read this page"),
+)  # fmt: skip
+
+
+def report_page(content: ReportContent, database: str) -> str:
+    """Returns the page of a report.
+
+    Args:
+        content: what it says.
+        database: the database, as the user named it.
+    """
+    figures = {figure.name: figure for figure in content.figures}
+    absent = {name for name, there in (("levels", content.levels), ("timelines", content.spans)) if not there}
+    return render_page(
+        "report.html.jinja",
+        machine_readable(content),
+        content.figures,
+        content=content,
+        database=database,
+        figures=figures,
+        answer=_answer(content),
+        sections=[section for section in SECTIONS if section[0] not in absent],
+        components=[_component(content, name) for name in content.components],
+        tables={
+            "overview": overview_table(content),
+            "statuses": status_table(content),
+            "missing": missing_table(content),
+            "levels": levels_table(content),
+            "states": spans_table(content, "state"),
+            "components": spans_table(content, "component"),
+        },
+    )
+
+
+def _answer(content: ReportContent) -> dict[str, Sequence[str]]:
+    """Returns the sentences that come first, those of success and of differences that are shown, and the others."""
+    wanted = [
+        item.sentence
+        for item in content.analysis.comparisons
+        if item.metric == SUCCESS or item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
+    ]
+    sentences = content.analysis.sentences
+    first = [sentence for sentence in sentences if sentence in wanted][:MOST_SENTENCES] or sentences[:1]
+    return {"first": first, "further": [sentence for sentence in sentences if sentence not in first]}
+
+
+def _as_sentence(text: str) -> str:
+    """Returns a text with a full stop and a capital; a name of a method in front stays as it is."""
+    start = text[:1].upper() if text.startswith(("no ", "nothing ")) else text[:1]
+    return start + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _component(content: ReportContent, name: str) -> dict[str, object]:
+    title = {"task": "Whole task", "grasp": "Grasp"}.get(name, words(name).capitalize())
+    return {
+        "title": title,
+        "metrics": [metric for metric in content.metrics if metric.component == name],
+        "methods": method_table(content, name),
+        "comparisons": comparison_table(content, name),
+        "figures": [figure for figure in content.figures if figure.component == name],
+    }
+
+
+def render_page(template: str, data: Mapping[str, Any], shown: Sequence[NamedFigure], **values: object) -> str:
+    """Returns a page from one of the templates.
+
+    Args:
+        template: file name in the folder of templates.
+        data: what the page carries for programs, JSON values.
+        shown: all figures that the page may show.
+        values: what the template names.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )
+    environment.filters.update(
+        words=words,
+        in_groups=_in_groups,
+        as_sentence=_as_sentence,
+        base64=lambda text: base64.b64encode(text.encode()).decode(),
+        count=number_text.count_text,
+        counted=number_text.counted,
+        moment=number_text.moment_text,
+        duration=number_text.duration_text,
+        share=number_text.share_text,
+    )
+    data_json = _in_script(json.dumps(data, allow_nan=False, ensure_ascii=False))
+    drawings = ",".join(f"{json.dumps(item.name)}:{item.figure.to_json()}" for item in shown)
+    figures_json = _in_script(f"{{{drawings}}}")
+    return environment.get_template(template).render(
+        values,
+        style=Markup((Path(__file__).parent / "templates" / "style.css").read_text(encoding="utf-8")),
+        plotly_js=Markup(get_plotlyjs()),
+        data_json=data_json,
+        figures_json=figures_json,
+        nonce=hashlib.sha256(f"{data_json}{figures_json}".encode()).hexdigest()[:32],
+    )
+
+
+def _in_script(text: str) -> Markup:
+    """Returns JSON as it may stand in a script element: nothing in it ends the element."""
+    for letter in ("<", ">", "&", "\u2028", "\u2029"):
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
+
+
+def _in_groups(rows: Sequence[tuple[Cell, ...]]) -> list[list[tuple[Cell, ...]]]:
+    """Returns rows in groups of neighbours with the same heading."""
+    return [list(group) for _, group in itertools.groupby(rows, key=lambda row: row[0].text)]

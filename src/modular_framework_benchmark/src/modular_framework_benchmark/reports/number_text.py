@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes numbers as a reader wants them: with as many digits as they are sure of, and with their units."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+
+NONE = "–"
+
+
+def decimals_for(width: float) -> int:
+    """Returns with how many decimals a number is written whose uncertainty is `width`.
+
+    Of the uncertainty two figures remain where it begins with 1, 2 or 3, else one. Source: Particle Data Group, Review
+    of Particle Physics, section 5.3 (which draws the line at 3.54).
+    """
+    if not math.isfinite(width) or width <= 0.0:
+        return 3
+    magnitude = math.floor(math.log10(width))
+    figures = 2 if width / 10.0**magnitude < 3.55 else 1
+    return min(max(figures - 1 - magnitude, 0), 9)
+
+
+def number_text(value: float | None, decimals: int | None = None) -> str:
+    """Returns a number; with three significant figures when `decimals` is not given; a dash for None and NaN."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    if decimals is None:
+        if value == 0.0:
+            return "0"
+        decimals = min(max(2 - math.floor(math.log10(abs(value))), 0), 9)
+    text = f"{value:,.{decimals}f}"
+    return text.lstrip("-") if float(text.replace(",", "")) == 0.0 else text.replace("-", "−")
+
+
+def share_text(share: float | None, decimals: int = 1) -> str:
+    """Returns a share of 0 to 1 as a percentage; a dash for None and NaN."""
+    if share is None or not math.isfinite(share):
+        return NONE
+    return f"{number_text(100.0 * share, decimals)} %"
+
+
+def interval_text(estimate: float | None, low: float | None, high: float | None) -> str:
+    """Returns an estimate and its interval, all with the decimals that the interval's width allows, if it has a width.
+
+    Args:
+        estimate: the number; None and NaN give a dash.
+        low: lower end; None for no interval.
+        high: upper end.
+    """
+    if estimate is None or not math.isfinite(estimate):
+        return NONE
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
+        return number_text(estimate)
+    decimals = decimals_for((high - low) / 2.0) if high > low else None
+    ends = f"{number_text(low, decimals)} to {number_text(high, decimals)}"
+    return f"{number_text(estimate, decimals)} ({ends})"
+
+
+def p_value_text(p_value: float | None) -> str:
+    """Returns a p value: no more digits than anyone decides on."""
+    if p_value is None or not math.isfinite(p_value):
+        return NONE
+    if p_value < 0.001:
+        return "< 0.001"
+    return f"{p_value:.3f}" if p_value < 0.1 else f"{p_value:.2f}"
+
+
+def count_text(count: int) -> str:
+    """Returns a count with separated thousands."""
+    return f"{count:,}"
+
+
+def counted(count: int, noun: str) -> str:
+    """Returns a count with its noun: `1 episode`, `2 episodes`."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def duration_text(seconds: float | None) -> str:
+    """Returns a duration in the two units that matter."""
+    if seconds is None or not math.isfinite(seconds):
+        return NONE
+    if seconds < 60.0:
+        return f"{number_text(seconds)} s"
+    minutes = int(round(seconds / 60.0))
+    if minutes < 60:
+        return f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    if hours < 48:
+        return f"{hours} h {minutes} min"
+    return f"{hours // 24} d {hours % 24} h"
+
+
+def moment_text(seconds: float | None) -> str:
+    """Returns a moment, given in seconds since 1970, in UTC."""
+    if seconds is None or not math.isfinite(seconds):
+        return NONE
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M UTC")

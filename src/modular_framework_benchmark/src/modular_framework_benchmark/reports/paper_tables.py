@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes tables for a paper: Markdown, and LaTeX in the style of booktabs."""
+
+from __future__ import annotations
+
+import re
+
+from modular_framework_benchmark.reports.tables import Cell, Table
+
+_LATEX = {
+    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
+    "|": r"\textbar{}", '"': "''", "–": "--", "−": "$-$", "↑": r"$\uparrow$", "↓": r"$\downarrow$",
+    "…": r"\dots{}", "±": r"$\pm$", "°": r"\textdegree{}", "µ": r"\textmu{}", "²": r"\textsuperscript{2}",
+    "\u00a0": "~", "\n": " ", "\r": " ", "\t": " ",
+}  # fmt: skip
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#~&$])")
+
+
+def markdown_table(table: Table) -> str:
+    """Returns a table in GitHub's Markdown, its caption first and its notes last."""
+    lines = [markdown_text(table.caption), ""]
+    lines.append("| " + " | ".join(markdown_text(title) for title in table.columns) + " |")
+    numbers = [_is_number(table, column) for column in range(len(table.columns))]
+    lines.append("|" + "|".join("---:" if number else "---" for number in numbers) + "|")
+    lines += ["| " + " | ".join(_markdown_cell(cell) for cell in row) + " |" for row in table.rows]
+    for note in table.notes:
+        lines += ["", markdown_text(note)]
+    return "\n".join(lines) + "\n"
+
+
+def latex_table(table: Table) -> str:
+    """Returns a table that needs the package booktabs; its notes are comments."""
+    columns = "".join("r" if _is_number(table, column) else "l" for column in range(len(table.columns)))
+    body = [" & ".join(_latex_cell(cell) for cell in row) + r" \\" for row in table.rows]
+    notes = [f"% {line}" for note in table.notes for line in note.splitlines()]
+    lines = [
+        r"% needs \usepackage{booktabs}",
+        r"\begin{table}",
+        r"  \centering",
+        rf"  \caption{{{latex_text(table.caption)}}}",
+        rf"  \label{{tab:{re.sub('[^A-Za-z0-9]', '-', table.name)}}}",
+        rf"  \begin{{tabular}}{{{columns}}}",
+        r"    \toprule",
+        "    " + " & ".join(latex_text(title) for title in table.columns) + r" \\",
+        r"    \midrule",
+        *(f"    {line}" for line in body),
+        r"    \bottomrule",
+        r"  \end{tabular}",
+        r"\end{table}",
+        *notes,
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def latex_text(text: str) -> str:
+    """Returns a text that LaTeX prints as it is."""
+    return "".join(_LATEX.get(letter, letter) for letter in text if letter.isprintable() or letter in _LATEX)
+
+
+def markdown_text(text: str) -> str:
+    """Returns a text that Markdown shows as it is, on one line."""
+    return _MARKDOWN.sub(r"\\\1", " ".join(text.split()))
+
+
+def _is_number(table: Table, column: int) -> bool:
+    return bool(table.rows) and all(row[column].is_number for row in table.rows)
+
+
+def _latex_cell(cell: Cell) -> str:
+    text = latex_text(cell.text)
+    return rf"\textbf{{{text}}}" if cell.is_strong else text
+
+
+def _markdown_cell(cell: Cell) -> str:
+    text = markdown_text(cell.text)
+    return f"**{text}**" if cell.is_strong else text

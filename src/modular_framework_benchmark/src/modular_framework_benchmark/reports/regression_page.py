@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shows what changed between two experiments: as text, and as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import plotly.graph_objects as go
+
+from modular_framework_benchmark.records.experiment import MetricKind
+from modular_framework_benchmark.reports.figure_style import MUTED, NamedFigure, styled, unique_labels, words
+from modular_framework_benchmark.reports.html_page import render_page
+from modular_framework_benchmark.reports.number_text import counted, number_text, p_value_text
+from modular_framework_benchmark.reports.regression import Change, MetricChange, Regression
+from modular_framework_benchmark.reports.report_content import plain_json
+from modular_framework_benchmark.reports.tables import Cell, Table, estimate_text, metric_title
+
+COLORS = {Change.BETTER: "#176639", Change.WORSE: "#b3261e", Change.NOT_SHOWN: "#5f6c7b", Change.NO_DATA: "#5f6c7b"}
+MOODS = {Change.BETTER: "better", Change.WORSE: "worse"}
+
+
+def changes_table(regression: Regression) -> Table:
+    """Returns each metric of each method before and after, and what is shown."""
+    rows = tuple(_row(item) for item in regression.changes)
+    columns = ("method", "metric", "before", "after", "after − before (interval)", "p corrected", "pairs", "result")
+    return Table("changes", "Each metric of each method in both experiments.", columns, rows, regression.notes)
+
+
+def _row(item: MetricChange) -> tuple[Cell, ...]:
+    found = item.comparison
+    scale = 100.0 if item.metric.kind is MetricKind.RATE else 1.0
+    before, after = (
+        number_text(None if value is None else scale * value) for value in (found.second_estimate, found.first_estimate)
+    )
+    pairs = f"{found.counts.pairs:,}" if found.counts.pairs else "unpaired"
+    shown = item.change in MOODS
+    return (
+        Cell(item.method),
+        Cell(metric_title(item.metric)),
+        Cell(before, is_number=True),
+        Cell(after, is_number=True),
+        Cell(estimate_text(found.difference, item.metric), is_number=True),
+        Cell(p_value_text(found.p_corrected), is_number=True),
+        Cell(pairs, is_number=True),
+        Cell(item.change.value, shown, mood=MOODS.get(item.change, "")),
+    )
+
+
+def summary_sentences(regression: Regression) -> tuple[str, ...]:
+    """Returns what changed in words, regressions first."""
+    counts = {change: regression.count(change) for change in Change}
+    text = (
+        f"{counted(counts[Change.WORSE], 'metric')} of methods got worse, {counts[Change.BETTER]:,} better; "
+        f"no difference is shown in {counts[Change.NOT_SHOWN]:,}"
+    )
+    if counts[Change.NO_DATA]:
+        text += f", nothing to compare in {counts[Change.NO_DATA]:,}"
+    ordered = [item for change in (Change.WORSE, Change.BETTER) for item in regression.changes if item.change is change]
+    return (text, *(f"{item.method}: {item.comparison.sentence}" for item in ordered))
+
+
+def regression_text(regression: Regression) -> str:
+    """Returns the comparison as plain text."""
+    table = changes_table(regression)
+    rows = [table.columns, *(tuple(cell.text for cell in row) for row in table.rows)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(table.columns))]
+    lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return "\n".join([*summary_sentences(regression), "", *lines, "", *table.notes]) + "\n"
+
+
+def regression_page(regression: Regression, before: str, after: str) -> str:
+    """Returns the comparison as a page that needs no other file.
+
+    Args:
+        regression: what changed.
+        before: database of the earlier experiment.
+        after: that of the later one.
+    """
+    figures = [figure for figure in (_figure(regression, True), _figure(regression, False)) if figure]
+    data = {
+        "before": regression.before.name,
+        "after": regression.after.name,
+        "confidence": regression.confidence,
+        "changes": [
+            {"method": item.method, "change": item.change.value, **asdict(item.comparison)}
+            for item in regression.changes
+        ],
+    }
+    return render_page(
+        "regression.html.jinja",
+        plain_json(data),
+        figures,
+        regression=regression,
+        sentences=summary_sentences(regression),
+        table=changes_table(regression),
+        figures=figures,
+        before=before,
+        after=after,
+        same_episodes=regression.before.digest == regression.after.digest,
+    )
+
+
+def _figure(regression: Regression, of_rates: bool) -> NamedFigure | None:
+    """Returns the changes of rates in points, or those of the other metrics in percent of the earlier value."""
+    bars = []
+    for item in regression.changes:
+        difference, before = item.comparison.difference, item.comparison.second_estimate
+        if (item.metric.kind is MetricKind.RATE) is not of_rates or difference is None or difference.interval is None:
+            continue
+        unit = 1.0 if of_rates else abs(before or 0.0)
+        if unit:
+            ends = (difference.interval.low, difference.value, difference.interval.high)
+            bars.append((item, tuple(100.0 * end / unit for end in ends)))
+    if not bars:
+        return None
+    what = "difference [points]" if of_rates else "change [% of the value before]"
+    figure = go.Figure(_markers(bars))
+    figure.add_vline(x=0.0, line={"color": MUTED, "width": 1})
+    styled(figure, height=130 + 30 * len(bars))
+    figure.update_layout(showlegend=False)
+    figure.update_xaxes(title_text=what)
+    figure.update_yaxes(range=[len(bars) - 0.5, -0.5], ticks="")
+    title = "Changes of rates" if of_rates else "Changes of other metrics"
+    summary = "After − before with its interval. Green: shown to be better; red: worse; grey: no difference shown."
+    return NamedFigure("rates" if of_rates else "values", title, summary, figure)
+
+
+def _markers(bars: Sequence[tuple[MetricChange, tuple[float, ...]]]) -> list[go.Scatter]:
+    names = unique_labels([f"{item.method}, {words(item.metric.name)}" for item, _ in bars], 56)
+    return [
+        go.Scatter(
+            x=[value], y=[name], mode="markers", marker={"color": COLORS[item.change], "size": 9},
+            error_x={
+                "type": "data", "symmetric": False, "array": [high - value], "arrayminus": [value - low],
+                "color": COLORS[item.change], "thickness": 1.6, "width": 5,
+            },
+            hovertemplate="%{y}: %{x:+.3g}<extra></extra>",
+        )
+        for name, (item, (low, value, high)) in zip(names, bars, strict=True)
+    ]  # fmt: skip

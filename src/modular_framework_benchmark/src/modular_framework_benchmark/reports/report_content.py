@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gathers all that a report says, before any of it is laid out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from modular_framework_benchmark.records.experiment import ExperimentDescription, Metric
+from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.reports.distribution_figures import distribution_figures
+from modular_framework_benchmark.reports.failure_groups import Failures, failures_figure, group_failures
+from modular_framework_benchmark.reports.figure_style import NamedFigure
+from modular_framework_benchmark.reports.run_record import (
+    RecordedValue,
+    SnapshotValues,
+    commands_to_repeat,
+    recorded_values,
+    warnings_of,
+)
+from modular_framework_benchmark.reports.span_tables import SpanSummary, choose_episodes, summarise_spans
+from modular_framework_benchmark.reports.success_figures import differences_figure, levels_figure, success_figure
+from modular_framework_benchmark.reports.time_figures import components_figure, progress_figure, timelines_figure
+from modular_framework_benchmark.statistics.analysis import analyse, summarise_by_level
+from modular_framework_benchmark.statistics.comparison import Analysis, MethodSummary
+from modular_framework_benchmark.statistics.observations import metrics_of
+
+SUCCESS = "success"
+COMPONENTS = ("task", "generation", "planning", "execution", "grasp")  # the order of a pick; a user's own follow
+
+
+@dataclass(frozen=True, slots=True)
+class ReportSource:
+    """Where a report's episodes come from and where it goes.
+
+    Attributes:
+        database: As the user named it.
+        database_folder: Folder that the episodes' folders are relative to.
+        report_folder: Folder of the report, which its links are relative to.
+        snapshots: What the episodes ran with: the different values of each name, each with its number of episodes.
+        span_totals: Sums of all spans, as `summarise_spans` takes them.
+        spans_of: Reads the spans of some episodes, by their numbers.
+    """
+
+    database: str
+    database_folder: Path
+    report_folder: Path
+    snapshots: SnapshotValues
+    span_totals: pd.DataFrame
+    spans_of: Callable[[Sequence[int]], pd.DataFrame]
+
+
+@dataclass(frozen=True, slots=True)
+class RunFacts:
+    """When and where the episodes ran.
+
+    Attributes:
+        begun: Start of the first episode [s since 1970]; None without episodes.
+        ended: End of the last [s since 1970]; None without episodes.
+        episode_s: Sum of the durations of the episodes [s].
+        workers: How many workers ran them.
+        seeds: How many different seeds they had.
+        trials: How many different trials they had.
+    """
+
+    begun: float | None
+    ended: float | None
+    episode_s: float
+    workers: int
+    seeds: int
+    trials: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReportContent:
+    """All that a report says.
+
+    Attributes:
+        description: What was run.
+        planned: How many episodes it has.
+        finished: How many are finished.
+        facts: When and where they ran.
+        analysis: The statistics.
+        metrics: The metrics, in the order of the components.
+        levels: Success of each method at each level of the other factors.
+        spans: What states and components took.
+        failures: What did not succeed, by cause.
+        figures: All figures.
+        recorded: Versions, machine, parameters.
+        warnings: What a reader must know first.
+        commands: How to run it again.
+    """
+
+    description: ExperimentDescription
+    planned: int
+    finished: int
+    facts: RunFacts
+    analysis: Analysis
+    metrics: tuple[Metric, ...]
+    levels: tuple[MethodSummary, ...]
+    spans: tuple[SpanSummary, ...]
+    failures: Failures
+    figures: tuple[NamedFigure, ...]
+    recorded: tuple[RecordedValue, ...]
+    warnings: tuple[str, ...]
+    commands: tuple[str, ...]
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Returns the components that have metrics."""
+        return tuple(dict.fromkeys(metric.component for metric in self.metrics))
+
+
+def gather(results: ExperimentResults, source: ReportSource) -> ReportContent:
+    """Returns the content of the report of an experiment."""
+    description = results.description
+    analysis = analyse(results)
+    levels = _success_by_level(results)
+    chosen = choose_episodes(results)
+    timelines = source.spans_of([item.number for item in chosen])
+    spans = summarise_spans(results, source.span_totals, timelines)
+    failures = group_failures(results, source.database_folder, source.report_folder)
+    recorded = recorded_values(source.snapshots)
+    metrics = tuple(sorted(metrics_of(results), key=_component_order))
+    methods = analysis.methods
+    figures = _comparison_figures(results, analysis) + _made(
+        components_figure(spans, methods),
+        levels_figure(levels, methods),
+        timelines_figure(chosen, timelines),
+        failures_figure(failures, methods),
+        progress_figure(results.episodes, results.planned),
+    )
+    return ReportContent(
+        description, results.planned, len(results.episodes), _run_facts(results), analysis, metrics, levels, spans,
+        failures, tuple(figures), recorded, warnings_of(results, recorded),
+        commands_to_repeat(results, recorded, source.database),
+    )  # fmt: skip
+
+
+def _component_order(metric: Metric) -> int:
+    return COMPONENTS.index(metric.component) if metric.component in COMPONENTS else len(COMPONENTS)
+
+
+def _success_by_level(results: ExperimentResults) -> tuple[MethodSummary, ...]:
+    description = results.description
+    others = [factor.name for factor in description.factors if factor.name != description.compared]
+    return tuple(item for name in others for item in summarise_by_level(results, name) if item.metric == SUCCESS)
+
+
+def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[NamedFigure]:
+    return _made(
+        success_figure([item for item in analysis.summaries if item.metric == SUCCESS]),
+        differences_figure([item for item in analysis.comparisons if item.metric == SUCCESS]),
+        *distribution_figures(results, analysis.methods),
+    )
+
+
+def _made(*figures: NamedFigure | None) -> list[NamedFigure]:
+    return [figure for figure in figures if figure is not None]
+
+
+def _run_facts(results: ExperimentResults) -> RunFacts:
+    episodes = results.episodes
+    if episodes.empty:
+        return RunFacts(None, None, 0.0, 0, 0, 0)
+    begun, wall = episodes["begun"].astype(float), episodes["wall_s"].astype(float)
+    ended = (begun + wall).max()
+    return RunFacts(
+        float(begun.min()) if math.isfinite(begun.min()) else None,
+        float(ended) if math.isfinite(ended) else None,
+        float(wall.sum()),
+        int(episodes["worker"].nunique()),
+        int(episodes["seed"].nunique()),
+        int(episodes["trial"].nunique()),
+    )
+
+
+def machine_readable(content: ReportContent) -> dict[str, Any]:
+    """Returns the claims of a report as JSON values: the page carries them, and they can be checked by a program."""
+    return plain_json(
+        {
+            "experiment": content.description.name,
+            "digest": content.description.digest,
+            "compared": content.description.compared,
+            "planned": content.planned,
+            "finished": content.finished,
+            "analysis": asdict(content.analysis),
+            "levels": [asdict(item) for item in content.levels],
+            "spans": [asdict(item) for item in content.spans],
+            "failures": asdict(content.failures),
+            "warnings": content.warnings,
+        }
+    )
+
+
+def plain_json(value: Any) -> Any:
+    """Returns a value as JSON holds it: no tuples, no enumerations, None for what is not finite."""
+    match value:
+        case Mapping():
+            return {str(key): plain_json(inner) for key, inner in value.items()}
+        case Enum():
+            return value.value
+        case list() | tuple():
+            return [plain_json(inner) for inner in value]
+        case float() if not math.isfinite(value):
+            return None
+        case _:
+            return value

@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The tables of a report, as texts in rows: the page, Markdown and LaTeX show the same ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from modular_framework_benchmark.records.experiment import Metric, MetricKind
+from modular_framework_benchmark.reports.figure_style import words
+from modular_framework_benchmark.reports.number_text import (
+    NONE,
+    count_text,
+    interval_text,
+    number_text,
+    p_value_text,
+    share_text,
+)
+from modular_framework_benchmark.reports.report_content import SUCCESS, ReportContent
+from modular_framework_benchmark.reports.success_figures import level_words
+from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, MethodSummary, Verdict
+
+NO_BREAK = "\u00a0"
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A cell of a table.
+
+    Attributes:
+        text: What it says.
+        is_strong: Whether it is a result that a reader looks for.
+        is_number: Whether it is aligned as a number.
+        mood: `better` or `worse` where a change is shown; "" otherwise.
+    """
+
+    text: str
+    is_strong: bool = False
+    is_number: bool = False
+    mood: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table.
+
+    Attributes:
+        name: Identifier, unique in a report.
+        caption: What it shows.
+        columns: Titles.
+        rows: Cells, as many in each row as there are columns; the first heads its row.
+        notes: What a reader must know beside it.
+    """
+
+    name: str
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+def overview_table(content: ReportContent) -> Table:
+    """Returns each metric of each method with its interval, and what is shown of their differences."""
+    methods = content.analysis.methods
+    found = {(item.metric, item.method): item for item in content.analysis.summaries}
+    rows = []
+    for metric in content.metrics:
+        of_metric = [item for item in content.analysis.comparisons if item.metric == metric.name]
+        best = _better_than_all(of_metric, methods)
+        estimates = [
+            Cell(estimate_text(_estimate(found.get((metric.name, method))), metric), method == best, True)
+            for method in methods
+        ]
+        rows.append((Cell(metric_title(metric)), *estimates, Cell(shown_text(of_metric))))
+    confidence = share_text(content.description.confidence, 0)
+    caption = (
+        "Each metric by method: rate, mean, or restricted mean of a metric with a limit, with its "
+        f"{confidence} interval. Bold: shown to be better than every other method."
+    )
+    return Table("overview", caption, ("metric", *methods, "what is shown"), tuple(rows), (content.analysis.rule,))
+
+
+def _better_than_all(comparisons: Sequence[Comparison], methods: Sequence[str]) -> str | None:
+    wins = {method: 0 for method in methods}
+    for item in comparisons:
+        if item.verdict is Verdict.FIRST_BETTER:
+            wins[item.first] += 1
+        elif item.verdict is Verdict.SECOND_BETTER:
+            wins[item.second] += 1
+    return next((method for method, count in wins.items() if len(methods) > 1 and count == len(methods) - 1), None)
+
+
+def metric_title(metric: Metric) -> str:
+    """Returns the name of a metric, with its unit and an arrow to the better values."""
+    arrow = "↑" if metric.better.value == "higher" else "↓"
+    unit = "%" if metric.kind is MetricKind.RATE else metric.unit
+    return f"{words(metric.name)}{f' [{unit}]' if unit else ''}{NO_BREAK}{arrow}"
+
+
+def _estimate(summary: MethodSummary | None) -> Estimate | None:
+    return summary.estimate if summary else None
+
+
+def estimate_text(estimate: Estimate | None, metric: Metric) -> str:
+    """Returns an estimate with its interval, a rate in percent; without the unit."""
+    if estimate is None:
+        return NONE
+    low, high = (None, None) if estimate.interval is None else (estimate.interval.low, estimate.interval.high)
+    if metric.kind is MetricKind.RATE:
+        if low is None or high is None:
+            return number_text(100.0 * estimate.value)
+        return interval_text(100.0 * estimate.value, 100.0 * low, 100.0 * high)
+    return interval_text(estimate.value, low, high)
+
+
+def shown_text(comparisons: Sequence[Comparison]) -> str:
+    """Returns what is shown of the differences between methods by one metric."""
+    shown = []
+    for item in comparisons:
+        match item.verdict:
+            case Verdict.FIRST_BETTER:
+                shown.append(f"{item.first} better than {item.second}")
+            case Verdict.SECOND_BETTER:
+                shown.append(f"{item.second} better than {item.first}")
+            case Verdict.NOT_SHOWN | Verdict.NO_DATA:
+                continue
+    if shown:
+        return "; ".join(shown)
+    return "no difference shown" if any(item.verdict is Verdict.NOT_SHOWN for item in comparisons) else NONE
+
+
+def method_table(content: ReportContent, component: str) -> Table:
+    """Returns the figures of each method by the metrics of a component."""
+    rows = []
+    for metric in content.metrics:
+        if metric.component != component:
+            continue
+        for item in content.analysis.summaries:
+            if item.metric == metric.name:
+                rows.append(_method_row(metric, item))
+    columns = (
+        "metric", "method", "estimate (interval)", "median (quartiles)", "interquartile mean", "counted",
+        "at the limit", "missing",
+    )  # fmt: skip
+    return Table(f"methods_{component}", f"Methods by the metrics of {words(component)}.", columns, tuple(rows))
+
+
+def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:
+    middle = NONE
+    if item.median is not None:
+        low, high = item.quartiles or (None, None)
+        middle = f"{number_text(item.median)} ({number_text(low)} to {number_text(high)})"
+    return (
+        Cell(metric_title(metric)),
+        Cell(item.method),
+        Cell(estimate_text(item.estimate, metric), is_number=True),
+        Cell(middle, is_number=True),
+        Cell(estimate_text(item.interquartile_mean, metric), is_number=True),
+        Cell(count_text(item.counts.counted), is_number=True),
+        Cell(count_text(item.counts.censored) if metric.limit is not None else NONE, is_number=True),
+        Cell(count_text(item.counts.missing), is_number=True),
+    )
+
+
+def comparison_table(content: ReportContent, component: str) -> Table:
+    """Returns each pair of methods by the metrics of a component."""
+    metrics = {metric.name: metric for metric in content.metrics if metric.component == component}
+    items = [item for item in content.analysis.comparisons if item.metric in metrics]
+    rows = tuple(_comparison_row(metrics[item.metric], item) for item in items)
+    columns = ("metric", "methods", "difference (interval)", "p corrected", "effect", "pairs", "result")
+    tests = dict.fromkeys(f"{item.test}; {item.correction}" for item in items if item.p_value is not None)
+    effects = dict.fromkeys(item.effect.name for item in items if item.effect)
+    intervals = dict.fromkeys(
+        item.difference.interval.method for item in items if item.difference and item.difference.interval
+    )
+    notes = [
+        f"{title}: {'; '.join(texts)}."
+        for title, texts in (("Tests", tests), ("Intervals", intervals), ("Effects", effects))
+        if texts
+    ]
+    notes += dict.fromkeys(
+        f"{words(item.metric)}, {item.first} and {item.second}: {note}" for item in items for note in item.notes
+    )
+    return Table(
+        f"comparisons_{component}",
+        f"Pairs of methods by the metrics of {words(component)}.",
+        columns,
+        rows,
+        tuple(notes),
+    )
+
+
+def _comparison_row(metric: Metric, item: Comparison) -> tuple[Cell, ...]:
+    match item.verdict:
+        case Verdict.FIRST_BETTER:
+            result = Cell(f"{item.first} better", True)
+        case Verdict.SECOND_BETTER:
+            result = Cell(f"{item.second} better", True)
+        case Verdict.NOT_SHOWN:
+            result = Cell("no difference shown" + (f"; {item.pairs_needed:,} pairs would" if item.pairs_needed else ""))
+        case Verdict.NO_DATA:
+            result = Cell("nothing to compare")
+    pairs = count_text(item.counts.pairs) if item.counts.pairs else "unpaired" if item.difference else NONE
+    return (
+        Cell(metric_title(metric).replace("[%]", "[points]")),
+        Cell(f"{item.first} − {item.second}"),
+        Cell(estimate_text(item.difference, metric), is_number=True),
+        Cell(p_value_text(item.p_corrected), is_number=True),
+        Cell(number_text(item.effect.value, 2) if item.effect else NONE, is_number=True),
+        Cell(pairs, is_number=True),
+        result,
+    )
+
+
+def missing_table(content: ReportContent) -> Table:
+    """Returns how many episodes of each method have no value of each metric, or count at its limit."""
+    rows = []
+    for metric in content.metrics:
+        for item in content.analysis.summaries:
+            if item.metric != metric.name:
+                continue
+            counts, limit = item.counts, metric.limit is not None
+            rows.append((
+                Cell(metric_title(metric)), Cell(item.method),
+                *(
+                    Cell(text, is_number=True)
+                    for text in (
+                        count_text(counts.episodes), count_text(counts.counted - counts.censored),
+                        count_text(counts.censored) if limit else NONE, count_text(counts.missing),
+                        share_text(counts.unmeasured_share) if counts.unmeasured_share is not None else NONE,
+                    )
+                ),
+            ))  # fmt: skip
+    columns = ("metric", "method", "episodes", "with a value", "at the limit", "missing", "without a value")
+    caption = "Values that are missing or censored: none is left out without being counted here."
+    return Table("missing", caption, columns, tuple(rows))
+
+
+def status_table(content: ReportContent) -> Table:
+    """Returns how the episodes of each method ended."""
+    items = [item for item in content.analysis.summaries if item.metric == SUCCESS]
+    rows = tuple(
+        (
+            Cell(item.method),
+            *(
+                Cell(count_text(count), is_number=True)
+                for count in (
+                    item.counts.episodes, item.counts.succeeded, item.counts.failed, item.counts.timed_out,
+                    item.counts.broken,
+                )
+            ),
+        )
+        for item in items
+    )  # fmt: skip
+    columns = ("method", "episodes", "succeeded", "failed", "timed out", "broken")
+    return Table("statuses", "How the finished episodes ended.", columns, rows)
+
+
+def levels_table(content: ReportContent) -> Table:
+    """Returns the success of each method at each level of the other factors."""
+    metric = next(item for item in content.metrics if item.name == SUCCESS)
+    rows = tuple(
+        (
+            Cell(level_words(item.levels)),
+            Cell(item.method),
+            Cell(estimate_text(item.estimate, metric), is_number=True),
+            Cell(count_text(item.counts.succeeded), is_number=True),
+            Cell(count_text(item.counts.counted), is_number=True),
+        )
+        for item in content.levels
+    )
+    columns = ("level", "method", "success [%] (interval)", "successes", "episodes")
+    return Table("levels", "Success of each method at each level of the other factors.", columns, rows)
+
+
+def spans_table(content: ReportContent, kind: str) -> Table:
+    """Returns what each state or component took.
+
+    Args:
+        content: of the report.
+        kind: `state` or `component`.
+    """
+    rows = tuple(
+        (
+            Cell(item.name),
+            Cell(item.method),
+            *(
+                Cell(text, is_number=True)
+                for text in (
+                    count_text(item.runs), count_text(item.failed), count_text(item.unended),
+                    number_text(item.mean_s), number_text(item.per_episode_s),
+                )
+            ),
+        )
+        for item in content.spans
+        if item.kind == kind
+    )  # fmt: skip
+    columns = (kind, "method", "runs", "failed", "never ended", "mean [s]", "mean per episode [s]")
+    return Table(f"spans_{kind}", f"What each {kind} took.", columns, rows)

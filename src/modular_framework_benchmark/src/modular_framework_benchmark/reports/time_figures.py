@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draws where time goes: by component and method, within single episodes, and over the run of the experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from modular_framework_benchmark.reports.figure_style import (
+    FAILED,
+    NamedFigure,
+    color_of,
+    dash_of,
+    label,
+    stacked_bars,
+    styled,
+    unique_labels,
+    words,
+)
+from modular_framework_benchmark.reports.number_text import number_text
+from modular_framework_benchmark.reports.span_tables import ChosenEpisode, SpanSummary
+
+MOST_STEPS = 300
+STATE_COLORS = (
+    "#8ecae6",
+    "#b7e4c7",
+    "#ffd6a5",
+    "#cdb4db",
+    "#f1c0b9",
+    "#d8e2a8",
+    "#a9bcd0",
+    "#e9d8a6",
+    "#bde0fe",
+    "#d6ccc2",
+)
+
+
+def components_figure(summaries: Sequence[SpanSummary], methods: Sequence[str]) -> NamedFigure | None:
+    """Returns stacked bars of the time that components take per episode; None when no component was recorded."""
+    components = [item for item in summaries if item.kind == "component"]
+    if not components:
+        return None
+    names = list(dict.fromkeys(item.name for item in components))
+    labels = unique_labels(methods)
+    found = {(item.name, item.method): item.per_episode_s for item in components}
+    figure = go.Figure(
+        [
+            go.Bar(
+                x=[found.get((name, method), 0.0) for method in methods], y=labels, orientation="h", width=0.5,
+                name=label(words(name)), marker={"color": STATE_COLORS[index % len(STATE_COLORS)]},
+                text=[f"{number_text(found.get((name, method), 0.0))} s" for method in methods],
+                textposition="inside", insidetextanchor="middle", textangle=0,
+                hovertemplate=f"{label(name)}: %{{x:.3g}} s<extra></extra>",
+            )
+            for index, name in enumerate(names)
+        ]
+    )  # fmt: skip
+    stacked_bars(figure, height=140 + 50 * len(methods), value_title="mean time per episode [s]")
+    summary = (
+        "Time that each component takes in an episode, mean over all episodes of the method: one in which a component "
+        "did not run counts as 0 s."
+    )
+    return NamedFigure("components", "Time by component", summary, figure)
+
+
+def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> NamedFigure | None:
+    """Returns the states and, below them, the components of some episodes over time; None without a state.
+
+    Args:
+        chosen: the episodes.
+        spans: their spans, in the order in which they started.
+    """
+    with_states = set(spans.loc[spans["kind"] == "state", "number"])
+    episodes = [item for item in chosen if item.number in with_states]
+    if not episodes:
+        return None
+    of_episode = {item.number: spans[spans["number"] == item.number] for item in episodes}
+    states = list(dict.fromkeys(name for rows in of_episode.values() for name in _leaves(rows)["name"]))
+    colors = {name: STATE_COLORS[index % len(STATE_COLORS)] for index, name in enumerate(states)}
+    figure = go.Figure()
+    shown: set[str] = set()
+    for row, item in enumerate(episodes):
+        for span in _leaves(of_episode[item.number]).to_dict("records"):
+            _add_span(figure, span, row - 0.12, 0.44, colors[span["name"]], str(span["name"]) not in shown)
+            shown.add(str(span["name"]))
+        for span in _components(of_episode[item.number]).to_dict("records"):
+            _add_span(figure, span, row + 0.24, 0.14, "#5f6c7b", False)
+    styled(figure, height=150 + 52 * len(episodes))
+    figure.update_layout(barmode="overlay", legend={"y": 1.02})
+    labels = [f"{label(item.method, 24)}<br>no. {item.number}, {words(item.status.value)}" for item in episodes]
+    figure.update_yaxes(
+        tickvals=list(range(len(episodes))),
+        ticktext=labels,
+        range=[len(episodes) - 0.5, -0.5],
+        ticks="",
+        showgrid=False,
+    )
+    figure.update_xaxes(title_text="time since the episode began [s]", rangemode="tozero")
+    summary = (
+        "States (wide bars) and components (narrow grey bars) of an episode. Red edges: failed; hatched: it never "
+        "ended. For each method a success of median length and the first failure of the most frequent cause."
+    )
+    return NamedFigure("timelines", "Timelines of single episodes", summary, figure)
+
+
+def _leaves(spans: pd.DataFrame) -> pd.DataFrame:
+    """Returns the states that contain no other state: a state is named by its path."""
+    states = spans[spans["kind"] == "state"]
+    paths = [str(name).rstrip("/") + "/" for name in states["name"]]
+    inner = [not any(other != path and other.startswith(path) for other in paths) for path in paths]
+    return states[np.array(inner, dtype=bool)]
+
+
+def _components(spans: pd.DataFrame) -> pd.DataFrame:
+    return spans[spans["kind"] == "component"]
+
+
+def _add_span(figure: go.Figure, span: dict[str, object], y: float, width: float, color: str, in_legend: bool) -> None:
+    started = float(str(span["started_s"]))
+    ended = span["ended_s"]
+    unended = ended is None or not np.isfinite(float(str(ended)))
+    length = 0.5 if unended else float(str(ended)) - started
+    failed = bool(span["failed"]) or unended
+    name, reason = label(str(span["name"]).strip("/")), label(str(span["reason"] or ""), 120)
+    end = "never ended" if unended else f"{number_text(length)} s"
+    figure.add_trace(
+        go.Bar(
+            x=[length], base=[started], y=[y], orientation="h", width=width, name=name, legendgroup=name,
+            showlegend=in_legend,
+            marker={
+                "color": color, "line": {"color": FAILED if failed else "white", "width": 2 if failed else 0.5},
+                "pattern": {"shape": "/" if unended else "", "fgcolor": FAILED},
+            },
+            hovertemplate=f"{name}: {end}" + (f"<br>{reason}" if reason else "") + "<extra></extra>",
+        )
+    )  # fmt: skip
+
+
+def progress_figure(episodes: pd.DataFrame, planned: int) -> NamedFigure | None:
+    """Returns how many episodes were finished when; None when no episode says when it began.
+
+    Args:
+        episodes: table of the episodes.
+        planned: number of episodes of the experiment.
+    """
+    ended = (episodes["begun"].astype(float) + episodes["wall_s"].astype(float)).dropna()
+    if ended.empty:
+        return None
+    order = ended.sort_values(kind="stable").to_numpy()
+    ranks = np.unique(np.linspace(0, order.size - 1, min(order.size, MOST_STEPS)).round().astype(np.intp))
+    begin = float(episodes["begun"].astype(float).min())
+    hours = (order[ranks] - begin) / 3600.0
+    unit, scale = ("h", 1.0) if hours[-1] >= 2.0 else ("min", 60.0)
+    figure = go.Figure(
+        go.Scatter(
+            x=np.concatenate(([0.0], hours * scale)), y=np.concatenate(([0], ranks + 1)), mode="lines",
+            line={"color": color_of(0), "dash": dash_of(0), "width": 2}, showlegend=False,
+            hovertemplate=f"%{{y:,}} finished after %{{x:.3g}} {unit}<extra></extra>",
+        )
+    )  # fmt: skip
+    figure.add_hline(y=planned, line={"color": "#5f6c7b", "dash": "dot", "width": 1})
+    styled(figure, height=260)
+    figure.update_xaxes(title_text=f"time since the first episode began [{unit}]", rangemode="tozero")
+    figure.update_yaxes(title_text="finished episodes", range=[0, 1.06 * planned], tickformat=",d")
+    return NamedFigure("progress", "Progress", "Finished episodes over time; dotted: how many are planned.", figure)

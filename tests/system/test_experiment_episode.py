@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An episode of an experiment: judged by the world, recorded, the same again on a stack that is kept, nothing left."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pandas as pd
+import pytest
+from ros_session import processes_with
+
+from modular_framework_benchmark.episodes.ros_task_runner import TaskEpisodeRunner
+from modular_framework_benchmark.metrics.registry import METRICS
+from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+
+MARK = "EPISODE_TEST"
+ENOUGH_S = 240.0
+PICK: dict[str, Any] = {
+    "arguments": {"world_file": "ur5_table.world"},
+    "objects": [{"name": "cube_1", "model": "cube", "x": 0.05, "y": 0.5, "z": 0.866, "yaw": 0.3}],
+    "success": {"lifted": 0.1, "hold_time": 1.0, "shake": 2.0},
+    "metrics": list(METRICS),
+    "time_limit": ENOUGH_S,
+}
+
+
+@pytest.fixture
+def runner(monkeypatch: pytest.MonkeyPatch) -> Iterator[TaskEpisodeRunner]:
+    """A runner that leaves no process when it is closed."""
+    mark = uuid.uuid4().hex
+    monkeypatch.setenv(MARK, mark)
+    made = TaskEpisodeRunner()
+    try:
+        yield made
+    finally:
+        made.close()
+        assert processes_with(MARK, mark) == []
+
+
+def run(runner: TaskEpisodeRunner, folder: Path, settings: dict[str, Any]) -> EpisodeRecord:
+    folder.mkdir()
+    return runner.run(EpisodeSpec(0, {"object": "cube"}, 0, 7, settings), folder)
+
+
+def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_stack_that_is_kept(
+    runner: TaskEpisodeRunner, tmp_path: Path
+) -> None:
+    cold = run(runner, tmp_path / "cold", PICK | {"record": {"bag": True, "video": True}})
+    warm = run(runner, tmp_path / "warm", PICK)
+    assert cold.status is EpisodeStatus.SUCCEEDED, f"{cold.cause}\n{(tmp_path / 'cold/log.txt').read_text()}"
+    assert cold.outcome == "successful_pipeline" and cold.simulated_s is not None
+    wanted = {"success", "task_time", "generation_time", "planning_time", "path_length", "tracking_error", "slip"}
+    assert {name: cold.metrics[name] for name in wanted if cold.metrics[name] is None} == {}
+    assert (cold.metrics["lift"] or 0.0) > 0.1 and cold.metrics["hold_time"] == pytest.approx(2.0)
+    assert {"start", "begin", "task", "check", "stop"} <= {span.name for span in cold.spans if span.kind == "episode"}
+    assert {span.name for span in cold.spans if span.kind == "component"} == {
+        *("generation", "planning", "execution", "grasp")
+    }
+    assert any(span.name == "MoveLift" for span in cold.spans if span.kind == "state")
+    assert cold.snapshot["seed"] == 7 and cold.snapshot["packages"]["ompl"] and cold.snapshot["machine"]["cores"]
+
+    assert (tmp_path / "cold/episode.bag").read_bytes().startswith(b"#ROSBAG V2.0\n")
+    assert b"topic=/joint_states" in (tmp_path / "cold/episode.bag").read_bytes()
+    with av.open(str(tmp_path / "cold/video.mp4")) as video:
+        images = [frame.to_ndarray(format="gray").astype(int) for frame in video.decode(video=0)]
+    assert len(images) == pytest.approx(10 * cold.simulated_s, abs=2), cold.snapshot.get("video_fault")
+    assert np.abs(images[-1] - images[0]).max() > 50  # the arm has moved
+
+    assert warm.status is EpisodeStatus.SUCCEEDED, f"{warm.cause}\n{(tmp_path / 'warm/log.txt').read_text()}"
+    assert warm.snapshot["final_objects"] == cold.snapshot["final_objects"]
+    motions = [pd.read_parquet(tmp_path / name / "trajectory.parquet") for name in ("cold", "warm")]
+    pd.testing.assert_frame_equal(*motions, check_exact=True)
+
+
+def test_a_launch_that_dies_is_an_episode_with_its_cause_at_once(runner: TaskEpisodeRunner, tmp_path: Path) -> None:
+    begun = time.monotonic()
+    record = run(runner, tmp_path / "dead", PICK | {"arguments": {"world_file": "no.world"}})
+    assert record.status is EpisodeStatus.BROKEN
+    assert "node 'gazebo' died (exited with 1)" in record.cause and "no.world: cannot be read" in record.cause
+    assert time.monotonic() - begun < ENOUGH_S
+    assert "no.world" in (tmp_path / "dead/log.txt").read_text()
+
+
+def test_a_setting_that_is_wrong_is_named_and_nothing_is_launched(runner: TaskEpisodeRunner, tmp_path: Path) -> None:
+    record = run(runner, tmp_path / "wrong", PICK | {"arguments": {"world_fil": "ur5_table.world"}})
+    assert record.status is EpisodeStatus.BROKEN
+    assert "unknown argument 'world_fil'; did you mean 'world_file'" in record.cause
+    assert not any((tmp_path / "wrong").iterdir())

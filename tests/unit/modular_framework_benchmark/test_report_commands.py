@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables and figures for a paper, and two runs of an experiment compared, by the commands a user types."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from report_pages import Loads, Page
+from reported_experiment import ReportedExperiment
+
+from modular_framework_benchmark.commands.compare_command import main as compare
+from modular_framework_benchmark.commands.report_command import main as report
+
+RUN = ReportedExperiment(trials=40, with_files=False, with_spans=False)
+SMALL = replace(RUN, trials=4)
+WORSE = (("rrt_connect", 0.45, 0.4), *RUN.planners[1:])
+
+
+def stored(folder: Path, name: str, experiment: ReportedExperiment = SMALL) -> str:
+    return str(experiment.store(folder / name))
+
+
+def test_the_markdown_table_has_the_cells_of_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = stored(tmp_path, "results.db")
+    assert report([path, "--table", "markdown"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
+    cells = [[cell.strip().replace("\\", "").strip("*") for cell in line.strip("|").split("|")] for line in lines]
+    assert cells[0][1:4] == ["rrt_connect", "bitstar", "stomp"]
+    shown = Page.of(Path(path), tmp_path / "report.html").rows("overview")
+    assert [row[1:4] for row in cells[2:]] == [row[1:4] for row in shown]
+
+
+def test_the_latex_table_escapes_names_and_is_complete(tmp_path: Path) -> None:
+    planners = (("a_b & c", 0.9, 0.4), ("50% #1 ~{x}^2\\", 0.8, 0.4))
+    path = stored(tmp_path, "results.db", replace(SMALL, planners=planners))
+    assert report([path, "--table", "latex", "--into", str(tmp_path / "table.tex")]) == 0
+    text = (tmp_path / "table.tex").read_text()
+    body = text[text.index("\\midrule") : text.index("\\bottomrule")]
+    rows = [line for line in body.splitlines() if line.rstrip().endswith("\\\\")]
+    assert len(rows) == 7
+    assert {len(re.findall(r"(?<!\\)&", row)) for row in rows} == {3}
+    head = next(line for line in text.splitlines() if "metric" in line and "&" in line)
+    assert r"a\_b \& c" in head and r"50\% \#1" in head
+    assert not re.search(r"(?<!\\)[#%_]", head)
+    assert text.count("\\begin{") == text.count("\\end{")
+
+
+def test_figures_are_listed_and_written_as_png_and_pdf(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = stored(tmp_path, "results.db")
+    assert report([path, "--figure", "list"]) == 0
+    names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert {"success", "differences", "distribution_path_length"} <= set(names)
+    for name, ending, first in (("success", ".png", b"\x89PNG"), ("distribution_path_length", ".pdf", b"%PDF")):
+        into = tmp_path / f"image{ending}"
+        assert report([path, "--figure", name + ending, "--into", str(into)]) == 0
+        assert into.read_bytes().startswith(first)
+        assert into.stat().st_size > 5_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--figure", "sucess"), "success, differences"),
+        (("--figure", "success.svg"), "png, pdf"),
+        (("--figure", "success", "--table", "latex"), "give one of them"),
+    ],
+)
+def test_what_cannot_be_drawn_is_named_with_what_can(
+    arguments: tuple[str, ...], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert report([stored(tmp_path, "results.db"), *arguments]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_without_a_browser_the_error_says_what_to_install(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BROWSER_PATH", str(tmp_path / "absent"))
+    assert report([stored(tmp_path, "results.db"), "--figure", "success"]) == 2
+    assert "apt-get install chromium" in capsys.readouterr().err
+
+
+def test_the_same_episodes_show_no_change_and_are_all_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    paths = [stored(tmp_path, name) for name in ("before.db", "after.db")]
+    assert compare([*paths, "--fail-on-regression"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("0 metrics of methods got worse, 0 better")
+    assert "24 pairs of episodes" in said
+
+
+def test_a_planner_that_got_worse_is_found_and_fails_the_comparison(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = stored(tmp_path, "before.db", RUN)
+    after = stored(tmp_path, "after.db", replace(RUN, planners=WORSE))
+    page = tmp_path / "changes.html"
+    assert compare([before, after, "--fail-on-regression", "--into", str(page)]) == 1
+    said = capsys.readouterr().out
+    worse = [line.split() for line in said.splitlines() if line.endswith("worse")]
+    assert ["rrt_connect", "success"] in [line[:2] for line in worse]
+    assert all(line[0] == "rrt_connect" for line in worse)
+    text = page.read_text()
+    loads = Loads()
+    loads.feed(text)
+    assert loads.addresses == []
+    assert "rrt_connect" in text and "worse" in text
+    assert compare([after, before, "--fail-on-regression"]) == 0  # the other way round it got better
+    assert not re.match(r"\d+ metrics of methods got worse, 0 better", capsys.readouterr().out)
+
+
+def test_two_experiments_of_one_database_are_compared_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = stored(tmp_path, "results.db", replace(SMALL, name="monday"))
+    stored(tmp_path, "results.db", replace(SMALL, name="tuesday"))
+    assert compare([path, "--experiment", "monday", "--with", "tuesday"]) == 0
+    assert "24 pairs of episodes" in capsys.readouterr().out
+    assert compare([path, "--experiment", "monday"]) == 2
+    assert "--with NAME" in capsys.readouterr().err
+
+
+def test_experiments_without_a_common_method_are_not_compared(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = stored(tmp_path, "before.db")
+    after = stored(tmp_path, "after.db", replace(SMALL, planners=(("chomp", 0.5, 1.0), ("prm", 0.5, 1.0))))
+    assert compare([before, after]) == 2
+    assert "no method is in both experiments" in capsys.readouterr().err

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page of a report says what was found and what was run, needs no network, and shows hostile texts as texts."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+import urllib.parse
+import urllib.request
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from lxml import html
+from report_pages import Loads, Page, drawn_page
+from reported_experiment import TEXT, ReportedExperiment
+
+from modular_framework_benchmark.commands.report_command import main
+
+HOSTILE = (
+    "<script>document.documentElement.dataset.hacked = 1</script>",
+    '</script><img src=x onerror="document.documentElement.dataset.hacked = 2">',
+    "' onmouseover='alert(3)' \u2028 <!-- {{ 7 * 7 }} {% raw %} %{x} <b>bold</b> &amp; $\\frac12$",
+    "line one\nline two\ttab \x07 bell",
+)
+SMALL = ReportedExperiment(trials=14)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Page:
+    """The page of an experiment, which lies beside the folder of the database."""
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "data").mkdir()
+    (folder / "pages").mkdir()
+    return Page.of(SMALL.store(folder / "data" / "results.db"), folder / "pages" / "report.html")
+
+
+@pytest.fixture(scope="module")
+def hostile(tmp_path_factory: pytest.TempPathFactory) -> Page:
+    """The page of an experiment whose causes and methods are hostile."""
+    folder = tmp_path_factory.mktemp("hostile")
+    planners = tuple(
+        (f"{name} & co", chance, time_s) for name, chance, time_s in (("<b>a</b>", 0.5, 1.0), ("b\"'>", 0.6, 1.0))
+    )
+    experiment = ReportedExperiment(trials=14, planners=planners, objects=("<i>can</i>",), causes=HOSTILE)
+    return Page.of(experiment.store(folder / "results.db"), folder / "report.html")
+
+
+def test_the_plain_sentences_of_success_come_first(page: Page) -> None:
+    answer = page.tree.xpath("//section[@class='answer']/p")
+    first = page.claims["analysis"]["comparisons"][0]["sentence"].lower()
+    assert any(first in paragraph.text_content().lower() for paragraph in answer)
+    assert page.words.index("succe") < page.words.index("Each metric by method")
+
+
+def test_it_says_how_many_of_the_planned_episodes_are_finished(page: Page) -> None:
+    assert "84 of 84 episodes finished" in page.words
+
+
+def test_the_overview_has_each_metric_of_each_method_with_its_interval(page: Page) -> None:
+    rows = page.rows("overview")
+    assert [row[0].split("\u00a0")[0].partition(" [")[0] for row in rows] == [
+        "success", "task time", "candidates", "planning time", "path length", "tracking error", "slip",
+    ]  # fmt: skip
+    assert all(re.fullmatch(r"−?[\d.]+ \(−?[\d.]+ to −?[\d.]+\)", cell) for row in rows for cell in row[1:4])
+
+
+def test_missing_and_censored_values_are_counted_for_each_method(page: Page) -> None:
+    rows = page.rows("missing")
+    assert len(rows) == 7 * 3
+    times = rows[3][1:]
+    assert times[0] == "rrt_connect"
+    assert int(times[2]) + int(times[3]) == 28
+    assert times[4] == "0"
+
+
+def test_the_experiment_file_stands_there_verbatim_and_can_be_saved(page: Page) -> None:
+    assert TEXT in [element.text_content() for element in page.tree.xpath("//pre")]
+    link = page.tree.xpath("//a[@download]")[0]
+    assert urllib.request.urlopen(link.get("href")).read().decode() == TEXT  # a data address: nothing is fetched
+
+
+def test_it_says_versions_machine_and_how_to_run_it_again(page: Page) -> None:
+    for text in ("0f3c9d2", "lab-pc", "versions.ompl", "run_experiment planners_on_two_objects.yaml"):
+        assert text in page.words
+
+
+def test_each_failure_is_linked_to_its_files_relative_to_the_page(page: Page) -> None:
+    links = page.tree.xpath("//details//td/a")
+    assert {link.text_content().split()[0] for link in links} == {"folder", "log", "video"}
+    for link in links:
+        assert (page.path.parent / urllib.parse.unquote(link.get("href"))).exists()
+
+
+def test_failures_are_grouped_by_cause_most_frequent_first(page: Page) -> None:
+    groups = page.claims["failures"]["groups"]
+    assert [group["episodes"] for group in groups] == sorted((group["episodes"] for group in groups), reverse=True)
+    assert sum(group["episodes"] for group in groups) == page.claims["failures"]["episodes"]
+    assert all(group["cause"] in page.words for group in groups)
+
+
+def test_a_broken_episode_is_named_before_the_figures(tmp_path: Path) -> None:
+    page = Page.of(ReportedExperiment(trials=40, seed=7).store(tmp_path / "results.db"), tmp_path / "report.html")
+    warning = page.tree.xpath("//section[@class='warning']")[0].text_content()
+    broken = [number for number in re.findall(r"number ([\d, ]+)", warning)[0].split(", ")]
+    assert len(broken) == sum(item["counts"]["broken"] for item in page.claims["analysis"]["summaries"][:3]) > 0
+
+
+@pytest.mark.parametrize("which", ["page", "hostile"])
+def test_nothing_is_loaded_from_a_network(which: str, request: pytest.FixtureRequest) -> None:
+    page: Page = request.getfixturevalue(which)
+    loads = Loads()
+    loads.feed(page.text)
+    assert loads.addresses == []
+    assert not re.search(r"@import|url\s*\(", page.tree.xpath("//style")[0].text_content())
+    policy = page.tree.xpath("//meta[@http-equiv='Content-Security-Policy']")[0].get("content")
+    assert policy.startswith("default-src 'none'")
+    assert not re.search(r"https?:", policy)
+
+
+def test_hostile_texts_are_shown_as_texts(hostile: Page) -> None:
+    causes = [element.text_content() for element in hostile.tree.xpath("//td[@class='cause']")]
+    for text in HOSTILE[:3]:
+        assert text in causes
+    assert [element.tag for element in hostile.tree.xpath("//img | //b | //*[@onmouseover] | //*[@onerror]")] == []
+    assert "<b>a</b> & co" in hostile.words
+    assert len(hostile.tree.xpath("//script")) == 4
+
+
+def test_hostile_texts_in_figures_are_escaped_for_plotly(hostile: Page) -> None:
+    drawn = "".join(value for value in _strings(hostile.figures()) if "co" in value or "script" in value)
+    assert "&lt;b&gt;a&lt;/b&gt; &amp; co" in drawn
+    assert not re.search(r"<(?!br>|extra>|/extra>)", drawn)
+
+
+def _strings(value: object) -> list[str]:
+    if isinstance(value, dict):
+        return [text for inner in value.values() for text in _strings(inner)]
+    if isinstance(value, list):
+        return [text for inner in value for text in _strings(inner)]
+    return [value] if isinstance(value, str) else []
+
+
+def test_a_browser_draws_every_figure_without_a_network_and_runs_no_hostile_script(
+    hostile: Page, tmp_path: Path
+) -> None:
+    drawn = html.document_fromstring(drawn_page(hostile.path, tmp_path))
+    places = drawn.xpath("//*[@data-figure]")
+    assert drawn.get("data-drawn") == str(len(places)) != "0"
+    assert all(place.xpath(".//*[local-name()='svg']//*[local-name()='path']") for place in places)
+    assert drawn.get("data-hacked") is None
+
+
+def test_a_path_out_of_the_folder_of_the_database_is_no_link(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "secret_files").mkdir()
+    experiment = ReportedExperiment(trials=4, with_files=False)
+    path = experiment.store(tmp_path / "data" / "results.db")
+    connection = sqlite3.connect(path)
+    connection.execute("UPDATE records SET folder = '../secret_files'")
+    connection.commit()
+    connection.close()
+    assert "secret_files" not in Page.of(path, tmp_path / "report.html").text
+
+
+def test_an_experiment_without_a_finished_episode_has_a_page_that_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "results.db"
+    ReportedExperiment(trials=4, finished=0).store(path)
+    page = Page.of(path, tmp_path / "report.html")
+    assert "0 of 24 planned episodes are finished" in page.words
+
+
+def test_an_unfinished_experiment_says_so(tmp_path: Path) -> None:
+    path = ReportedExperiment(trials=4, finished=10).store(tmp_path / "results.db")
+    assert "10 of 24 planned episodes are finished" in Page.of(path, tmp_path / "report.html").words
+
+
+def test_one_method_alone_is_reported(tmp_path: Path) -> None:
+    experiment = replace(SMALL, trials=4, planners=(("only", 0.5, 1.0),), with_spans=False)
+    page = Page.of(experiment.store(tmp_path / "results.db"), tmp_path / "report.html")
+    assert len(page.rows("overview")) == 7
+
+
+def test_components_without_a_task_have_times_but_no_timeline(tmp_path: Path) -> None:
+    path = replace(SMALL, trials=4).store(tmp_path / "results.db")
+    with sqlite3.connect(path) as connection:
+        connection.execute("DELETE FROM spans WHERE kind = 'state'")
+    page = Page.of(path, tmp_path / "report.html")
+    assert {row[0] for row in page.rows("spans_component")} >= {"planning"}
+    assert "components" in page.figures() and "timelines" not in page.figures()
+
+
+@pytest.mark.parametrize(("planning_s", "limit", "lines"), [(4.0, "5 s, dotted", 2), (0.2, "5 s", 0)])
+def test_a_limit_is_drawn_unless_it_is_so_far_off_that_it_squeezes_the_values(
+    planning_s: float, limit: str, lines: int, tmp_path: Path
+) -> None:
+    experiment = replace(SMALL, trials=4, planners=(("one", 0.9, planning_s), ("other", 0.9, planning_s)))
+    page = Page.of(experiment.store(tmp_path / "results.db"), tmp_path / "report.html")
+    assert len(page.figures()["distribution_planning_time"]["layout"].get("shapes", ())) == lines
+    assert f"Episodes at the limit ({limit})" in page.words
+
+
+def test_several_experiments_need_a_name_and_a_wrong_name_gets_the_right_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "results.db"
+    for name in ("first", "second"):
+        ReportedExperiment(trials=2, name=name, with_files=False).store(path)
+    assert main([str(path)]) == 2
+    assert "first, second; name one with --experiment" in capsys.readouterr().err
+    assert main([str(path), "--experiment", "secnd"]) == 2
+    assert "second" in capsys.readouterr().err
+    assert main([str(path), "--experiment", "second", "--into", str(tmp_path / "page.html")]) == 0
+
+
+def test_a_page_that_cannot_be_written_is_an_error_that_names_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = ReportedExperiment(trials=2, with_files=False).store(tmp_path / "results.db")
+    assert main([str(path), "--into", str(tmp_path / "absent" / "page.html")]) == 2
+    assert "absent/page.html" in capsys.readouterr().err

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The statistics of an experiment as a user reads them: verdicts, sentences, what is said beside them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from statistics_results import LENGTH, TIME, outcomes, results_of
+
+from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
+from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.statistics.analysis import (
+    analyse,
+    compare,
+    compare_by_level,
+    summarise,
+    summarise_by_level,
+)
+from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
+
+COLLISION = Metric("collision", "execution", MetricKind.RATE, Direction.LOWER)
+CLEARANCE = Metric("clearance", "planning", MetricKind.VALUE, Direction.HIGHER, "m")
+
+
+def successes(first: Sequence[int], second: Sequence[int], **settings: object) -> ExperimentResults:
+    return results_of({"A": outcomes(first), "B": outcomes(second)}, **settings)  # type: ignore[arg-type]
+
+
+def pairs(both: int, only_first: int, only_second: int, none: int, **settings: object) -> ExperimentResults:
+    """Returns results with a number of pairs of each kind."""
+    first = [1] * (both + only_first) + [0] * (only_second + none)
+    second = [1] * both + [0] * only_first + [1] * only_second + [0] * none
+    return successes(first, second, **settings)
+
+
+def of_values(metric: Metric, first: Sequence[float], second: Sequence[float]) -> Comparison:
+    statuses = {"A": ["succeeded"] * len(first), "B": ["succeeded"] * len(second)}
+    return compare(results_of(statuses, (metric,), {metric.name: {"A": first, "B": second}}))[1]
+
+
+def test_a_difference_that_is_shown_is_a_plain_sentence() -> None:
+    (found,) = compare(pairs(120, 40, 16, 24))
+    assert found.sentence == "A succeeds more often than B (+12 points, 95 % interval 5 to 19, 200 paired episodes)"
+    assert found.verdict is Verdict.FIRST_BETTER
+    assert found.p_value == pytest.approx(2 * sum(math.comb(56, n) for n in range(17)) / 2**56)
+    assert found.test == "McNemar's exact test"
+    assert found.improvement == pytest.approx((160 - 16 + 40 - 0) / 2 / 200 + 0.1)
+
+
+def test_the_better_method_comes_first_and_its_difference_has_its_sign() -> None:
+    (found,) = compare(pairs(120, 16, 40, 24))
+    assert found.sentence == "B succeeds more often than A (+12 points, 95 % interval 5 to 19, 200 paired episodes)"
+    assert found.verdict is Verdict.SECOND_BETTER
+    assert found.difference is not None
+    assert found.difference.value == pytest.approx(-0.12)
+
+
+def test_a_difference_that_is_not_shown_says_how_many_pairs_would_show_5_points() -> None:
+    (found,) = compare(pairs(40, 6, 5, 9))
+    assert found.sentence.startswith(
+        "no difference in success shown between A and B (+2 points, 95 % interval -10 to 14"
+    )
+    assert found.sentence.endswith(f"; {found.pairs_needed} paired episodes would show 5 points")
+    assert found.pairs_needed is not None
+    assert found.pairs_needed > 60
+
+
+def test_a_shorter_time_and_a_higher_clearance_are_better() -> None:
+    shorter = of_values(dataclasses.replace(TIME, name="planning_time", limit=None), [1.0, 1.1] * 10, [2.0, 2.2] * 10)
+    assert shorter.verdict is Verdict.FIRST_BETTER
+    assert shorter.sentence.startswith("A has a shorter planning time than B (-1.050 s, 95 % interval -1.0")
+    assert shorter.sentence.endswith(", 20 paired episodes)")
+    higher = of_values(CLEARANCE, [0.10, 0.11] * 10, [0.2, 0.22] * 10)
+    assert higher.verdict is Verdict.SECOND_BETTER
+    assert higher.sentence.startswith("B has a higher clearance than A (+0.1050 m")
+
+
+def test_a_lower_rate_of_collisions_is_better() -> None:
+    results = results_of(
+        {"A": ["succeeded"] * 30, "B": ["succeeded"] * 30}, (COLLISION,),
+        {"collision": {"A": [0.0] * 30, "B": [1.0] * 15 + [0.0] * 15}},
+    )  # fmt: skip
+    assert compare(results)[1].sentence.startswith("A has a lower rate of collision than B (-50 points")
+
+
+def test_failed_episodes_count_at_the_limit_of_a_time_and_are_told() -> None:
+    statuses = {"A": ["succeeded"] * 15 + ["failed"] * 5, "B": ["succeeded"] * 18 + ["timed_out"] * 2}
+    values = {"task_time": {"A": [3.0] * 20, "B": [10.0] * 18 + [np.nan] * 2}}
+    results = results_of(statuses, (TIME,), values)
+    summary = next(each for each in summarise(results) if (each.method, each.metric) == ("A", "task_time"))
+    assert summary.estimate is not None
+    assert summary.estimate.name == "restricted mean"
+    assert summary.estimate.value == pytest.approx((15 * 3 + 5 * 60) / 20)
+    assert summary.sentence.endswith("20 episodes, 5 at the limit of 60 s)")
+    assert "7 of 40 episodes count at the limit of 60 s" in compare(results)[1].notes
+
+
+def test_a_component_that_did_its_work_keeps_its_time_in_a_task_that_failed_later() -> None:
+    planning = dataclasses.replace(TIME, name="planning_time", component="planning")
+    statuses = {"A": ["failed"] * 2, "B": ["succeeded"] * 2}
+    values = {"planning_time": {"A": [1.0, np.nan], "B": [1.0, 80.0]}}
+    results = results_of(statuses, (planning,), values)
+    found = {each.method: each for each in summarise(results) if each.metric == "planning_time"}
+    assert found["A"].estimate.value == pytest.approx(30.5)  # type: ignore[union-attr]
+    assert found["B"].estimate.value == pytest.approx(30.5)  # type: ignore[union-attr]
+    alone = dataclasses.replace(results, description=dataclasses.replace(results.description, mode="planning"))
+    found = {each.method: each for each in summarise(alone) if each.metric == "planning_time"}
+    assert found["A"].estimate.value == pytest.approx(60.0)  # type: ignore[union-attr]
+
+
+def test_a_time_that_nothing_measured_is_missing_and_not_at_its_limit() -> None:
+    search = dataclasses.replace(TIME, name="search_time", component="planning")
+    statuses = {"A": ["succeeded", "failed"], "B": ["succeeded"] * 2}
+    unmeasured = results_of(statuses, (search,), {"search_time": {"A": [np.nan] * 2, "B": [np.nan] * 2}})
+    found = next(each for each in summarise(unmeasured) if each.metric == "search_time")
+    assert found.estimate is None and found.counts.censored == 0 and found.counts.missing == 2
+    in_part = results_of(statuses, (search,), {"search_time": {"A": [np.nan] * 2, "B": [1.0, np.nan]}})
+    found = next(each for each in summarise(in_part) if (each.method, each.metric) == ("A", "search_time"))
+    assert found.counts.censored == 1 and found.counts.missing == 1  # the failure, and the success without a value
+
+
+def test_missing_values_are_left_out_and_counted() -> None:
+    found = of_values(LENGTH, [1.0, 2.0, np.nan, 4.0], [2.0, np.nan, np.nan, 5.0])
+    assert (found.counts.pairs, found.counts.missing) == (2, 2)
+    assert "2 pairs left out because an episode has no value" in found.notes
+
+
+def test_broken_episodes_count_as_failures_and_what_they_decide_is_told() -> None:
+    statuses = {"A": ["succeeded"] * 20, "B": ["succeeded"] * 12 + ["broken"] * 8}
+    (found,) = compare(results_of(statuses))
+    assert found.verdict is Verdict.FIRST_BETTER
+    assert found.verdict_without_broken is Verdict.NOT_SHOWN
+    assert found.notes == (
+        "8 broken episodes counted as failures; without their pairs that is not so "
+        "(0 points, 95 % interval -24 to 24, 12 paired episodes)",
+    )
+    of_b = next(each for each in summarise(results_of(statuses)) if each.method == "B")
+    assert of_b.counts.broken == 8
+    assert of_b.estimate is not None
+    assert of_b.without_broken is not None
+    assert (of_b.estimate.value, of_b.without_broken.value) == (0.6, 1.0)
+
+
+def test_pairs_of_a_seed_count_as_one() -> None:
+    # In each of 5 seeds the three objects have the same outcome: 15 pairs for A that are worth 5.
+    first, second = np.ones(30, dtype=int), np.repeat([0, 1], 15)
+    apart = successes(first.tolist(), second.tolist(), objects=("can", "box", "cup"))
+    shared = successes(first.tolist(), second.tolist(), objects=("can", "box", "cup"), seed_per_pair=False)
+    assert compare(apart)[0].verdict is Verdict.FIRST_BETTER
+    found = compare(shared)[0]
+    assert (found.counts.pairs, found.counts.units) == (30, 10)
+    assert found.p_value == pytest.approx(2 / 2**5)
+    assert found.verdict is Verdict.NOT_SHOWN
+    assert "30 paired episodes of 10 seeds" in found.sentence
+    assert any("pairs of a seed count as one" in note for note in found.notes)
+
+
+def test_each_level_of_another_factor_has_its_own_comparison_and_summary() -> None:
+    first, second = [1, 1] * 20, [0, 1] * 20
+    results = successes(first, second, objects=("can", "box"))
+    can, box = compare_by_level(results, "object")
+    assert can.sentence.startswith("object=can: A succeeds more often than B (+100 points")
+    assert (can.levels, can.counts.pairs) == ("object=can", 20)
+    assert box.verdict is Verdict.NOT_SHOWN
+    assert can.notes == ()
+    assert [each.levels for each in summarise_by_level(results, "object")] == ["object=can"] * 2 + ["object=box"] * 2
+
+
+def test_methods_without_a_common_trial_are_compared_unpaired() -> None:
+    results = successes([1] * 40, [0] * 20 + [1] * 20)
+    results.episodes.loc[results.episodes["method"] == "B", "trial"] += 1000
+    (found,) = compare(results)
+    assert found.test == "Barnard's exact test"
+    assert found.counts.pairs == 0
+    assert found.sentence == (
+        "A succeeds more often than B (+50 points, 95 % interval 33 to 65, 40 and 40 unpaired episodes)"
+    )
+
+
+def test_a_partner_that_is_not_finished_is_told() -> None:
+    results = successes([1, 1, 1, 0], [1, 1, 0, 0], planned=10)
+    shorter = dataclasses.replace(results, episodes=results.episodes.iloc[:-1])
+    (found,) = compare(shorter)
+    assert found.counts.pairs == 3
+    assert "1 episode without a partner" in found.notes
+    assert found.notes[-1] == "unfinished: 7 of 10 episodes; the error rate holds for a look at the end only"
+
+
+def test_many_comparisons_are_corrected_together() -> None:
+    results = results_of({name: outcomes([1] * 12 + [int(name == "A")] * 7) for name in "ABCD"})
+    found = {(each.first, each.second): each for each in compare(results)}
+    assert found["A", "B"].p_value == pytest.approx(2 / 2**7)
+    assert found["A", "B"].p_corrected == pytest.approx(6 * 2 / 2**7)
+    assert found["A", "B"].verdict is Verdict.NOT_SHOWN
+    assert "between A and B, corrected for all comparisons (+37 points" in found["A", "B"].sentence
+    assert found["A", "B"].notes == (
+        "the interval leaves out 0, but the corrected test does not show a difference (p = 0.094)",
+    )
+
+
+def test_with_other_metrics_success_has_half_of_the_error_rate() -> None:
+    statuses = {"A": ["succeeded"] * 20, "B": ["failed"] * 6 + ["succeeded"] * 14}
+    values = {"path_length": {"A": [1.0] * 20, "B": [1.0] * 20}}
+    assert compare(results_of(statuses))[0].verdict is Verdict.FIRST_BETTER
+    found = compare(results_of(statuses, (LENGTH,), values))[0]
+    assert found.p_corrected == pytest.approx(2 * 2 / 2**6)
+    assert found.verdict is Verdict.NOT_SHOWN
+
+
+def test_an_experiment_with_a_stopping_rule_uses_tests_that_hold_at_any_time() -> None:
+    analysis = analyse(pairs(120, 40, 16, 24, sequential=True))
+    (found,) = analysis.comparisons
+    assert found.test == "betting test, valid at any time"
+    assert found.p_value is not None
+    assert found.p_value > compare(pairs(120, 40, 16, 24))[0].p_value  # type: ignore[operator]
+    assert "hold at any time" in analysis.rule
+    assert found.pairs_needed is None
+
+
+@pytest.mark.parametrize(
+    ("results", "sentence"),
+    [
+        (successes([], []), "nothing to compare between A and B in success: no episode of A and B has a value"),
+        (successes([1], []), "nothing to compare between A and B in success: no episode of B has a value"),
+        (results_of({"A": ["succeeded"]}), "nothing to compare: the only method is A"),
+    ],
+)
+def test_without_data_the_sentence_says_so(results: ExperimentResults, sentence: str) -> None:
+    assert analyse(results).sentences == (sentence,)
+    assert all(each.verdict is Verdict.NO_DATA for each in compare(results))
+
+
+def test_values_that_are_all_missing_or_all_equal_have_a_sentence() -> None:
+    missing = of_values(LENGTH, [np.nan] * 3, [np.nan] * 3)
+    assert missing.sentence == (
+        "nothing to compare between A and B in path length: no pair has a value of both; 3 pairs are without one"
+    )
+    equal = of_values(LENGTH, [2.0] * 9, [2.0] * 9)
+    assert equal.verdict is Verdict.NOT_SHOWN
+    assert equal.sentence.startswith("no difference in path length shown between A and B (0.00 rad")
+
+
+@settings(max_examples=15)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["succeeded", "failed", "timed_out", "broken"]),
+            st.sampled_from(["succeeded", "failed", "timed_out", "broken"]),
+            st.sampled_from([np.nan, 0.0, 1.0, 70.0, np.inf]),
+            st.sampled_from([np.nan, 0.0, 1.0, 70.0]),
+        ),
+        max_size=14,
+    ),
+    st.booleans(),
+    st.booleans(),
+)
+def test_any_results_give_sentences_and_numbers_that_json_can_hold(
+    rows: list[tuple[str, str, float, float]], sequential: bool, seed_per_pair: bool
+) -> None:
+    statuses = {"A": [row[0] for row in rows], "B": [row[1] for row in rows]}
+    drawn = {"A": [row[2] for row in rows], "B": [row[3] for row in rows]}
+    results = results_of(
+        statuses, (TIME, LENGTH), {"task_time": drawn, "path_length": drawn},
+        objects=("can", "box"), sequential=sequential, seed_per_pair=seed_per_pair,
+    )  # fmt: skip
+    analysis = analyse(results)
+    text = json.dumps(dataclasses.asdict(analysis), default=lambda each: each.value)
+    assert "NaN" not in text
+    assert "Infinity" not in text
+    assert all(each.sentence and "nan" not in each.sentence for each in (*analysis.comparisons, *analysis.summaries))
+    for each in analysis.comparisons:
+        shown = each.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
+        assert not shown or (each.p_corrected is not None and each.p_corrected <= 0.05)
+        assert (each.verdict is Verdict.NO_DATA) == (each.difference is None)
+
+
+def test_the_same_results_give_the_same_figures() -> None:
+    random = np.random.default_rng(1)
+    results = results_of(
+        {"A": outcomes(random.random(40) < 0.8), "B": outcomes(random.random(40) < 0.7)}, (TIME,),
+        {"task_time": {"A": random.lognormal(1, 1, 40), "B": random.lognormal(1, 1, 40)}},
+    )  # fmt: skip
+    assert analyse(results) == analyse(results)
+
+
+def test_an_episode_that_is_there_twice_and_an_unknown_factor_are_refused() -> None:
+    results = successes([1, 1], [0, 1])
+    results.episodes["trial"] = 7
+    with pytest.raises(ValueError, match="two episodes of method A have trial=7"):
+        compare(results)
+    description = dataclasses.replace(results.description, compared="planner")
+    with pytest.raises(ValueError, match="has no factor 'planner'; its factors are: method"):
+        compare(dataclasses.replace(results, description=description))
+    with pytest.raises(ValueError, match="'method' is none of the factors beside the compared one; those are: none"):
+        compare_by_level(results, "method")
