@@ -15,6 +15,7 @@ usage: ./install.sh [COMMAND]
 
   (none)               set the framework up: Debian packages, Python environment, build
   run [ARG:=VALUE..]   set up, then run the simulated pick; arguments are those of start_framework.launch
+  experiment FILE      set up, then run an experiment and write its report; options are those of run_experiment
   test [SUITE]         set up, then run the tests: lint, unit, rostest, system, all (the default) or one suite of them
   shell                set up, then open a shell with everything sourced
   exec COMMAND..       set up, then run a command with everything sourced, e.g. a benchmark
@@ -296,6 +297,11 @@ main() {
       source_workspace
       exec rosrun modular_framework_api run_framework "$@"
       ;;
+    experiment)
+      set_up
+      source_workspace
+      exec rosrun modular_framework_benchmark run_experiment "$@"
+      ;;
     test)
       set_up
       source_workspace
@@ -316,7 +322,7 @@ main() {
     help | -h | --help) usage ;;
     *)
       usage >&2
-      fail "unknown command '$command'" "use one of: run, test, shell, exec, packages, help"
+      fail "unknown command '$command'" "use one of: run, experiment, test, shell, exec, packages, help"
       ;;
   esac
 }
