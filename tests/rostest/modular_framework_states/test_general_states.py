@@ -11,16 +11,19 @@ from types import SimpleNamespace
 import actionlib
 import pytest
 import rospy
+from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import GripperCommandAction, GripperCommandResult
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
+from rospy.impl.tcpros_base import TCPROSTransport
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, SetBoolResponse
 
 import smach
 from modular_framework_core import srv
+from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_states.states.call_action import CallAction
 from modular_framework_states.states.call_service import CallService
 from modular_framework_states.states.counter import Counter
@@ -216,6 +219,31 @@ class Gripper:
             self._server.set_aborted(GripperCommandResult(), "fingers do not open that far")
         else:
             self._server.set_succeeded(GripperCommandResult(position=goal.command.position, reached_goal=True))
+
+
+def test_no_result_is_lost_while_its_topic_is_still_being_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may need seconds for the connection of one topic, and a goal that needs no motion ends at once."""
+    connect, may_connect = TCPROSTransport.connect, threading.Event()
+
+    def connect_later(transport: TCPROSTransport, *where: object, **options: object) -> None:
+        if transport.name == "/quick_hand/result":
+            may_connect.wait(60.0)
+        connect(transport, *where, **options)
+
+    monkeypatch.setattr(TCPROSTransport, "connect", connect_later)
+    ended = threading.Event()
+
+    def answer(goal: ServerGoalHandle) -> None:
+        goal.set_accepted()
+        goal.set_succeeded(GripperCommandResult(reached_goal=True))
+        ended.set()
+
+    server = SteadyActionServer("quick_hand", GripperCommandAction, answer, auto_start=False)
+    server.start()
+    threading.Timer(1.0, may_connect.set).start()
+    state = CallAction("quick_hand", {"command": {"position": 0.5}}, timeout=20.0, server_timeout=60.0)
+    assert run(state)[0] == "success", state.reason
+    assert ended.is_set()
 
 
 def test_call_action_sends_a_goal_and_reports_how_it_ended() -> None:

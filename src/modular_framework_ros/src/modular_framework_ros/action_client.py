@@ -35,7 +35,18 @@ class SteadyActionClient(actionlib.SimpleActionClient):
 
 
 def is_connected(client: actionlib.SimpleActionClient) -> bool:
-    """Whether an action server listens to a client and has reported its status; asks without rospy's clock."""
+    """Whether an action server and a client are connected on all topics of the action, in both directions.
+
+    rospy counts the connection of a subscriber before it is made: a result published until then is lost. Only when the
+    publisher has answered is its name known, so the names are compared. Asks without rospy's clock.
+    """
     inner = client.action_client
-    ends = (inner.pub_goal, inner.pub_cancel, inner.result_sub, inner.feedback_sub)
-    return inner.last_status_msg is not None and all(end.get_num_connections() > 0 for end in ends)
+    goal, cancel = (topic.impl for topic in (inner.pub_goal, inner.pub_cancel))
+    heard = [topic.impl for topic in (inner.status_sub, inner.result_sub, inner.feedback_sub)]
+    if None in (goal, cancel, *heard):  # unregistered: rospy is shutting down
+        return False
+    return any(
+        cancel.has_connection(server.endpoint_id)
+        and all(any(link.callerid_pub == server.endpoint_id for link in topic.connections) for topic in heard)
+        for server in goal.connections
+    )

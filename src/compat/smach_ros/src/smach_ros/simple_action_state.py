@@ -12,6 +12,7 @@ from actionlib import CommState, SimpleActionClient
 from actionlib_msgs.msg import GoalID, GoalStatus
 
 import smach
+from modular_framework_ros.action_client import is_connected
 from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource
 from smach_ros.waiting import POLL_PERIOD_S, RosTimeLimit, WallTimeLimit, seconds
 
@@ -139,7 +140,7 @@ class SimpleActionState(AskingState):
                 self._goal_is_out = False
 
     def _is_connected(self) -> bool:
-        if _server_is_there(self._connect()):
+        if is_connected(self._connect()):
             return True
         self._wake.wait(POLL_PERIOD_S)
         return False
@@ -178,7 +179,7 @@ class SimpleActionState(AskingState):
                     f"the goal was cancelled{', since it ' + too_late if too_late else ''}, but did not end within "
                     f"{self._preempt_timeout_s} s"
                 )
-            if _server_is_there(client):
+            if is_connected(client):
                 lost = WallTimeLimit(SERVER_LOST_S)
             elif lost.over():
                 client.stop_tracking_goal()
@@ -208,22 +209,6 @@ def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
         raise smach.InvalidStateError(
             f"action_spec of '{action_name}' must be the class of an action as FibonacciAction, got {action_spec!r}"
         ) from error
-
-
-def _server_is_there(client: SimpleActionClient) -> bool:
-    """Returns whether one server is connected by all topics of the action."""
-    inner = client.action_client
-    status = inner.last_status_msg
-    if status is None:
-        return False
-    server = status._connection_header["callerid"]
-    hears = [topic.impl for topic in (inner.pub_goal, inner.pub_cancel)]
-    heard = [topic.impl for topic in (inner.result_sub, inner.feedback_sub)]
-    if None in hears or None in heard:  # unregistered: rospy is shutting down
-        return False
-    return all(topic.has_connection(server) for topic in hears) and all(
-        any(link.callerid_pub == server for link in topic.connections) for topic in heard
-    )
 
 
 def _ended(client: SimpleActionClient) -> bool:

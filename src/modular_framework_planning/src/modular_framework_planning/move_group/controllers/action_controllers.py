@@ -20,7 +20,7 @@ from modular_framework_planning.trajectory_execution.controllers import (
     ControllerSpec,
     parse_controllers,
 )
-from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_ros.action_client import SteadyActionClient, is_connected
 
 POLL_S = 0.01
 ACTION_TYPES = dict(zip(ACTION_KINDS, (FollowJointTrajectoryAction, GripperCommandAction), strict=True))
@@ -105,7 +105,7 @@ class ActionControllers:
         for spec in (part.controller for part in parts):
             # real time: while a simulation is paused, simulated time never runs out
             deadline = time.monotonic() + self._timeout_s
-            while not _is_connected(self._client(spec).action_client):
+            while not is_connected(self._client(spec)):
                 if time.monotonic() > deadline or rospy.is_shutdown():
                     raise PlanningError(
                         ErrorCode.CONTROL_FAILED,
@@ -156,9 +156,3 @@ class ActionMotion:
     def cancel(self) -> None:
         """Cancels the goal."""
         self._client.cancel_goal()
-
-
-def _is_connected(client: actionlib.ActionClient) -> bool:
-    """Whether an action server and a client are connected on all topics of the action, in both directions."""
-    ends = (client.pub_goal, client.pub_cancel, client.result_sub, client.feedback_sub, client.status_sub)
-    return all(end.get_num_connections() > 0 for end in ends)
