@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings
-from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,3 +34,16 @@ class Robot:
     def solvers(self) -> KinematicsPool:
         """Returns the inverse kinematics of its groups."""
         return KinematicsPool(self.model, self.kinematics)
+
+    def chain(self, name: str) -> JointGroup:
+        """Returns a group that is a chain, as inverse kinematics needs it.
+
+        Raises:
+            ModeError: It is none.
+            ModelError: There is no such group.
+        """
+        group = self.model.group(name)
+        if not group.is_chain:
+            chains = ", ".join(other for other, item in self.model.groups.items() if item.is_chain)
+            raise ModeError(f"group '{name}' is no chain, which inverse kinematics needs; allowed: {chains or 'none'}")
+        return group

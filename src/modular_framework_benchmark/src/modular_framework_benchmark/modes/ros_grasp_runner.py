@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import heapq
 import importlib
-import json
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,11 +18,11 @@ from typing import Any
 from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.grasp_reach import GraspReach
-from modular_framework_benchmark.modes.measured_record import Stopwatch, broken_record, measured_record
+from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.modes.method_parameters import GivenNumbers
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
-from modular_framework_benchmark.modes.ros_robots import load_robot
+from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspMethod, GraspQuery
 from modular_framework_core.grasp_generation.gripper_geometry import (
@@ -31,7 +30,6 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometryError,
     measure_gripper,
 )
-from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 
 
@@ -44,33 +42,23 @@ class _Prepared:
     gripper: GripperGeometry
 
 
-class GraspEpisodeRunner:
-    """Runs episodes of the mode `grasps`; belongs to one process."""
+class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
+    """Runs episodes of the mode `grasps`."""
 
-    def __init__(self) -> None:
-        """Starts nothing: robots are loaded for the first episode that needs them."""
-        self._prepared: dict[str, _Prepared] = {}
+    prepared_by = ("robot", "group", "gripper_joint")
 
-    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
-        """Finds the grasps of one scene.
-
-        Args:
-            spec: What to run; the experiment file of its mode has the settings.
-            folder: Folder of the episode; nothing is written there, the figures are all there is.
-        """
-        watch, settings = Stopwatch(), spec.settings
-        try:
-            prepared = self._prepare(settings)
-            scene = grasp_scene(prepared.robot.model, settings["objects"], str(settings["target"]))
-            numbers = GivenNumbers(settings.get("method_parameters") or {})
-            method = load_method(str(settings["method"]), numbers)
-            started_s, start = watch.elapsed_s(), time.perf_counter()
-            candidates = _candidates(method, scene, prepared.gripper, spec.seed)
-            search_s = time.perf_counter() - start
-            numbers.check_all_read()
-            reached = _reached(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
-        except (ModeError, ModelError, PlanningError) as error:
-            return broken_record(spec, str(error), watch)
+    def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
+        """Finds the grasps of one scene; nothing is written, the figures are all there is."""
+        settings = spec.settings
+        prepared = self.prepared(settings)
+        scene = grasp_scene(prepared.robot.model, settings["objects"], str(settings["target"]))
+        numbers = GivenNumbers(settings.get("method_parameters") or {})
+        method = load_method(str(settings["method"]), numbers)
+        started_s, start = watch.elapsed_s(), time.perf_counter()
+        candidates = _candidates(method, scene, prepared.gripper, spec.seed)
+        search_s = time.perf_counter() - start
+        numbers.check_all_read()
+        reached = _reached(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
         found = [place for place, travel in enumerate(reached, start=1) if travel is not None]
         outcome = "reachable" if found else ("out_of_reach" if candidates else "no_grasp")
         report = ComponentReport(
@@ -86,24 +74,15 @@ class GraspEpisodeRunner:
         status = EpisodeStatus.SUCCEEDED if found else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report, folder, watch)
 
-    def close(self) -> None:
-        """Ends nothing: there are no processes."""
-
-    def _prepare(self, settings: Mapping[str, Any]) -> _Prepared:
-        """Returns the robot, its inverse kinematics and its hand; made once for all episodes that need the same."""
-        key = json.dumps([settings[name] for name in ("robot", "group", "gripper_joint")], sort_keys=True)
-        if key not in self._prepared:
-            robot = load_robot(settings["robot"])
-            group = robot.model.group(str(settings["group"]))
-            if not group.is_chain:
-                chains = ", ".join(name for name, item in robot.model.groups.items() if item.is_chain)
-                raise ModeError(f"group '{group.name}' is no chain; grasps need one of {chains or 'none'}")
-            try:
-                gripper = measure_gripper(robot.urdf, group.tip_link, str(settings["gripper_joint"]))
-            except GripperGeometryError as error:
-                raise ModeError(f"gripper_joint '{settings['gripper_joint']}': {error}") from error
-            self._prepared[key] = _Prepared(robot, robot.solvers().solver(group.name), gripper)
-        return self._prepared[key]
+    def prepare(self, settings: Mapping[str, Any]) -> _Prepared:
+        """Returns the robot, its inverse kinematics and its hand."""
+        robot = self.robot(settings["robot"])
+        group = robot.chain(str(settings["group"]))
+        try:
+            gripper = measure_gripper(robot.urdf, group.tip_link, str(settings["gripper_joint"]))
+        except GripperGeometryError as error:
+            raise ModeError(f"gripper_joint '{settings['gripper_joint']}': {error}") from error
+        return _Prepared(robot, robot.solvers().solver(group.name), gripper)
 
 
 def load_method(reference: str, numbers: GivenNumbers) -> GraspMethod:

@@ -7,7 +7,6 @@ state, so the answer cannot be read off the seed. Each solution is checked by fo
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +17,6 @@ import numpy as np
 import pinocchio as pin
 
 from modular_framework_benchmark.metrics.measurements import ComponentReport
-from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.modes.parameters import parameters_below
 from modular_framework_benchmark.modes.robots import Robot
@@ -47,17 +45,14 @@ class _PoseResult:
         return self.position_error_m < POSITION_TOLERANCE_M and self.rotation_error_rad < ROTATION_TOLERANCE_RAD
 
 
-class KinematicsEpisodeRunner(ModelEpisodeRunner):
+class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
     """Runs episodes of the mode `kinematics`."""
 
-    def __init__(self) -> None:
-        """Starts nothing."""
-        super().__init__()
-        self._solvers: dict[str, InverseKinematics] = {}
+    prepared_by = ("robot", "group", "solver", "timeout", "parameters")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Solves the poses of one trial; nothing is written, the figures are all there is."""
-        robot, solver = self._prepare(spec.settings)
+        robot, solver = self.robot(spec.settings["robot"]), self.prepared(spec.settings)
         started_s = watch.elapsed_s()
         results = _solve_poses(robot, solver, spec)
         unsolved, ended_s = [number for number, result in enumerate(results) if not result.is_solved], watch.elapsed_s()
@@ -76,19 +71,13 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner):
         status = EpisodeStatus.FAILED if unsolved else EpisodeStatus.SUCCEEDED
         return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)
 
-    def _prepare(self, settings: Mapping[str, Any]) -> tuple[Robot, InverseKinematics]:
+    def prepare(self, settings: Mapping[str, Any]) -> InverseKinematics:
+        """Returns the solver, warm: its first solution takes longer."""
         robot = self.robot(settings["robot"])
-        keys = ("robot", "group", "solver", "timeout", "parameters")
-        key = json.dumps([settings.get(name) for name in keys], sort_keys=True)
-        if key not in self._solvers:
-            group = robot.model.group(str(settings["group"]))
-            if not group.is_chain:
-                chains = ", ".join(name for name, item in robot.model.groups.items() if item.is_chain)
-                raise ModeError(f"group '{group.name}' is no chain; inverse kinematics has {chains or 'none'}")
-            solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
-            solver.solutions(group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _home(robot))
-            self._solvers[key] = solver
-        return robot, self._solvers[key]
+        group = robot.chain(str(settings["group"]))
+        solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
+        solver.solutions(group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _home(robot))
+        return solver
 
 
 def _solver_settings(robot: Robot, settings: Mapping[str, Any]) -> KinematicsSettings:

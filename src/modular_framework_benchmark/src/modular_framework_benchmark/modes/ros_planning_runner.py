@@ -6,7 +6,6 @@ Each plan runs in a process of its own that starts from the same state, so that 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -54,17 +53,14 @@ class _Prepared:
     seeded: SeededPlanning
 
 
-class PlanningEpisodeRunner(ModelEpisodeRunner):
+class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
     """Runs episodes of the mode `planning`."""
 
-    def __init__(self) -> None:
-        """Starts nothing: processes are made for the first episode that needs them."""
-        super().__init__()
-        self._prepared: dict[str, _Prepared] = {}
+    prepared_by = ("robot", "pipeline", "planner", "planner_parameters", "parameters")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
         """Plans one problem, and writes the motion to `trajectory.parquet` in the folder."""
-        prepared = self._prepare(spec.settings)
+        prepared = self.prepared(spec.settings)
         problem = _read_problem(spec.settings, prepared.model)
         started_s, answer, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
         try:
@@ -87,24 +83,17 @@ class PlanningEpisodeRunner(ModelEpisodeRunner):
         )
         return measured_record(spec, _status(code), code.name, report, folder, watch)
 
-    def close(self) -> None:
-        """Ends the processes; may be called twice."""
-        for prepared in self._prepared.values():
-            prepared.seeded.close()
-        self._prepared.clear()
-        super().close()
+    def prepare(self, settings: Mapping[str, Any]) -> _Prepared:
+        """Returns the robot and the process that plans."""
+        robot = self.robot(settings["robot"])
+        spec = _pipeline_spec(robot, settings)
+        pipeline = spec.build(robot.model, robot.solvers())
+        _check_planner(pipeline, str(settings["planner"]))
+        return _Prepared(robot.model, pipeline, SeededPlanning(robot.model, [spec]))
 
-    def _prepare(self, settings: Mapping[str, Any]) -> _Prepared:
-        """Returns the robot and the process that plans; made once for all episodes that need the same."""
-        keys = ("robot", "pipeline", "planner", "planner_parameters", "parameters")
-        key = json.dumps([settings.get(name) for name in keys], sort_keys=True)
-        if key not in self._prepared:
-            robot = self.robot(settings["robot"])
-            spec = _pipeline_spec(robot, settings)
-            pipeline = spec.build(robot.model, robot.solvers())
-            _check_planner(pipeline, str(settings["planner"]))
-            self._prepared[key] = _Prepared(robot.model, pipeline, SeededPlanning(robot.model, [spec]))
-        return self._prepared[key]
+    def end(self, prepared: _Prepared) -> None:
+        """Ends the process that plans."""
+        prepared.seeded.close()
 
 
 def _pipeline_spec(robot: Robot, settings: Mapping[str, Any]) -> PipelineSpec:
