@@ -151,6 +151,16 @@ def test_a_run_of_nohup_outlives_the_terminal(folder: Path) -> None:
     assert process.returncode == 0, errors
 
 
+def test_a_report_that_cannot_be_written_is_named_and_loses_no_result(folder: Path) -> None:
+    (folder / "experiment.yaml").write_text(TEXT.replace("trials: 40", "trials: 1"))
+    (folder / "plans.html").mkdir()
+    process = start(folder, "run_experiment", "experiment.yaml")
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 1 and finished(folder) == 3
+    assert f"error: no report: {folder}/plans.html: Is a directory" in errors
+    assert "modular_framework_benchmark report plans.db --experiment plans --into FILE" in errors
+
+
 def test_a_second_run_of_a_database_is_refused_while_the_first_one_runs(folder: Path) -> None:
     first = start(folder, "run_experiment", "experiment.yaml", episode_s=0.5)  # still running when the second starts
     while not finished(folder):

@@ -13,6 +13,7 @@ from types import FrameType
 from modular_framework_benchmark.commands.mode_runners import runner_factory
 from modular_framework_benchmark.commands.stopping_rules import RunSettings, stopping_rule
 from modular_framework_benchmark.records.episode import EpisodeStatus
+from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.results.database import ResultDatabase
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import LocalPool, Pool
@@ -98,12 +99,20 @@ class ExperimentSession:
     def _print_results(self, end: RunEnd) -> int:
         """Prints the sentences of the comparison and writes the report; fails when no episode says anything."""
         from modular_framework_benchmark.commands.report_command import write_page  # takes seconds to import
+        from modular_framework_benchmark.reports.report_source import OpenedExperiment
 
         if end.stopped_because:
             print(f"ended before all trials: {end.stopped_because}")
         page = self._database.folder / f"{self._name}.html"
-        print(*write_page(self._options.target, self._name, page), f"report: {page}", sep="\n")
-        episodes = self._database.load(self._number, spans=False).episodes
+        results = self._database.load(self._number, spans=False)
+        try:
+            sentences = write_page(OpenedExperiment(self._database, self._number, results), page)
+        except ReportError as error:
+            again = f"{COMMAND} report {shlex.quote(self._options.target)} --experiment {self._name} --into FILE"
+            print(f"error: no report: {error}; the results are stored. To write it: {again}", file=sys.stderr)
+            return EXIT_FAILED
+        print(*sentences, f"report: {page}", sep="\n")
+        episodes = results.episodes
         if len(episodes) and (episodes["status"] == EpisodeStatus.BROKEN.value).all():
             print(f"error: every episode broke; the first one: {episodes['cause'].iloc[0]}", file=sys.stderr)
             return EXIT_FAILED

@@ -15,7 +15,7 @@ from modular_framework_benchmark.reports.image_export import FORMATS, figure_ima
 from modular_framework_benchmark.reports.paper_tables import latex_table, markdown_table
 from modular_framework_benchmark.reports.report_content import ReportContent, gather
 from modular_framework_benchmark.reports.report_files import write_file
-from modular_framework_benchmark.reports.report_source import open_source
+from modular_framework_benchmark.reports.report_source import OpenedExperiment, open_source
 from modular_framework_benchmark.reports.tables import overview_table
 
 TABLES = {"markdown": markdown_table, "latex": latex_table}
@@ -26,21 +26,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_reporting(_parser(), arguments, _report)
 
 
-def write_page(target: str, experiment: str, into: Path) -> tuple[str, ...]:
+def write_page(opened: OpenedExperiment, into: Path) -> tuple[str, ...]:
     """Writes the report page of an experiment; returns the sentences that compare its methods.
 
     Args:
-        target: Result database, as the user named it.
-        experiment: Its name in the database.
+        opened: The experiment.
         into: File of the page.
 
     Raises:
         ReportError: It cannot be written.
         ResultsError: The database cannot be read.
     """
-    with open_source(target, experiment) as opened:
-        content = gather(opened.results, opened.source(into.absolute().parent))
-        write_file(into, report_page(content, opened.database.label).encode())
+    content = gather(opened.results, opened.source(into.absolute().parent))
+    write_file(into, report_page(content, opened.database.label).encode())
     return tuple(content.analysis.sentences)
 
 
