@@ -26,6 +26,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene
 from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger
 
 from modular_framework_core.srv import AddStandardisedGrasp, GetStandardisedGrasp
 
@@ -101,7 +102,11 @@ class Picker:
         problem = spawn(name, model, PLACE_XY_M, YAW_RAD)
         if problem:
             return {"case": case, "log": problem}
-        wait(lambda: self._signals > signals, f"grasps of {name}")
+        if task_runs:
+            wait(lambda: self._signals > signals, f"grasps of {name}")
+        else:
+            wait(lambda: in_scene(case), f"{name} in the planning scene")
+            service("refresh_grasps", Trigger)()
         if case == SECOND_TRY:
             spoil_first_grasps()
         before, log, exit_code = height(name), "", 0
@@ -124,16 +129,15 @@ class Picker:
     def clear(self, case: str) -> None:
         """Takes the object away, and waits until the planning scene has forgotten it."""
         service("/gazebo/delete_model", DeleteModel)(f"{case}_1")
-        wait(lambda: not any(identity.startswith(f"{case}_1") for identity in scene_objects()), f"{case} to be gone")
+        wait(lambda: not in_scene(case), f"{case} to be gone")
 
 
-def scene_objects() -> list[str]:
-    """Returns the objects of the planning scene, attached ones included."""
+def in_scene(case: str) -> bool:
+    """Whether the object of a case is in the planning scene, attached ones included."""
     wanted = PlanningSceneComponents.WORLD_OBJECT_NAMES | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS
     scene = service("get_planning_scene", GetPlanningScene)(PlanningSceneComponents(components=wanted)).scene
-    return [item.id for item in scene.world.collision_objects] + [
-        item.object.id for item in scene.robot_state.attached_collision_objects
-    ]
+    found = [*scene.world.collision_objects, *(item.object for item in scene.robot_state.attached_collision_objects)]
+    return any(item.id.startswith(f"{case}_1") for item in found)
 
 
 def spoil_first_grasps() -> None:

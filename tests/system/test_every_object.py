@@ -35,6 +35,8 @@ def picks() -> Iterator[dict[str, Any]]:
             rviz="false",
             world_file="ur5_table.world",
             end_with_task="false",
+            wait_for_planning="true",
+            real_time_factor="0",
         )
         run = subprocess.run(
             [sys.executable, str(TESTS / "pick_objects.py"), str(SCRIPT)],
