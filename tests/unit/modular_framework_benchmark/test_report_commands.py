@@ -14,7 +14,7 @@ from reported_experiment import ReportedExperiment
 from modular_framework_benchmark.commands.compare_command import main as compare
 from modular_framework_benchmark.commands.report_command import main as report
 
-RUN = ReportedExperiment(trials=40, with_files=False, with_spans=False)
+RUN = ReportedExperiment(trials=24, with_files=False, with_spans=False)
 SMALL = replace(RUN, trials=4)
 WORSE = (("rrt_connect", 0.45, 0.4), *RUN.planners[1:])
 

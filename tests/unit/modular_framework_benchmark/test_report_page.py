@@ -100,7 +100,7 @@ def test_failures_are_grouped_by_cause_most_frequent_first(page: Page) -> None:
 
 
 def test_a_broken_episode_is_named_before_the_figures(tmp_path: Path) -> None:
-    page = Page.of(ReportedExperiment(trials=40, seed=7).store(tmp_path / "results.db"), tmp_path / "report.html")
+    page = Page.of(ReportedExperiment(trials=14, seed=10).store(tmp_path / "results.db"), tmp_path / "report.html")
     warning = page.tree.xpath("//section[@class='warning']")[0].text_content()
     broken = [number for number in re.findall(r"number ([\d, ]+)", warning)[0].split(", ")]
     assert len(broken) == sum(item["counts"]["broken"] for item in page.claims["analysis"]["summaries"][:3]) > 0

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from modular_framework_benchmark.commands.ros_run_command import resume, run_experiment
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.scheduling.marked_processes import marked_processes
 from modular_framework_benchmark.scheduling.run_lock import RunLock
@@ -45,6 +46,14 @@ def folder(tmp_path: Path) -> Path:
     for kind in ("scene", "request"):
         (tmp_path / "problems" / f"{kind}0001.yaml").write_text("{}")
     return tmp_path
+
+
+@pytest.fixture
+def here(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder, in which commands run that this process calls itself."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("ROS_HOME", str(folder / "ros"))
+    return folder
 
 
 def start(
@@ -142,6 +151,7 @@ def test_a_signal_ends_the_run_and_what_it_has_started_and_says_how_to_go_on(fol
 
 
 def test_a_run_of_nohup_outlives_the_terminal(folder: Path) -> None:
+    (folder / "experiment.yaml").write_text(TEXT.replace("trials: 40", "trials: 5"))
     process = start(folder, "run_experiment", "experiment.yaml", ignored_signals=(signal.SIGHUP,))
     while not finished(folder):
         assert process.poll() is None, process.communicate()
@@ -149,6 +159,7 @@ def test_a_run_of_nohup_outlives_the_terminal(folder: Path) -> None:
     process.send_signal(signal.SIGHUP)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
+    assert finished(folder) == 15
 
 
 def test_a_report_that_cannot_be_written_is_named_and_loses_no_result(folder: Path) -> None:
@@ -161,34 +172,36 @@ def test_a_report_that_cannot_be_written_is_named_and_loses_no_result(folder: Pa
     assert "modular_framework_benchmark report plans.db --experiment plans --into FILE" in errors
 
 
-def test_a_second_run_of_a_database_is_refused_while_the_first_one_runs(folder: Path) -> None:
-    first = start(folder, "run_experiment", "experiment.yaml", episode_s=0.5)  # still running when the second starts
-    while not finished(folder):
+def test_a_second_run_of_a_database_is_refused_while_the_first_one_runs(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = start(here, "run_experiment", "experiment.yaml", episode_s=0.5)  # still running when the second starts
+    while not finished(here):
         assert first.poll() is None, first.communicate()
         time.sleep(0.02)
-    second = start(folder, "resume", "plans.db")
-    _, errors = second.communicate(timeout=60)
-    assert second.returncode == 2
-    assert f"process {first.pid} runs episodes of plans.db already" in errors
+    assert resume(["plans.db"]) == 2
+    assert f"process {first.pid} runs episodes of plans.db already" in capsys.readouterr().err
     first.send_signal(signal.SIGINT)
     first.communicate(timeout=60)
 
 
-def test_the_design_is_shown_without_running_it(folder: Path) -> None:
-    output, _ = start(folder, "run_experiment", "experiment.yaml", "--dry-run").communicate(timeout=60)
+def test_the_design_is_shown_without_running_it(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_experiment(["experiment.yaml", "--dry-run"]) == 0
+    output = capsys.readouterr().out
     assert "plans: 120 episodes = 3 combinations x 40 trials; mode planning" in output
     assert "planner: RRTConnect, PRM, BKPIECE  (compared)" in output
-    assert not (folder / "plans.db").exists()
+    assert not (here / "plans.db").exists()
 
 
-def test_faults_of_the_user_end_with_exit_code_2_and_say_what_to_do(folder: Path) -> None:
-    (folder / "wrong.yaml").write_text(TEXT.replace("trials", "trails"))
+def test_faults_of_the_user_end_with_exit_code_2_and_say_what_to_do(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "wrong.yaml").write_text(TEXT.replace("trials", "trails"))
     for command, arguments, fault in (
-        ("run_experiment", ["wrong.yaml"], "wrong.yaml:9:1: the key 'trails' is unknown"),
-        ("run_experiment", ["none.yaml"], "none.yaml:1:1: there is no such file"),
-        ("run_experiment", ["experiment.yaml", "--workers", "0"], "--workers is 0; allowed: 1 or more"),
-        ("resume", ["none.db"], "none.db"),
+        (run_experiment, ["wrong.yaml"], "wrong.yaml:9:1: the key 'trails' is unknown"),
+        (run_experiment, ["none.yaml"], "none.yaml:1:1: there is no such file"),
+        (run_experiment, ["experiment.yaml", "--workers", "0"], "--workers is 0; allowed: 1 or more"),
+        (resume, ["none.db"], "none.db"),
     ):
-        process = start(folder, command, *arguments)
-        _, errors = process.communicate(timeout=60)
-        assert process.returncode == 2 and fault in errors, errors
+        assert command(arguments) == 2
+        assert fault in capsys.readouterr().err

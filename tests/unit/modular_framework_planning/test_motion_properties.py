@@ -11,7 +11,7 @@ from motion_properties import examine
 
 from modular_framework_planning.robot_model.urdf_document import package_resolver
 
-SHARE = {"ompl": 8, "ptp": 16, "lin": 30, "stomp": 5}
+SHARE = {"ompl": 8, "ptp": 8, "lin": 12, "stomp": 5}
 LEAST_SOLVED = {"ompl": 0.95, "ptp": 0.25, "lin": 0.25, "stomp": 0.8}  # straight motions are refused where they touch
 
 

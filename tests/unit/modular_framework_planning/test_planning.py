@@ -40,7 +40,7 @@ from modular_framework_planning.trajectory_processing.time_parameterization impo
 GROUP = "arm_and_manipulator"
 PALM = "ezgripper_palm_link"
 BOXES = 6
-PLANS = 100
+PLANS = 50
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_verdicts_equal_those_of_an_independent_checker(model: RobotModel, check
         scene, world = random_world(model, rng)
         checker.set_world(world)
         ours = ExactCollisionChecker(scene)
-        for _ in range(150):
+        for _ in range(75):
             positions = random_positions(model, rng)
             assert ours.is_free(positions) == (not checker.collisions(named(model, positions)))
             assert ours.is_free(positions) == (not ours.contacts(positions))

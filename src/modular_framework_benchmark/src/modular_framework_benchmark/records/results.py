@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription
+
+if TYPE_CHECKING:  # pandas takes 0.6 s to import, and a run has no tables
+    import pandas as pd
 
 
 @dataclass(frozen=True, slots=True)
