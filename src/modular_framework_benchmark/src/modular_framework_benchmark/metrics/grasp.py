@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from modular_framework_benchmark.metrics.measurements import Array, EpisodeMeasurements, ObjectTrack
 
@@ -82,8 +83,6 @@ def _moved_in_hand(episode: EpisodeMeasurements, since_s: float) -> tuple[Array,
     times = track.times_s[chosen]
     if not times.size:
         return None
-    from scipy.spatial.transform import Rotation  # see motion_figures
-
     nearest = np.minimum(np.searchsorted(hand.times_s, times), len(hand.times_s) - 1)
     turned = Rotation.from_quat(hand.quaternions[nearest]).inv()
     in_hand = turned.apply(track.positions[chosen] - hand.positions[nearest])

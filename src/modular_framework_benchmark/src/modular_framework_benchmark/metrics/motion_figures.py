@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 
 Array = npt.NDArray[np.float64]
 
@@ -57,10 +58,6 @@ def smoothness(times_s: npt.ArrayLike, positions: npt.ArrayLike) -> float | None
         raise ValueError(f"there are {len(times)} times for {len(points)} points; give one for each")
     if len(times) < 5 or motion_duration(times) <= 0.0 or not np.ptp(points, axis=0).any():
         return None
-    from scipy.interpolate import (
-        CubicSpline,
-    )  # 0.4 s of import: a run that only looks up the names of metrics does without
-
     spline = CubicSpline(times, points)
     fastest = float(np.linalg.norm(spline(np.linspace(times[0], times[-1], 4 * len(times)), 1), axis=1).max())
     total = float((spline(times[:-1], 3) ** 2).sum(axis=1) @ np.diff(times))

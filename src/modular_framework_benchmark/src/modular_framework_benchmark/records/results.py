@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription
-
-if TYPE_CHECKING:  # pandas takes 0.6 s to import, and a run has no tables
-    import pandas as pd
 
 
 @dataclass(frozen=True, slots=True)

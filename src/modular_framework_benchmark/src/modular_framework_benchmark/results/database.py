@@ -14,8 +14,9 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import Any, Self, TypeVar
 
+import pandas as pd
 from sqlalchemy import Connection, Engine, func, insert, inspect, select, update
 from sqlalchemy.exc import DBAPIError, IntegrityError
 
@@ -53,9 +54,6 @@ from modular_framework_benchmark.results.schema import (
     SCHEMA_VERSION,
 )
 from modular_framework_benchmark.results.unwritten_records import keep_record, waiting_records
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _LOG = logging.getLogger(__name__)
 _ATTEMPTS = 10

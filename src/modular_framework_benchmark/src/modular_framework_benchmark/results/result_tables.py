@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from sqlalchemy import Connection, Select, column, func, select, table
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription
@@ -14,9 +15,6 @@ from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results.columns import SUCCESS
 from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES
 from modular_framework_benchmark.results.schema import EPISODES, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
-
-if TYPE_CHECKING:  # pandas takes 0.6 s to import: each function that makes a table does so, since a run makes none
-    import pandas as pd
 
 SPAN_COLUMNS = ("number", "kind", "name", "started_s", "ended_s", "outcome", "failed", "reason")
 _TEXTS = ("outcome", "cause", "folder", "worker")
@@ -40,8 +38,6 @@ def load_results(
 
 def load_episodes(connection: Connection, number: int, description: ExperimentDescription) -> pd.DataFrame:
     """Reads the table of episodes that `ExperimentResults` describes."""
-    import pandas as pd
-
     metrics = [metric.name for metric in description.metrics if metric.name != SUCCESS]
     runs = table(RUNS.name, *map(column, [*RUNS.columns.keys(), *metrics]))
     planned = EPISODES.c
@@ -76,8 +72,6 @@ def load_spans(connection: Connection, number: int, numbers: Collection[int] | N
         number: Identifier of the experiment.
         numbers: Numbers of the episodes whose spans are read; None for all.
     """
-    import pandas as pd
-
     statement = (
         select(EPISODES.c.number, *(SPANS.c[name] for name in SPAN_COLUMNS[1:]))
         .join_from(EPISODES, SPANS, SPANS.c.runid == EPISODES.c.id)
@@ -98,8 +92,6 @@ def span_totals(connection: Connection, number: int, description: ExperimentDesc
         A row for each kind, name and method, with the columns `kind`, `name`, the compared factor's name, `count`,
         `ended` (how many have an end), `failed` and `total_s` (sum of the durations of those that ended).
     """
-    import pandas as pd
-
     ended = SPANS.c.ended_s.is_not(None)
     statement = (
         select(SPANS.c.kind, SPANS.c.name, EPISODES.c.configuration)
@@ -159,8 +151,6 @@ def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, A
 
 
 def _levels(configurations: tuple[str, ...], description: ExperimentDescription) -> dict[str, Any]:
-    import pandas as pd
-
     known = {text: json.loads(text) for text in set(configurations)}
     return {
         factor.name: pd.Series([known[text][factor.name] for text in configurations], dtype="str")
