@@ -97,7 +97,7 @@ def test_verdicts_equal_those_of_an_independent_checker(model: RobotModel, check
         scene, world = random_world(model, rng)
         checker.set_world(world)
         ours = ExactCollisionChecker(scene)
-        for _ in range(75):
+        for _ in range(150):
             positions = random_positions(model, rng)
             assert ours.is_free(positions) == (not checker.collisions(named(model, positions)))
             assert ours.is_free(positions) == (not ours.contacts(positions))
