@@ -18,6 +18,7 @@ from modular_framework_benchmark.experiments.design_text import design_text
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 from modular_framework_benchmark.results.errors import RecordNotStoredError, ResultsError
 from modular_framework_benchmark.scheduling.local_pool import SchedulerError
@@ -89,31 +90,45 @@ def _run(options: argparse.Namespace) -> int:
         print(design_text(experiment, episodes))
         return 0
     target = options.database or f"{experiment.description.name}.db"
-    with RunLock(target) as lock, open_database(target, create=True) as database:
+    return run_episodes(experiment, episodes, _session_options(options, target))
+
+
+def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], options: SessionOptions) -> int:
+    """Runs episodes of an experiment, those that its database has not; returns the exit code.
+
+    Args:
+        experiment: What they belong to.
+        episodes: All that `lay_out` gives, or some of them.
+        options: How to run them.
+
+    Raises:
+        Exception: One of `USER_ERRORS`; an episode that fails is none.
+        RecordNotStoredError: The database cannot be written.
+        WorkerStartError: A worker cannot be started.
+    """
+    with RunLock(options.target) as lock, open_database(options.target, create=True) as database:
         number = database.add_experiment(experiment.described(digest_of(experiment, episodes)), episodes)
-        return _session(database, number, target, lock, options, experiment).run()
+        return _session(database, number, lock, options, experiment).run()
 
 
 def _resume(options: argparse.Namespace) -> int:
     with RunLock(options.database) as lock, open_database(options.database) as database:
         number = _unfinished(database, options.experiment, options.database)
-        return _session(database, number, options.database, lock, options, None).run()
+        return _session(database, number, lock, _session_options(options, options.database), None).run()
+
+
+def _session_options(options: argparse.Namespace, target: str) -> SessionOptions:
+    return SessionOptions(target, options.workers, options.scheduler, options.runner)
 
 
 def _session(
-    database: ResultDatabase,
-    number: int,
-    target: str,
-    lock: RunLock,
-    options: argparse.Namespace,
-    experiment: Experiment | None,
+    database: ResultDatabase, number: int, lock: RunLock, options: SessionOptions, experiment: Experiment | None
 ) -> ExperimentSession:
     if lock.ended_processes:
         print(f"ended {lock.ended_processes} processes that an earlier run had left behind", file=sys.stderr)
-    chosen = SessionOptions(target, options.workers, options.scheduler, options.runner)
     (description,) = (one.description for one in database.experiments() if one.id == number)
     settings = settings_of(experiment, description)
-    return ExperimentSession(database, number, lock.run, chosen, settings)
+    return ExperimentSession(database, number, lock.run, options, settings)
 
 
 def _unfinished(database: ResultDatabase, name: str | None, target: str) -> int:

@@ -160,8 +160,8 @@ class Stack:
         lines = [line.strip() for line in self._launch.log().splitlines() if line.strip()]
         own = [number for number, line in enumerate(lines) if line.startswith("run_framework: ")]
         if own:
-            return " ".join(lines[own[-1] :]).removeprefix("run_framework: ")
-        return f"the launch ended with exit code {self._launch.process.poll()}: {lines[-1] if lines else 'no output'}"
+            return "the launch died: " + " ".join(lines[own[-1] :]).removeprefix("run_framework: ")
+        return f"the launch died: exit code {self._launch.process.poll()}, {lines[-1] if lines else 'no output'}"
 
     def stop(self) -> None:
         """Stops everything at once and leaves no process and no file. May be called twice."""

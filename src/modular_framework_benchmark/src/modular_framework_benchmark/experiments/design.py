@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +83,7 @@ def _drawn(experiment: Experiment, settings: Mapping[str, Any], rest: str, trial
     }
 
 
-def digest_of(experiment: Experiment, episodes: list[EpisodeSpec]) -> str:
+def digest_of(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
     """Returns SHA-256 of what decides the episodes, hexadecimal.
 
     Paths count by their last two parts, so that the digest is the same in every folder; what is in the files counts.
@@ -101,7 +101,7 @@ def digest_of(experiment: Experiment, episodes: list[EpisodeSpec]) -> str:
     return digest.hexdigest()
 
 
-def _parts(head: Mapping[str, Any], episodes: list[EpisodeSpec]) -> Iterator[str]:
+def _parts(head: Mapping[str, Any], episodes: Sequence[EpisodeSpec]) -> Iterator[str]:
     yield _canonical(head)
     for spec in episodes:
         yield _canonical([spec.number, dict(spec.configuration), spec.trial, spec.seed, _portable(spec.settings)])
