@@ -7,7 +7,9 @@ import re
 import struct
 
 FORMATS = ("stl", "obj", "ply")
-_STL_HEADER, _STL_TRIANGLE = 84, 50  # [bytes]
+STL_HEADER = 84
+"""Length of what stands before the triangles of a binary STL file [bytes]."""
+_STL_TRIANGLE = 50  # [bytes]
 _FACE = re.compile(rb"^[ \t]*f[ \t]+(.*)$", re.MULTILINE)
 _OBJ_LINE = re.compile(rb"^[ \t]*(v|f)[ \t]+(.*)$", re.MULTILINE)
 _PLY_SIZES = {
@@ -46,11 +48,16 @@ def declared_triangles(kind: str, content: bytes) -> int:
     raise ValueError(f"'{kind}' is not one of {', '.join(FORMATS)}")
 
 
+def is_binary_stl(content: bytes) -> bool:
+    """Returns whether an STL file is as long as its binary header says; one that is text may begin like any."""
+    if len(content) < STL_HEADER:
+        return False
+    return len(content) == STL_HEADER + int(struct.unpack_from("<I", content, 80)[0]) * _STL_TRIANGLE
+
+
 def _stl(content: bytes) -> int:
-    if len(content) >= _STL_HEADER:
-        count = struct.unpack_from("<I", content, 80)[0]
-        if len(content) == _STL_HEADER + count * _STL_TRIANGLE:
-            return int(count)
+    if is_binary_stl(content):
+        return (len(content) - STL_HEADER) // _STL_TRIANGLE
     if not content.lstrip()[:5].lower() == b"solid":
         raise ValueError(f"{len(content)} bytes hold neither the triangles of a binary header nor text")
     return len(re.findall(rb"\bfacet\s+normal\b", content, re.IGNORECASE))
