@@ -10,6 +10,7 @@ import resource
 import shutil
 import signal
 import sqlite3
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from sqlalchemy import create_engine, text
 from sqlalchemy.exc import DBAPIError
 
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.results.connection import shown_target
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 from modular_framework_benchmark.results.errors import (
     DatabaseCorruptError,
@@ -218,6 +220,18 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
         open_database("://x")
     with pytest.raises(ResultsError, match="install the driver that the URL names"):
         open_database("nosuchserver://me@host/results")
+
+
+def test_a_driver_that_is_missing_is_named_as_pip_calls_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "psycopg", None)
+    with pytest.raises(ResultsError, match=r"install\.sh exec pip install 'psycopg\[binary\]'") as caught:
+        open_database("postgresql+psycopg://me:secret@host/results")
+    assert "secret" not in str(caught.value)
+
+
+def test_a_password_of_a_url_is_not_shown() -> None:
+    assert shown_target("postgresql+psycopg://me:secret@host/results") == "postgresql+psycopg://me:***@host/results"
+    assert shown_target("picks.db") == "picks.db"
 
 
 def test_a_url_of_a_sqlite_file_is_that_file(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from modular_framework_benchmark.commands.mode_runners import runner_factory
 from modular_framework_benchmark.commands.stopping_rules import RunSettings, stopping_rule
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.reports.errors import ReportError
+from modular_framework_benchmark.results.connection import shown_target
 from modular_framework_benchmark.results.database import ResultDatabase
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import LocalPool, Pool
@@ -59,6 +60,7 @@ class ExperimentSession:
         description = self._stored.description
         self._settings = settings
         self._name = description.name
+        self._shown = shown_target(options.target)
         stem = self._name if "://" in options.target else Path(options.target).stem
         self._folder = database.folder.resolve() / f"{stem}_episodes" / self._name
 
@@ -78,9 +80,7 @@ class ExperimentSession:
             workers = min(self._options.workers or self._settings.workers, run.pending)
             return LocalPool(make_runner, workers, self._run_mark, logs)
 
-        print(
-            f"{self._name}: {run.pending} of {self._stored.planned} episodes to run; results in {self._options.target}"
-        )
+        print(f"{self._name}: {run.pending} of {self._stored.planned} episodes to run; results in {self._shown}")
         sys.stdout.flush()
         with _Signals():
             try:
@@ -90,7 +90,7 @@ class ExperimentSession:
         return self._print_results(end)
 
     def _interrupted(self) -> int:
-        resume = f"{COMMAND} resume {shlex.quote(self._options.target)} --experiment {self._name}"
+        resume = f"{COMMAND} resume {shlex.quote(self._shown)} --experiment {self._name}"
         if self._options.runner:
             resume += f" --runner {self._options.runner}"
         print(f"\nstopped; every episode that had ended is stored. To go on: {resume}", file=sys.stderr)
@@ -108,7 +108,7 @@ class ExperimentSession:
         try:
             sentences = write_page(OpenedExperiment(self._database, self._number, results), page)
         except ReportError as error:
-            again = f"{COMMAND} report {shlex.quote(self._options.target)} --experiment {self._name} --into FILE"
+            again = f"{COMMAND} report {shlex.quote(self._shown)} --experiment {self._name} --into FILE"
             print(f"error: no report: {error}; the results are stored. To write it: {again}", file=sys.stderr)
             return EXIT_FAILED
         print(*sentences, f"report: {page}", sep="\n")

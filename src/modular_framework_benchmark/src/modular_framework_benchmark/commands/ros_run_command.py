@@ -19,6 +19,7 @@ from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
 from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.results.connection import shown_target
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 from modular_framework_benchmark.results.errors import RecordNotStoredError, ResultsError
 from modular_framework_benchmark.scheduling.local_pool import SchedulerError
@@ -143,7 +144,8 @@ def _unfinished(database: ResultDatabase, name: str | None, target: str) -> int:
         return stored[0].id
     names = ", ".join(one.description.name for one in open_ones or stored)
     count = f"{len(open_ones)} experiments that are not finished" if open_ones else "no experiment that is not finished"
-    raise CommandError(f"{target} has {count}; name one with --experiment; allowed: {names or 'none, it is empty'}")
+    shown = shown_target(target)
+    raise CommandError(f"{shown} has {count}; name one with --experiment; allowed: {names or 'none, it is empty'}")
 
 
 def experiment_path(given: Path) -> Path:

@@ -16,6 +16,8 @@ from modular_framework_benchmark.results.errors import DatabaseMissingError, Res
 BUSY_TIMEOUT_S = 30.0
 """How long a write waits for another process: far longer than a report takes to read 100,000 episodes."""
 BEGIN = "sqlite_begin"
+PIP_NAMES = {"psycopg": "psycopg[binary]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
+"""What pip calls drivers that are imported by another name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,11 @@ def parse_address(target: str | Path) -> DatabaseAddress:
     return DatabaseAddress(str(path), path, None)
 
 
+def shown_target(target: str | Path) -> str:
+    """Returns what a user named as database, without a password."""
+    return parse_address(target).label if "://" in str(target) else str(target)
+
+
 def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool, busy_timeout_s: float) -> Engine:
     """Makes the engine; connects to nothing yet.
 
@@ -75,8 +82,17 @@ def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool, busy
     if address.path is None:
         try:
             return create_engine(address.url or "", pool_pre_ping=True)
-        except (NoSuchModuleError, ImportError) as error:
-            raise ResultsError(f"{address.label}: {error}; install the driver that the URL names") from error
+        except NoSuchModuleError as error:
+            raise ResultsError(
+                f"{address.label}: {error}; install the driver that the URL names, or begin the URL with one that "
+                "SQLAlchemy knows, such as postgresql+psycopg://"
+            ) from error
+        except ImportError as error:
+            driver = PIP_NAMES.get(error.name or "", error.name)
+            raise ResultsError(
+                f"{address.label}: {error}; install the driver that the URL names: ./install.sh exec pip install "
+                f"'{driver}'"
+            ) from error
     path = address.path
     if not path.parent.is_dir():
         raise DatabaseMissingError(f"{path}: there is no folder {path.parent}; make it, or name another file")
