@@ -143,6 +143,19 @@ def test_a_duration_is_limited_by_the_time_of_an_episode_unless_the_file_says_ot
     assert read(text, tmp_path).description.metrics[1].limit == 12.0
 
 
+def test_a_duration_that_should_be_long_counts_as_0_where_an_episode_fails(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def held(episode):\n    return 1.0\n")
+    entry = "{function: mine.py:held, kind: time, unit: s, better: higher}"
+    assert read(PICK.replace("task_time]", f"{entry}]"), tmp_path).description.metrics[1].limit == 0.0
+
+
+def test_a_metric_of_ones_own_may_be_a_count_and_have_bounds(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("def grips(episode):\n    return 1.0\n")
+    entry = "{function: mine.py:grips, kind: count, lowest: 1, highest: 4}"
+    own = read(PICK.replace("task_time]", f"{entry}]"), tmp_path).description.metrics[1]
+    assert (own.kind, own.bounds) == (MetricKind.COUNT, (1.0, 4.0))
+
+
 def test_a_sequential_rule_is_read(tmp_path: Path) -> None:
     stopping = read(PICK + "stopping: {rule: sequential, smallest_difference: 0.1}\n", tmp_path).stopping
     assert (stopping.kind, stopping.metric, stopping.smallest_difference) == (StoppingKind.SEQUENTIAL, "success", 0.1)

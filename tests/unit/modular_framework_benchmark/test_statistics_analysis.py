@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statistics_results import LENGTH, TIME, outcomes, results_of
 
+from modular_framework_benchmark.metrics.registry import METRICS
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics.analysis import (
@@ -43,6 +44,15 @@ def pairs(both: int, only_first: int, only_second: int, none: int, **settings: o
 def of_values(metric: Metric, first: Sequence[float], second: Sequence[float]) -> Comparison:
     statuses = {"A": ["succeeded"] * len(first), "B": ["succeeded"] * len(second)}
     return compare(results_of(statuses, (metric,), {metric.name: {"A": first, "B": second}}))[1]
+
+
+def interval_of(metric: Metric, values: Sequence[float]) -> tuple[float, float]:
+    """Returns the interval of the mean of a metric, rounded."""
+    results = results_of({"A": ["succeeded"] * len(values)}, (metric,), {metric.name: {"A": values}})
+    (found,) = (item for item in summarise(results) if item.metric == metric.name)
+    assert found.estimate is not None
+    assert found.estimate.interval is not None
+    return round(found.estimate.interval.low, 3), round(found.estimate.interval.high, 3)
 
 
 def test_a_difference_that_is_shown_is_a_plain_sentence() -> None:
@@ -80,6 +90,32 @@ def test_a_shorter_time_and_a_higher_clearance_are_better() -> None:
     higher = of_values(CLEARANCE, [0.10, 0.11] * 10, [0.2, 0.22] * 10)
     assert higher.verdict is Verdict.SECOND_BETTER
     assert higher.sentence.startswith("B has a higher clearance than A (+0.1050 m")
+
+
+def test_counts_are_more_or_fewer() -> None:
+    more = of_values(METRICS["candidates"].metric, [30.0, 31.0] * 10, [158.0, 160.0] * 10)
+    assert more.sentence.startswith("B has more candidates than A (+128.50, 95 % interval 128.2")
+    fewer = of_values(METRICS["attempts"].metric, [1.0, 2.0] * 10, [4.0, 6.0] * 10)
+    assert fewer.sentence.startswith("A has fewer attempts than B (-3.50, 95 % interval -3.7")
+
+
+def test_an_interval_of_a_mean_ends_where_the_metric_ends() -> None:
+    few = [0.0] * 18 + [2.0, 3.0]
+    unbounded = interval_of(LENGTH, few)
+    assert unbounded[0] < 0.0
+    assert interval_of(METRICS["failed_states"].metric, few) == (0.0, unbounded[1])
+    assert interval_of(METRICS["reachable_share"].metric, [1.0] * 18 + [0.5, 0.7])[1] == 1.0
+    assert interval_of(dataclasses.replace(TIME, limit=10.0), [10.0] * 18 + [1.0, 2.0])[1] == 10.0
+    assert interval_of(METRICS["failed_states"].metric, [-1.0] * 19 + [1.0])[0] == -1.0
+
+
+def test_a_hold_time_counts_as_measured_and_as_0_in_an_episode_that_lost_the_object() -> None:
+    hold = dataclasses.replace(METRICS["hold_time"].metric, limit=0.0)
+    statuses = {"A": ["succeeded"] * 15 + ["failed"] * 5, "B": ["succeeded"] * 20}
+    held = {"A": [3.0] * 15 + [np.nan] * 5, "B": [6.0] * 20}
+    found = compare(results_of(statuses, (hold,), {"hold_time": held}))[1]
+    assert (found.first_estimate, found.second_estimate) == (2.25, 6.0)
+    assert found.sentence.startswith("B has a longer hold time than A (+3.8 s")
 
 
 def test_a_lower_rate_of_collisions_is_better() -> None:

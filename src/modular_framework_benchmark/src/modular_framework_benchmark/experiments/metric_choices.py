@@ -15,7 +15,7 @@ from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
 
-OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description")
+OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description", "lowest", "highest")
 KNOWN_KEYS = ("metric", "limit")
 EXAMPLE = "{function: my_metric.py:smoothness, better: lower, unit: rad}"
 
@@ -51,7 +51,8 @@ def read_metrics(
 
 def _limited(metric: Metric, time_limit_s: float) -> Metric:
     if metric.kind is MetricKind.TIME and metric.limit is None:
-        return dataclasses.replace(metric, limit=time_limit_s)
+        # what fails has held for no time at all, and has taken all the time there was
+        return dataclasses.replace(metric, limit=0.0 if metric.better is Direction.HIGHER else time_limit_s)
     return metric
 
 
@@ -103,14 +104,17 @@ def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, Measure] | Non
 
     better = _choice(node, "better", [item.value for item in Direction], "higher", reading)
     kind = _choice(node, "kind", [item.value for item in MetricKind], "value", reading)
-    limit = reading.number(node.entries["limit"], "limit") if "limit" in node.entries else None
+    limit, lowest, highest = (
+        reading.number(node.entries[key], key) if key in node.entries else None
+        for key in ("limit", "lowest", "highest")
+    )
     name = text("name", function)
     if not name.isidentifier():
         reading.faults.add(node.entries["name"].location, f"the name '{name}' must be letters, digits and underscores")
         return None
     metric = Metric(
         name, text("component", "own"), MetricKind(kind), Direction(better), text("unit", ""), limit,
-        text("description", ""),
+        text("description", ""), lowest, highest,
     )  # fmt: skip
     return metric, {"name": name, "function": f"{path}:{function}"}
 

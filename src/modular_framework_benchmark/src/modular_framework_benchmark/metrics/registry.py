@@ -32,52 +32,60 @@ class RegisteredMetric:
     measure: MetricFunction
 
 
-_RATE, _VALUE, _TIME = MetricKind.RATE, MetricKind.VALUE, MetricKind.TIME
+_RATE, _VALUE, _COUNT, _TIME = MetricKind.RATE, MetricKind.VALUE, MetricKind.COUNT, MetricKind.TIME
 _HIGHER, _LOWER = Direction.HIGHER, Direction.LOWER
+_SHARE = (0.0, 1.0)
+_NOT_NEGATIVE = (0.0, None)
+_Bounds = tuple[float | None, float | None]
 
 
 def _registered(
-    measure: MetricFunction, component: str, kind: MetricKind, better: Direction, unit: str = ""
+    measure: MetricFunction,
+    component: str,
+    kind: MetricKind,
+    better: Direction,
+    unit: str = "",
+    bounds: _Bounds = (None, None),
 ) -> RegisteredMetric:
     """Describes a metric by the name and the first line of the docstring of its function."""
     description = (inspect.getdoc(measure) or "").splitlines()[0]
-    return RegisteredMetric(
-        Metric(getattr(measure, "__name__", ""), component, kind, better, unit, description=description), measure
-    )
+    name, (lowest, highest) = getattr(measure, "__name__", ""), bounds
+    metric = Metric(name, component, kind, better, unit, description=description, lowest=lowest, highest=highest)
+    return RegisteredMetric(metric, measure)
 
 
 _ALL = (
     _registered(task.success, "task", _RATE, _HIGHER),
     _registered(task.task_time, "task", _TIME, _LOWER, "s"),
     _registered(task.task_wall_time, "task", _TIME, _LOWER, "s"),
-    _registered(task.failed_states, "task", _VALUE, _LOWER),
+    _registered(task.failed_states, "task", _COUNT, _LOWER),
     _registered(generation.generation_time, "generation", _TIME, _LOWER, "s"),
     _registered(generation.generation_success, "generation", _RATE, _HIGHER),
-    _registered(generation.candidates, "generation", _VALUE, _HIGHER),
-    _registered(generation.reachable_share, "generation", _VALUE, _HIGHER),
-    _registered(generation.best_rank, "generation", _VALUE, _LOWER),
+    _registered(generation.candidates, "generation", _COUNT, _HIGHER),
+    _registered(generation.reachable_share, "generation", _VALUE, _HIGHER, bounds=_SHARE),
+    _registered(generation.best_rank, "generation", _VALUE, _LOWER, bounds=(1.0, None)),
     _registered(planning.planning_time, "planning", _TIME, _LOWER, "s"),
     _registered(planning.search_time, "planning", _TIME, _LOWER, "s"),
-    _registered(planning.planning_success, "planning", _VALUE, _HIGHER),
-    _registered(planning.path_length, "planning", _VALUE, _LOWER, "rad"),
+    _registered(planning.planning_success, "planning", _VALUE, _HIGHER, bounds=_SHARE),
+    _registered(planning.path_length, "planning", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
     _registered(planning.motion_duration, "planning", _TIME, _LOWER, "s"),
     _registered(planning.smoothness, "planning", _VALUE, _HIGHER),
     _registered(planning.clearance, "planning", _VALUE, _HIGHER, "m"),
-    _registered(planning.attempts, "planning", _VALUE, _LOWER),
-    _registered(kinematics.solved_share, "kinematics", _VALUE, _HIGHER),
+    _registered(planning.attempts, "planning", _COUNT, _LOWER),
+    _registered(kinematics.solved_share, "kinematics", _VALUE, _HIGHER, bounds=_SHARE),
     _registered(kinematics.solving_time, "kinematics", _TIME, _LOWER, "s"),
-    _registered(kinematics.solutions, "kinematics", _VALUE, _HIGHER),
-    _registered(kinematics.position_error, "kinematics", _VALUE, _LOWER, "m"),
-    _registered(kinematics.rotation_error, "kinematics", _VALUE, _LOWER, "rad"),
+    _registered(kinematics.solutions, "kinematics", _COUNT, _HIGHER),
+    _registered(kinematics.position_error, "kinematics", _VALUE, _LOWER, "m", _NOT_NEGATIVE),
+    _registered(kinematics.rotation_error, "kinematics", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
     _registered(execution.execution_time, "execution", _TIME, _LOWER, "s"),
-    _registered(execution.execution_success, "execution", _VALUE, _HIGHER),
-    _registered(execution.tracking_error, "execution", _VALUE, _LOWER, "rad"),
-    _registered(execution.greatest_tracking_error, "execution", _VALUE, _LOWER, "rad"),
-    _registered(execution.executed_length, "execution", _VALUE, _LOWER, "rad"),
+    _registered(execution.execution_success, "execution", _VALUE, _HIGHER, bounds=_SHARE),
+    _registered(execution.tracking_error, "execution", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(execution.greatest_tracking_error, "execution", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(execution.executed_length, "execution", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
     _registered(execution.executed_smoothness, "execution", _VALUE, _HIGHER),
-    _registered(execution.greatest_effort, "execution", _VALUE, _LOWER, "Nm"),
+    _registered(execution.greatest_effort, "execution", _VALUE, _LOWER, "Nm", _NOT_NEGATIVE),
     _registered(grasp.lift, "grasp", _VALUE, _HIGHER, "m"),
-    _registered(grasp.slip, "grasp", _VALUE, _LOWER, "m"),
+    _registered(grasp.slip, "grasp", _VALUE, _LOWER, "m", _NOT_NEGATIVE),
     _registered(grasp.grasp_time, "grasp", _TIME, _LOWER, "s"),
     _registered(grasp.hold_time, "grasp", _TIME, _HIGHER, "s"),
 )

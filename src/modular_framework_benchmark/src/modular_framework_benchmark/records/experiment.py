@@ -6,6 +6,7 @@ It is what a result database keeps of an experiment file, so that statistics and
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -22,6 +23,7 @@ class MetricKind(Enum):
 
     RATE = "rate"  # true or false in each episode, such as success
     VALUE = "value"  # a number, such as a length
+    COUNT = "count"  # how many of something, such as attempts
     TIME = "time"  # a duration, censored at a limit when the episode did not finish
 
 
@@ -37,6 +39,8 @@ class Metric:
         unit: Unit of the values, such as `s`; "" for none.
         limit: Value at which it is censored [unit]; None: never. An episode that failed counts at the limit.
         description: What it says, in a sentence.
+        lowest: Least value that it can have [unit]; None: 0 for counts and times, otherwise none is known.
+        highest: Greatest value that it can have [unit]; None: none is known.
     """
 
     name: str
@@ -46,6 +50,18 @@ class Metric:
     unit: str = ""
     limit: float | None = None
     description: str = ""
+    lowest: float | None = None
+    highest: float | None = None
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Returns between which values an episode counts, the limit included [unit]."""
+        never_negative = self.kind in (MetricKind.COUNT, MetricKind.TIME)
+        low = (0.0 if never_negative else -math.inf) if self.lowest is None else self.lowest
+        high = math.inf if self.highest is None else self.highest
+        if self.limit is None:
+            return low, high
+        return (low, min(high, self.limit)) if self.better is Direction.LOWER else (max(low, self.limit), high)
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,8 @@ def nothing_to_compare(metric: Metric, first: str, second: str, reason: str) -> 
 def planned(metric: Metric, pairs: int, difference: float) -> str:
     """Returns the end of a sentence on how many pairs would show a difference."""
     rate = metric.kind is MetricKind.RATE
-    text = f"{100 * difference:g} points" if rate else f"{difference:g} {metric.unit}".rstrip()
+    of_value = f"{difference:g} {metric.unit}" if metric.unit else f"a difference of {difference:g}"
+    text = f"{100 * difference:g} points" if rate else of_value
     return f"; {pairs} paired episodes would show {text}"
 
 
@@ -116,6 +117,8 @@ def _comparative(metric: Metric, difference: float) -> str:
         return "succeeds more often than"
     if metric.kind is MetricKind.RATE:
         return f"has a {'higher' if difference > 0 else 'lower'} rate of {words(metric)} than"
+    if metric.kind is MetricKind.COUNT:
+        return f"has {'more' if difference > 0 else 'fewer'} {words(metric)} than"
     if metric.kind is MetricKind.TIME:
         return f"has a {'longer' if difference > 0 else 'shorter'} {words(metric)} than"
     return f"has a {'higher' if metric.better is Direction.HIGHER else 'lower'} {words(metric)} than"

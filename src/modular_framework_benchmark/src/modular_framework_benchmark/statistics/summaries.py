@@ -16,6 +16,7 @@ from modular_framework_benchmark.statistics.values import (
     interquartile_mean,
     interquartile_mean_interval,
     mean_interval,
+    within_bounds,
 )
 
 Floats = NDArray[np.float64]
@@ -51,15 +52,15 @@ def summarise_method(table: EpisodeTable, metric: Metric, method: str, generator
     )
     if metric.kind is MetricKind.RATE or estimate is None:
         return summary
-    return _with_quartiles(summary, seen.values[present], confidence, generator)
+    return _with_quartiles(summary, metric, seen.values[present], confidence, generator)
 
 
 def _with_quartiles(
-    summary: MethodSummary, values: Floats, confidence: float, generator: np.random.Generator
+    summary: MethodSummary, metric: Metric, values: Floats, confidence: float, generator: np.random.Generator
 ) -> MethodSummary:
     first, median, third = (float(value) for value in np.quantile(values, [0.25, 0.5, 0.75]))
     interval = interquartile_mean_interval(values, np.zeros(len(values), dtype=np.int64), confidence, generator)
-    middle = Estimate("interquartile mean", interquartile_mean(values), interval)
+    middle = Estimate("interquartile mean", interquartile_mean(values), within_bounds(interval, metric, values))
     return MethodSummary(
         summary.method, summary.metric, summary.unit, summary.levels, summary.counts, summary.estimate,
         summary.without_broken, median, middle, (first, third), summary.sentence,
@@ -74,4 +75,5 @@ def _estimate(metric: Metric, values: Floats, confidence: float, generator: np.r
         interval = rate_interval(int(values.sum()), len(values), confidence)
     else:
         interval = mean_interval(values, np.zeros(len(values), dtype=np.int64), confidence, generator)
+        interval = interval and within_bounds(interval, metric, values)
     return Estimate(figure_name(metric), float(values.mean()), interval)

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from modular_framework_benchmark.records.experiment import Direction
+from modular_framework_benchmark.records.experiment import Direction, Metric
 from modular_framework_benchmark.statistics.comparison import Effect, Interval
 
 Floats = NDArray[np.float64]
@@ -53,6 +54,23 @@ def mean_interval(
         if np.isfinite(resampled):
             factor, method = resampled, f"symmetric studentised bootstrap, {RESAMPLES} resamples"
     return Interval(mean - factor * deviation, mean + factor * deviation, confidence, method)
+
+
+def within_bounds(interval: Interval, metric: Metric, values: Floats) -> Interval:
+    """Returns the part of an interval in which the figure of a metric can be.
+
+    It holds the true figure as often as the whole interval, for the figure is never in the part that is cut off.
+
+    Args:
+        interval: Interval of a mean of values.
+        metric: What they are of.
+        values: The values, shape (n,), n at least 1; where they are beyond its bounds, these do not hold.
+    """
+    lowest, highest = metric.bounds
+    low, high = max(interval.low, min(lowest, values.min())), min(interval.high, max(highest, values.max()))
+    if (low, high) == (interval.low, interval.high):
+        return interval
+    return replace(interval, low=float(low), high=float(high), method=f"{interval.method}, within the metric's bounds")
 
 
 def interquartile_mean(values: Floats) -> float:
