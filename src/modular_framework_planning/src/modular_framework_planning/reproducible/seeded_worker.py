@@ -129,6 +129,13 @@ def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
             straight.plan(PlanningRequest(scene, group.name, (goal,)))
 
 
+def _wait_for_children(*_: object) -> None:
+    """Takes note of children that ended: of those that are ignored the processor time is lost."""
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+
+
 class _Straight:
     """Plans without OMPL, whose random generator must stay unused here."""
 
@@ -141,7 +148,7 @@ class _Straight:
 def main() -> None:
     """Reads the setup from standard input, builds the robot and serves."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, _wait_for_children)
     sys.path[:] = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the parent process
     setup: WorkerSetup = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the parent process
     model = RobotModel(*setup.robot)
