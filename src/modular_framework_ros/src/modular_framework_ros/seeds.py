@@ -33,7 +33,7 @@ def seed_parameter() -> int | None:
 
 
 def derived_seed(seed: int, *purpose: object) -> int:
-    """Returns the seed of one purpose, which tells nothing about that of another one.
+    """Returns the seed of one purpose, from which that of another one cannot be guessed.
 
     Args:
         seed: of the launch.

@@ -32,7 +32,7 @@ from modular_framework_benchmark.episodes.ros_recording import model_samples, wr
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, WorldError, spawn
-from modular_framework_core.task_runner.ros_episode import EpisodeError, begin_episode
+from modular_framework_core.task_runner.ros_episode import GENERATE_SERVICE, EpisodeError, begin_episode
 from modular_framework_ros.calls import CallError, request_service, wait_until
 from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
 
@@ -42,7 +42,7 @@ SAMPLE_S, SAMPLES_TIMEOUT_S = 0.02, 2.0
 SERVICE_TIMEOUT_S, STOP_TIMEOUT_S = 60.0, 3.0
 START_SERVICE, STOP_SERVICE = "/task/start", "/task/stop"
 LIST_CONTROLLERS = "/controller_manager/list_controllers"
-GENERATION_SIGNAL, GENERATION_SERVICE = "/grasp_generated", "/generate_grasps"
+GENERATION_SIGNAL = "/grasp_generated"
 GENERATION_SERVICE_S = 30.0
 """How long after the signal a method's service is waited for [s]: on a busy machine it connects for seconds."""
 
@@ -220,7 +220,7 @@ class EpisodeRecorder:
             self._wait(lambda: _is_published(GENERATION_SIGNAL))
             # a method offers the service soon after, or it has none
             until = time.monotonic() + GENERATION_SERVICE_S
-            self._wait(lambda: GENERATION_SERVICE in _services() or time.monotonic() > until)
+            self._wait(lambda: rospy.resolve_name(GENERATE_SERVICE) in _services() or time.monotonic() > until)
 
     def _on_status(self, message: String) -> None:
         status = json.loads(message.data)

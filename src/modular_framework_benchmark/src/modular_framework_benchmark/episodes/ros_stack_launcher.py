@@ -3,8 +3,8 @@
 
     python3 -m modular_framework_benchmark.episodes.ros_stack_launcher PACKAGE FILE PARAMETERS_FILE [name:=value ...]
 
-It runs until it is stopped or a node dies, and says last which one and why. Whoever started it kills the nodes that
-are left.
+It runs until it is stopped or a node dies, and says last which one and why. The process that started it kills the nodes
+that are left.
 """
 
 from __future__ import annotations

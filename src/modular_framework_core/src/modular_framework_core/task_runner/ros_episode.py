@@ -28,7 +28,7 @@ class EpisodeError(RuntimeError):
     """An episode cannot begin; the text says why."""
 
 
-def begin_episode(spawn: Callable[[], None] = lambda: None, settle_s: float = 0.5, restart: bool = True) -> None:
+def begin_episode(spawn: Callable[[], None], settle_s: float) -> None:
     """Begins an episode; simulated time has to be held by the caller, from here to the end of the episode.
 
     In this sequence: the world begins again, objects are spawned while time stands still, they settle, the managers
@@ -37,14 +37,12 @@ def begin_episode(spawn: Callable[[], None] = lambda: None, settle_s: float = 0.
     Args:
         spawn: Puts the objects of the episode into the world.
         settle_s: Simulated time for them to settle [s].
-        restart: Whether the world begins again; if not, the episode is not that of a cold start.
 
     Raises:
         EpisodeError: A node does not do its part.
     """
     try:
-        if restart:
-            _trigger(RESTART_SERVICE, SERVICE_TIMEOUT_S)
+        _trigger(RESTART_SERVICE, SERVICE_TIMEOUT_S)
         spawn()
         if settle_s > 0.0:
             SimulatedTime().sleep(settle_s)

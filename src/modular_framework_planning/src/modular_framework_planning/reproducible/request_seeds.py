@@ -31,7 +31,7 @@ def _goal_text(goal: object) -> str:
 
 
 class RequestCounts:
-    """Counts how often the same was asked; counts anew once time goes back, as with a simulation that begins again.
+    """Counts how often the same was asked; starts again once time goes back, as with a simulation that begins again.
 
     Threads may share it. A request that is repeated gets another number, so that it is not planned the same way again.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import actionlib
@@ -27,7 +28,8 @@ from std_msgs.msg import String
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.move_group import capability_names as names
-from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_ros.action_client import SteadyActionClient, is_connected
+from modular_framework_ros.calls import wait_until
 
 GOAL_TOLERANCE = 1.0e-4  # [rad or m]
 EXECUTION_MARGIN_S = 60.0
@@ -81,7 +83,7 @@ class MoveGroupClient:
                     f"service {service.resolved_name} was not offered within {timeout_s:.0f} s; is move_group running?",
                 ) from error
         for name, client in ((names.MOVE_ACTION, self._move), (names.EXECUTE_ACTION, self._execute)):
-            if not client.wait_for_server(rospy.Duration(timeout_s)):
+            if not wait_until(partial(is_connected, client), timeout_s):
                 raise PlanningError(
                     ErrorCode.COMMUNICATION_FAILURE,
                     f"action {rospy.resolve_name(name)} was not "

@@ -117,7 +117,7 @@ class PhysicsWorld:
         Args:
             model: What to add.
             prepared: What `prepare` made of it, if that was called before.
-            keep: Whether it belongs to the world that `restart` makes anew.
+            keep: Whether it belongs to the world as `restart` makes it.
 
         Raises:
             DuplicateModelError: Its name is taken.
