@@ -14,7 +14,8 @@ def run_node(module: str, function: str = "main") -> NoReturn:
 
     An interrupt (SIGINT) before the node handles signals itself ends the process at once, without a traceback:
     roslaunch sends it to all nodes when one of them died, and the reason of that death is what the user needs to see.
-    One that comes while rospy starts the node ends the process too.
+    One that comes while rospy starts the node ends the process too. The node's publishers send without a change of
+    threads.
 
     Args:
         module: Full name of the module.
@@ -23,6 +24,9 @@ def run_node(module: str, function: str = "main") -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     import rospy
 
+    from modular_framework_ros.ros_direct_publishing import publish_directly
+
+    publish_directly()
     try:
         sys.exit(getattr(importlib.import_module(module), function)())
     except rospy.exceptions.ROSInitException:
