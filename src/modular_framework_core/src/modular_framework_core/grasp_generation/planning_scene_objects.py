@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ class SceneObjectError(ValueError):
     """A collision object cannot be understood; the text says which part."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SceneObject:
     """An object of the planning scene.
 
@@ -35,7 +36,7 @@ class SceneObject:
     surface: Surface
     solids: tuple[TriangleMesh, ...] = ()
 
-    @property
+    @cached_property
     def centre(self) -> npt.NDArray[np.float64]:
         """Centre of the bounding box in the planning frame (3,) [m]."""
         return (self.surface.points.min(axis=0) + self.surface.points.max(axis=0)) / 2

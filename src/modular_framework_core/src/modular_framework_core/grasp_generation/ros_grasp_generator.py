@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import heapq
 import threading
+import time
 from collections import Counter
 from contextlib import nullcontext
 
@@ -34,6 +35,8 @@ SIGNAL_TOPIC = "grasp_generated"
 GENERATE_SERVICES = ("generate_grasps", "~generate")
 REFRESH_SERVICES = ("refresh_grasps", "~refresh")
 SCENE_PERIOD_S = 0.25
+SETTINGS_PERIOD_S = 2.0
+"""Time between two readings of the parameters while the scene is watched [s]: each is two dozen calls of the master."""
 WAITING_PERIOD_S = 10.0
 
 
@@ -43,7 +46,8 @@ class GraspGenerator:
     New grasps replace the ones that were generated before. An object that the robot carries counts as the one that
     is set down under its name.
 
-    Parameters: see :mod:`ros_generator_settings`, and those of the method; they are read again for every generation.
+    Parameters: see :mod:`ros_generator_settings`, and those of the method; they are read again for every generation,
+        and every 2 s while the scene is watched.
     Publishers: ``grasp_generated`` (std_msgs/Bool, latched), ``grasp_generated/reason`` (std_msgs/String, latched),
         ``component_reports`` (std_msgs/String, JSON: of a generation its time and how many grasps there were).
     Services (std_srvs/Trigger), the names of every method first, this node's own second:
@@ -107,11 +111,13 @@ class GraspGenerator:
         before: list[SceneObject] = []
         wait_limit: WaitLimit | None = WaitLimit()  # None: every object that is there has been handled
         scene_was_read = False
+        settings, settings_read_s = read_settings(), time.monotonic()
         while not rospy.is_shutdown():
             if wait_limit is None and self._time.enabled:
                 rospy.rostime.wallsleep(SCENE_PERIOD_S)
                 continue
-            settings = read_settings()
+            if wait_limit or time.monotonic() - settings_read_s > SETTINGS_PERIOD_S:
+                settings, settings_read_s = read_settings(), time.monotonic()
             try:
                 # a request that comes meanwhile looks at the scene later, and so has the last word
                 with self._generating if self._time.enabled else nullcontext():

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import rospy
-from moveit_msgs.msg import PlanningSceneComponents
+from moveit_msgs.msg import CollisionObject, PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
 from modular_framework_core.grasp_generation.planning_scene_objects import (
@@ -41,6 +41,7 @@ class SceneObjects:
     def __init__(self) -> None:
         """Connects to nothing yet, see :meth:`connect`."""
         self.attached: set[str] = set()
+        self._known: dict[str, tuple[CollisionObject, SceneObject | None]] = {}
 
     def connect(self, timeout_s: float) -> None:
         """Waits for move_group.
@@ -90,13 +91,18 @@ class SceneObjects:
         answer = call_service(self._scene, GetPlanningSceneRequest(components=components), SERVICE_TIMEOUT_S)
         self.attached = {item.object.id for item in answer.scene.robot_state.attached_collision_objects}
         objects = []
+        known: dict[str, tuple[CollisionObject, SceneObject | None]] = {}
         for message in answer.scene.world.collision_objects:
+            before, found = self._known.get(message.id, (None, None))
             try:
-                found = scene_object(message)
+                if message != before:
+                    found = scene_object(message)
+                known[message.id] = message, found
             except (SceneObjectError, ValueError) as error:
                 rospy.logwarn_throttle(WARNING_PERIOD_S, f"{rospy.get_name()}: {error}; this object is left out.")
                 continue
             objects += [found] if found is not None else []
+        self._known = known
         return objects
 
 
