@@ -122,6 +122,8 @@ class LaunchSession:
             "PYTHONUNBUFFERED": "1",
         }
         self.env.pop("ROS_HOSTNAME", None)
+        # of two nodes that make it at the same time, rospy's logging leaves one without any log
+        Path(self.env["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
         self._launches: list[Launch] = []
 
     def start(self, command: Sequence[str], log_path: Path | None = None) -> Launch:
