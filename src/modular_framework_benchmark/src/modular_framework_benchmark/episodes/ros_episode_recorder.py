@@ -36,15 +36,15 @@ from modular_framework_core.task_runner.ros_episode import GENERATE_SERVICE, Epi
 from modular_framework_ros.calls import CallError, request_service, wait_until
 from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
 
+LIST_CONTROLLERS = "/controller_manager/list_controllers"
+GENERATION_SIGNAL = "/grasp_generated"
+GENERATION_SERVICE_S = 30.0
+"""How long after the signal a method's service is waited for [s]: on a busy machine it connects for seconds."""
 POLL_S = 0.02
 SETTLE_S = 0.5
 SAMPLE_S, SAMPLES_TIMEOUT_S = 0.02, 2.0
 SERVICE_TIMEOUT_S, STOP_TIMEOUT_S = 60.0, 3.0
 START_SERVICE, STOP_SERVICE = "/task/start", "/task/stop"
-LIST_CONTROLLERS = "/controller_manager/list_controllers"
-GENERATION_SIGNAL = "/grasp_generated"
-GENERATION_SERVICE_S = 30.0
-"""How long after the signal a method's service is waited for [s]: on a busy machine it connects for seconds."""
 
 
 @dataclass(frozen=True, slots=True)
