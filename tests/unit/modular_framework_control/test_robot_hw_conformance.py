@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One suite over every hardware: fake, simulated, a UR arm and an EZGripper against their emulators, and two as one."""
+"""The conformance suite over fake and simulated hardware, and what the suite itself promises."""
 
 from __future__ import annotations
 
@@ -9,22 +9,13 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
 
 import pytest
 
-from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
 from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
 from modular_framework_control.hardware_interface.joint_limits import JointLimits
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
-from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.hardware_interface.robot_hw_conformance import RobotHWConformance
-from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
-from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
-from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
-from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
-from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
-from modular_framework_drivers.ur.ur_arm_robot_hw import JOINT_NAMES, UrArmHardware
 from modular_framework_ros.node_handle import MappingNodeHandle
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
@@ -47,7 +38,6 @@ LIMITED = {
     "has_velocity_limits": True,
     "max_velocity": 2.0,
 }
-KNUCKLE = {"has_velocity_limits": True, "max_velocity": 2.0}
 ROBOT = """<robot name="lab"><link name="base"/>
 {links}
 </robot>"""
@@ -110,92 +100,6 @@ class TestPyBullet(RobotHWConformance):
     def advance(self, period_s: float) -> None:
         for _ in range(round(period_s / self._world.settings.time_step_s)):
             self._world.step()
-
-
-class TestUrArm(RobotHWConformance):
-    """A UR5 in software, at the end of the unmodified ur-rtde client."""
-
-    period_s = 0.008
-    settle_s = 0.4
-    real_time = True
-    close_after_test = False
-    arm: ClassVar[UrArmHardware]
-
-    @pytest.fixture(autouse=True, scope="class")
-    @classmethod
-    def arm_of_all(cls) -> Iterator[None]:
-        emulator = EmulatedArm()
-        robot_hw = cls.arm = UrArmHardware()
-        settings = {"robot_ip_address": emulator.address, "link_timeout": 0.5}
-        assert robot_hw.init(MappingNodeHandle({}), MappingNodeHandle(settings, "/arm_hw"))
-        yield
-        robot_hw.close()
-        robot_hw.close()
-        emulator.close()
-
-    def make_robot_hw(self) -> RobotHW:
-        return self.arm
-
-    def limits(self) -> Mapping[str, JointLimits]:
-        return dict.fromkeys(JOINT_NAMES, JointLimits(-6.4, 6.4, 3.2))
-
-
-class TestEzGripper(RobotHWConformance):
-    """A gripper whose servo is emulated on a pseudo-terminal."""
-
-    period_s = 0.008
-    settle_s = 0.6
-    real_time = True
-    close_after_test = False
-    robot_hw: ClassVar[RobotHW]
-
-    @pytest.fixture(autouse=True, scope="class")
-    @classmethod
-    def robot_hw_of_all(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-        finger = Finger(DynamixelServo(), FingerModel(top_speed=12000.0, time_constant_s=0.015), opening=200.0)
-        line = DynamixelLine([finger], tmp_path_factory.mktemp("line") / "gripper")
-        line.connect()
-        cls.robot_hw = cls.initialised({"port_name": str(line.link), "start_position": 1.7})
-        yield
-        cls.robot_hw.close()
-        cls.robot_hw.close()
-        line.close()
-
-    @classmethod
-    def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
-        """The hardware, with these parameters of the gripper."""
-        root = MappingNodeHandle({"hand": gripper, "joint_limits": {JOINT: KNUCKLE}})
-        robot_hw = EzGripperRobotHW()
-        assert robot_hw.init(root, root.child("hand"))
-        return robot_hw
-
-    def make_robot_hw(self) -> RobotHW:
-        return self.robot_hw
-
-    def limits(self) -> Mapping[str, JointLimits]:
-        return {JOINT: JointLimits(0.0, 1.94, 2.0)}
-
-
-class TestCombination(TestEzGripper):
-    """An arm and a gripper of two kinds as one robot: the one fake, the other with its emulated servo."""
-
-    @classmethod
-    def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
-        root = MappingNodeHandle(
-            {
-                "robot_hardware": ["arm", "hand"],
-                "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
-                "hand": {"type": "lab/Hand", **gripper},
-                "joint_limits": {**dict.fromkeys(("shoulder", "elbow"), LIMITED), JOINT: KNUCKLE},
-            }
-        )
-        kinds: dict[str, type[RobotHW]] = {"lab/Mock": MockRobotHW, "lab/Hand": EzGripperRobotHW}
-        robot_hw = CombinedRobotHW(lambda name: kinds[name]())
-        assert robot_hw.init(root, root)
-        return robot_hw
-
-    def limits(self) -> Mapping[str, JointLimits]:
-        return {**super().limits(), **dict.fromkeys(("shoulder", "elbow"), JointLimits(-1.0, 1.0, 2.0))}
 
 
 class TestSlidingGripper(TestMock):
