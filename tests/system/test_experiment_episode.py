@@ -22,7 +22,7 @@ from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSp
 MARK = "EPISODE_TEST"
 ENOUGH_S = 240.0
 PICK: dict[str, Any] = {
-    "arguments": {"world_file": "ur5_table.world"},
+    "arguments": {"world_file": "ur5_table.world", "real_time_factor": 0},
     "objects": [{"name": "cube_1", "model": "cube", "x": 0.05, "y": 0.5, "z": 0.866, "yaw": 0.3}],
     "success": {"lifted": 0.1, "hold_time": 1.0, "shake": 2.0},
     "metrics": list(METRICS),

@@ -106,13 +106,13 @@ def test_planners_that_improve_their_path_stop_with_the_time_and_return_what_the
     model: RobotModel, pipeline: PlanningPipeline, name: str
 ) -> None:
     begun = time.monotonic()
-    request = wall_request(model, planner_id=name, allowed_time_s=6.0)
+    request = wall_request(model, planner_id=name, allowed_time_s=3.0)
     try:
         assert arrives(pipeline.plan(request))
     except PlanningError as error:  # a busy computer may be too slow for a path or for its check: it must say so
         assert error.code == ErrorCode.TIMED_OUT, error.reason
         assert "time ran out after" in error.reason or "its check was not done" in error.reason, error.reason
-    assert time.monotonic() - begun > 4.9, "the time allowed is used, but for the last second"
+    assert time.monotonic() - begun > 1.9, "the time allowed is used, but for the last second"
 
 
 def test_a_planner_that_is_not_there_is_replaced_by_the_default_one(

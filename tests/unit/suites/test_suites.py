@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -56,7 +58,37 @@ def test_every_suite_is_run_once_in_its_lane(runner: ModuleType) -> None:
     assert lanes["rostest/modular_framework_drivers/ur_arm_fault_times"] == "alone"
     assert lanes["unit/modular_framework_drivers/ur"] == lanes["system/test_hardware_pick"] == "emulated hardware"
     assert lanes["system/test_simulated_pick"] == "whole launches"
-    assert lanes["lint/ruff"] == "others"
+    assert lanes["lint/ruff"] == "checkers" and lanes["unit/smach"] == "others"
+
+
+def test_a_launch_runs_beside_fewer_others_and_what_measures_time_alone(
+    runner: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running: list[str] = []
+    beside: list[list[str]] = []
+
+    def run_suite(suite: Any) -> tuple[str, Any]:
+        running.append(suite.lane)
+        time.sleep(0.02)
+        beside.append(sorted(running))
+        running.remove(suite.lane)
+        return suite.name, runner.Count(passed=1)
+
+    monkeypatch.setattr(runner, "run_suite", run_suite)
+    names = [f"unit/{number}" for number in range(10 * runner.PROCESSORS)] + [
+        "system/a",
+        "system/b",
+        "system/test_stop",
+    ]
+    names += ["unit/modular_framework_drivers/a", "rostest/modular_framework_control/control_loop_node"]
+    suites = [runner.Suite(name, Path(name)) for name in names]
+    counts = [count for lanes in runner.PHASES for count in runner.run_phase(lanes, suites).items()]
+    assert sorted(name for name, _ in counts) == sorted(names)
+    assert beside.count(["alone"]) == 2 and beside.count(["emulated hardware"]) == 1
+    launches = [group for group in beside if "whole launches" in group]
+    assert launches and all(group.count("whole launches") == 1 for group in launches)
+    assert max(len(group) for group in launches) == 1 + 2 * (runner.PROCESSORS + 3) // 5
+    assert ["others"] * (runner.PROCESSORS + 3) in beside
 
 
 def report(results: Path, tests: int, failures: int = 0, skipped: int = 0) -> Path:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler
+from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler, port_handler
 
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.ezgripper import dynamixel_bus, mx64
@@ -22,6 +22,12 @@ from modular_framework_drivers.ezgripper.dynamixel_bus import (
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
 MakeLine = Callable[..., DynamixelLine]
+
+
+@pytest.fixture
+def patient_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The SDK waits 34 ms for an answer by default, less than a busy computer may take."""
+    monkeypatch.setattr(port_handler, "LATENCY_TIMER", 150)
 
 
 def sdk_port(line: DynamixelLine, baudrate: int = 57600) -> PortHandler:
@@ -43,6 +49,7 @@ def bus(line: DynamixelLine) -> DynamixelBus:
     return made
 
 
+@pytest.mark.usefixtures("patient_sdk")
 def test_the_sdk_pings_reads_and_writes(line: DynamixelLine) -> None:
     port, packets = sdk_port(line), PacketHandler(1.0)
     assert packets.ping(port, 1) == (310, COMM_SUCCESS, 0)
@@ -53,6 +60,7 @@ def test_the_sdk_pings_reads_and_writes(line: DynamixelLine) -> None:
     port.closePort()
 
 
+@pytest.mark.usefixtures("patient_sdk")
 def test_the_sdk_talks_to_two_servos_at_once(make_line: MakeLine) -> None:
     port, packets = sdk_port(make_line(1, 2)), PacketHandler(1.0)
     together = GroupSyncWrite(port, packets, 34, 2)
