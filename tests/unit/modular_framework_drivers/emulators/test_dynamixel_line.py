@@ -196,6 +196,7 @@ def test_the_link_does_not_replace_a_file(make_line: MakeLine, tmp_path: Path) -
         make_line()
 
 
+@pytest.mark.usefixtures("patient_sdk")
 def test_a_line_that_nobody_reads_loses_what_it_cannot_hold_and_goes_on(line: DynamixelLine) -> None:
     port, packets = sdk_port(line), PacketHandler(1.0)
     line.garbage(3_000)
