@@ -6,18 +6,20 @@ from __future__ import annotations
 import contextlib
 import functools
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 from xmlrpc.client import ServerProxy
 
+import pytest
 import rosgraph
 import roslib.packages
 import rospkg
 
 from modular_framework_core.launching.launch_session import Launch, LaunchSession, free_port, processes_with
 
-__all__ = ["Launch", "RosSession", "executable", "free_port", "processes_with", "until"]
+__all__ = ["Launch", "RosSession", "executable", "free_port", "processes_with", "pytest_runtest_makereport", "until"]
+SHOWN_LINES = 150
 
 
 def until(condition: Callable[[], Any], what: str, timeout_s: float = 30.0) -> None:
@@ -46,8 +48,11 @@ def _launch_arguments(args: Mapping[str, object]) -> list[str]:
 class RosSession(LaunchSession):
     """A master and the launches on it: the master that rostest brought, or one of the session's own."""
 
+    started: ClassVar[list[RosSession]] = []
+
     def __init__(self, master_uri: str | None = None) -> None:
         super().__init__(master_uri)
+        self.started.append(self)
         self._suite_logs = Path(rospkg.get_log_dir()) if master_uri else None
 
     def start_master(self, timeout_s: float = 20.0) -> None:
@@ -98,12 +103,20 @@ class RosSession(LaunchSession):
             return bool(ServerProxy(uri).getPid("/test_session")[0] == 1)
         return False
 
+    def stop(self) -> None:
+        """Stops the launches and whatever of them is left. May be called twice."""
+        with contextlib.suppress(ValueError):
+            self.started.remove(self)
+        super().stop()
+
     def log(self) -> str:
         """What all launches have printed so far, and what the nodes of the suite's .test file have logged."""
         logs = self._suite_logs / self._run_id() if self._suite_logs else self.folder / "none"
-        return "".join(launch.log() for launch in self._launches) + "".join(
-            path.read_text(errors="replace") for path in sorted(logs.glob("*.log"))
-        )
+        return self.printed() + "".join(path.read_text(errors="replace") for path in sorted(logs.glob("*.log")))
+
+    def printed(self) -> str:
+        """What all launches have printed so far."""
+        return "".join(launch.log() for launch in self._launches)
 
     def _run_id(self) -> str:
         return str(rosgraph.Master("/test_session", master_uri=self.env["ROS_MASTER_URI"]).getParam("/run_id"))
@@ -116,3 +129,14 @@ class RosSession(LaunchSession):
             until(condition, what, timeout_s)
         except AssertionError as error:
             raise AssertionError(f"{error}; log:\n{self.log()}") from None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Shows with a failed test the last lines that the launches of its sessions have printed."""
+    report = yield
+    if report.failed:
+        for number, session in enumerate(RosSession.started):
+            lines = session.printed().splitlines()[-SHOWN_LINES:]
+            report.sections.append((f"Printed by the launches of session {number}", "\n".join(lines)))
+    return report

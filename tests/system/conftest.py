@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from ros_session import RosSession  # noqa: E402
+from ros_session import RosSession, pytest_runtest_makereport  # noqa: E402, F401
 
 
 @pytest.fixture
