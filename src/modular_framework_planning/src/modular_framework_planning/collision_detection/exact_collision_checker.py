@@ -21,7 +21,7 @@ from modular_framework_planning.collision_detection.collision_bodies import (
 )
 from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
 from modular_framework_planning.collision_detection.exact_collision import ExactCollision
-from modular_framework_planning.collision_detection.kernels.compiled_collision import surrounded_pair_at
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World, surrounded_pair_at
 from modular_framework_planning.collision_detection.kernels.compiled_distance import TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     UNDECIDED_ROWS,
@@ -74,6 +74,11 @@ class ExactCollisionChecker:
     @cached_property
     def _compiled(self) -> CompiledWorld:
         return compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving])
+
+    @property
+    def compiled_world(self) -> World | None:
+        """The world as `compiled_paths.check_path` takes it; None where pairs need the exact check at every state."""
+        return None if self._tolerated or self._compiled.uncompiled else self._compiled.world
 
     def build(self, check_interrupt: Callable[[], None]) -> None:
         """Builds now what the first check would build: it takes seconds for 100,000 triangles.

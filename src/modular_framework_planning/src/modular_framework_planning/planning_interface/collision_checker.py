@@ -9,6 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
@@ -117,4 +118,14 @@ class CollisionCostEstimator(Protocol):
         Args:
             states: shape (n, joints).
         """
+        ...
+
+
+@runtime_checkable
+class CompiledChecks(Protocol):
+    """An optional property of checkers for searches that are compiled; without it they call `path_is_free`."""
+
+    @property
+    def compiled_world(self) -> World | None:
+        """The world as `compiled_paths.check_path` takes it; None where some pair needs more than that knows."""
         ...

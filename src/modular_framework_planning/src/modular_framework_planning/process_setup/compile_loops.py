@@ -20,6 +20,7 @@ from modular_framework_planning.octomap.encoding import read_stream, write_binar
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
 from modular_framework_planning.perception.self_filter import RegionCache, bodies_in_scene, self_filter_of
+from modular_framework_planning.planners.rrt_connect import rrt_connect
 from modular_framework_planning.planning_scene.planning_scene import (
     AttachedObject,
     CollisionObject,
@@ -97,6 +98,7 @@ def _check_motions(scene: PlanningScene) -> None:
     checker.path_is_free(np.array([scene.positions, scene.positions + 0.1]), MOTION_STEP)
     checker.contacts(scene.positions)
     checker.collision_costs(np.array([scene.positions]))
+    rrt_connect.warm_up(checker, scene.positions)
 
 
 def main() -> None:

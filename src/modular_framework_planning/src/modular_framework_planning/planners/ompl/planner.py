@@ -21,11 +21,14 @@ from modular_framework_planning.planners.ompl.planner_settings import (
     DEFAULT_RANGE,
     PLANNERS,
     THREADED,
+    connection_range,
+    keeps_intermediate_states,
     make_planner,
     parameter_faults,
     stages,
 )
 from modular_framework_planning.planners.ompl.projection import projection_evaluator
+from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, can_search
 from modular_framework_planning.planning_interface.path_repair import repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
@@ -105,7 +108,7 @@ def _paths(problem: PlanningProblem, goals: Array, step: float) -> tuple[list[Ar
     paths, states = [], 0
     for _ in range(max(1, problem.request.attempts)):
         for reach, limit in stages(problem.planner_id, problem.planner_parameters):
-            search = _Search(problem, goals, step, reach, limit)
+            search = _search(problem, goals, step, reach, limit)
             path = search.run()
             states += search.states
             if path is not None:
@@ -134,7 +137,19 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
             return ConstrainedSearch(near, fine, second[None], CONSTRAINED_CONNECTION_STATES).run().vertices
         except PlanningError:
             return None
-    return _Search(near, second[None], fine, DEFAULT_RANGE, CONNECTION_ITERATIONS).run()
+    return _search(near, second[None], fine, DEFAULT_RANGE, CONNECTION_ITERATIONS).run()
+
+
+def _search(
+    problem: PlanningProblem, goals: Array, step: float, reach: float, limit: int | None
+) -> _Search | RrtConnect:
+    """Returns the search of the problem's planner; RRTConnect is compiled where the checker allows it."""
+    parameters = problem.planner_parameters
+    if problem.planner_id == "RRTConnect" and can_search(problem) and not keeps_intermediate_states(parameters):
+        limit = problem.request.most_iterations if limit is None else limit
+        wanted = connection_range(parameters)
+        return RrtConnect(problem, goals, step, wanted or reach, limit, is_weighted=wanted is None)
+    return _Search(problem, goals, step, reach, limit)
 
 
 def edge_step(problem: PlanningProblem) -> float:

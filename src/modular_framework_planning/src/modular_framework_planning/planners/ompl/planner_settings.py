@@ -154,6 +154,36 @@ def stages(planner_id: str, settings: Mapping[str, object]) -> tuple[tuple[float
     return (LONG_RANGE, LONG_RANGE_ITERATIONS), (DEFAULT_RANGE, None)
 
 
+def connection_range(settings: Mapping[str, object]) -> float | None:
+    """Returns the range that the settings of RRTConnect give [rad or m], None where they leave it open.
+
+    Raises:
+        PlanningError: it cannot be read.
+    """
+    wanted = _value("RRTConnect", settings, "range")
+    return float(wanted) if wanted is not None and wanted > 0.0 else None
+
+
+def keeps_intermediate_states(settings: Mapping[str, object]) -> bool:
+    """Whether the settings of RRTConnect ask it to add states along its edges.
+
+    Raises:
+        PlanningError: the value cannot be read.
+    """
+    return bool(_value("RRTConnect", settings, "intermediate_states"))
+
+
+def _value(planner_id: str, settings: Mapping[str, object], key: str) -> Any:
+    """Returns a setting as its planner takes it, None for an empty one; raises PlanningError where it is no value."""
+    text = settings.get(key, "")
+    if not str(text).strip():
+        return None
+    faults = _unreadable(key, PLANNERS[planner_id][1][key][1], text)
+    if faults:
+        raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_configs/{planner_id}: {faults[0]}")
+    return PLANNERS[planner_id][1][key][1](text)
+
+
 def make_planner(
     planner_id: str, settings: Mapping[str, object], information: Any, default_range: float = DEFAULT_RANGE
 ) -> Any:
@@ -172,13 +202,8 @@ def make_planner(
     planner = kind(information)
     if "range" in known:
         planner.setRange(default_range)
-    for key, value in settings.items():
-        if key not in known or not str(value).strip():
-            continue
-        faults = _unreadable(key, known[key][1], value)
-        if faults:
-            raise PlanningError(ErrorCode.PLANNING_FAILED, f"planner_configs/{planner_id}: {faults[0]}")
-        number = known[key][1](value)
-        if not (key == "range" and number <= 0.0):
-            getattr(planner, known[key][0])(number)
+    for key in (key for key in settings if key in known):
+        value = _value(planner_id, settings, key)
+        if value is not None and not (key == "range" and value <= 0.0):
+            getattr(planner, known[key][0])(value)
     return planner

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""RRT-Connect as one compiled loop: samples, trees and checks of edges without a call of Python between them.
+
+Kuffner, LaValle: RRT-Connect: An efficient approach to single-query path planning, ICRA 2000. The loop returns where
+it needs the interpreter: for more samples, for larger trees, and for an edge that the bounds leave undecided.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
+from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOUCHING
+from modular_framework_planning.collision_detection.kernels.compiled_paths import check_path, sample
+from modular_framework_planning.geometry.spatial import Array
+
+# What `grow` returns
+FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED = 0, 1, 2, 3
+# What is known of the edge that it was about to add
+UNKNOWN, FREE, BLOCKED = 0, 1, 2
+EXTENDS, CONNECTS = 0, 1
+NEW = -1  # target, for which the nearest state is not known yet
+REACHED = 1.0e-12
+
+
+class Trees(NamedTuple):
+    """The trees from the start (0) and from the goals (1), and where the search stands between two calls.
+
+    Attributes:
+        states: joint vectors of the group [rad or m]; shape (2, room, joints).
+        parents: of each state, -1 for a root; shape (2, room).
+        sizes: how many states each tree has; shape (2,).
+        position: next sample; tree that grows; EXTENDS or CONNECTS; state at which it grows, or NEW; shape (4,).
+        target: state that it grows to; shape (joints,).
+        counts: edges that were checked; shape (1,).
+    """
+
+    states: Array
+    parents: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    position: NDArray[np.int64]
+    target: Array
+    counts: NDArray[np.int64]
+
+
+class Space(NamedTuple):
+    """The joint space of a group, in which lengths are weighted.
+
+    Attributes:
+        weights: of each joint in a length; shape (joints,).
+        longest: most a tree grows by at once, in that length.
+        step: distance of the checks along an edge, of any joint [rad or m].
+        rest: positions of the whole robot where the group's are 0; shape (all,).
+        map: change of the robot's positions by the group's, mimic joints included; shape (all, joints).
+    """
+
+    weights: Array
+    longest: float
+    step: float
+    rest: Array
+    map: Array
+
+
+@njit(cache=True, nogil=True)
+def _squared_length(one, other, weights):  # type: ignore[no-untyped-def]
+    length = 0.0
+    for joint in range(len(one)):
+        gap = weights[joint] * (other[joint] - one[joint])
+        length += gap * gap
+    return length
+
+
+@njit(cache=True, nogil=True)
+def _nearest(states, size, target, weights):  # type: ignore[no-untyped-def]
+    best, found = np.inf, 0
+    for number in range(size):
+        length = _squared_length(states[number], target, weights)
+        if length < best:
+            best, found = length, number
+    return found
+
+
+@njit(cache=True, nogil=True)
+def write_step(here, target, space, out):  # type: ignore[no-untyped-def]
+    """Writes the state (joints,) on the way from one state to another, `longest` away from the first at most."""
+    length = np.sqrt(_squared_length(here, target, space.weights))
+    share = space.longest / length if length > space.longest else 1.0
+    for joint in range(len(out)):
+        out[joint] = target[joint] if share == 1.0 else here[joint] + share * (target[joint] - here[joint])
+
+
+@njit(cache=True, nogil=True)
+def _write_positions(space, state, out):  # type: ignore[no-untyped-def]
+    """Writes the positions (all,) of the whole robot for a joint vector of the group."""
+    for row in range(len(out)):
+        out[row] = space.rest[row]
+        for joint in range(len(state)):
+            out[row] += space.map[row, joint] * state[joint]
+
+
+@njit(cache=True, nogil=True)
+def _check_edge(space, world, start, end, vertices, undecided):  # type: ignore[no-untyped-def]
+    """Returns FREE, BLOCKED, or UNKNOWN where the bounds do not decide; the start of the edge is not checked."""
+    _write_positions(space, start, vertices[0])
+    _write_positions(space, end, vertices[1])
+    status, _ = check_path(world, sample(vertices, space.step), 1, undecided)
+    return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
+
+
+@njit(cache=True, nogil=True)
+def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def]
+    """Grows the trees until they meet.
+
+    Args:
+        trees: the search; changed.
+        space: in which it runs.
+        samples: random states, shape (n, joints).
+        verdict: FREE or BLOCKED about the edge for which the last call returned UNDECIDED; else UNKNOWN.
+        world: what `arguments` returns.
+
+    Returns:
+        FOUND: the last states of both trees are the same. NEEDS_SAMPLES: all samples are used. NEEDS_ROOM: a tree is
+        full. UNDECIDED: the edge from the state at which a tree grows to `target`, `longest` of it at most.
+    """
+    bodies = world_of(world)
+    states, parents, sizes, position, target, counts = trees
+    state, vertices = np.empty(len(target)), np.empty((2, len(space.rest)))
+    nobody_asks = np.empty((0, 2), np.int64)
+    while True:
+        tree = position[1]
+        if position[3] == NEW:
+            if position[2] == EXTENDS:
+                if position[0] == len(samples):
+                    return NEEDS_SAMPLES
+                target[:] = samples[position[0]]
+                position[0] += 1
+            position[3] = _nearest(states[tree], sizes[tree], target, space.weights)
+        if sizes[tree] == len(parents[tree]):
+            return NEEDS_ROOM
+        here = states[tree, position[3]]
+        write_step(here, target, space, state)
+        if verdict == UNKNOWN:
+            counts[0] += 1
+            verdict = _check_edge(space, bodies, here, state, vertices, nobody_asks)
+            if verdict == UNKNOWN:
+                return UNDECIDED
+        is_free, verdict = verdict == FREE, UNKNOWN
+        if is_free:
+            number = sizes[tree]
+            states[tree, number], parents[tree, number] = state, position[3]
+            sizes[tree] += 1
+            if position[2] == CONNECTS and _squared_length(state, target, space.weights) < REACHED:
+                return FOUND
+            if position[2] == CONNECTS:
+                position[3] = number
+            else:
+                target[:] = state
+                position[1], position[2], position[3] = 1 - tree, CONNECTS, NEW
+        else:
+            if position[2] == EXTENDS:
+                position[1] = 1 - tree
+            position[2], position[3] = EXTENDS, NEW

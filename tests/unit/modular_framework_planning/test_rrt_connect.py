@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The compiled RRT-Connect: its paths are free by plain Coal, a seed repeats them, and it ends when it has to."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from plain_coal_checker import PlainCoalChecker
+from test_collision_checkers import SMALL_SRDF, SMALL_URDF
+
+from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.geometry.shapes import Box
+from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planners.rrt_connect.rrt_connect import ROOM, RrtConnect, can_search, reaches
+from modular_framework_planning.planning_interface.motion_check import MotionChecker
+from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
+from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
+from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
+from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+
+START = np.array([0.0, 1.2, 0.3, 0.03])
+GOAL = np.array([2.0, 1.2, 0.3, 0.07])
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.03])
+UNREACHABLE = np.array([2.0, 2.5, 2.5, 0.03])  # the arm touches itself
+STEP, RANGE = 0.02, 0.5
+WALL = (Box(0.9, 0.04, 0.6), np.array([0.35, 0.45, 0.3]))  # between start and goal; the arm goes over it
+COVER = (Box(0.9, 0.9, 0.02), np.array([0.0, 0.0, 0.95]))
+
+
+@pytest.fixture(scope="module")
+def small() -> RobotModel:
+    group = '<group name="all"><joint name="pan"/><joint name="lift"/><joint name="bend"/><joint name="slide"/></group>'
+    return RobotModel(SMALL_URDF, SMALL_SRDF.replace("</robot>", f"{group}</robot>"))
+
+
+def scene_with(model: RobotModel, *walls: tuple[Box, np.ndarray]) -> PlanningScene:
+    scene = empty_scene(model)
+    for number, (shape, at) in enumerate(walls):
+        pose = pin.SE3(np.eye(3), at)
+        scene = scene.with_object(CollisionObject(f"wall{number}", pose, ((shape, pin.SE3.Identity()),)))
+    return scene
+
+
+def problem_in(
+    scene: PlanningScene,
+    seed: int = 1,
+    seconds: float = 60.0,
+    cancelled: Callable[[], bool] = lambda: False,
+    start: np.ndarray = START,
+) -> PlanningProblem:
+    model, group = scene.model, scene.model.group("all")
+    positions = model.merge(scene.positions, dict(zip(group.joints, start.tolist(), strict=True)))
+    scene = scene.with_positions(positions)
+    checker = ExactCollisionChecker(scene, group.indices)
+    goal = JointGoal(dict(zip(group.joints, GOAL.tolist(), strict=True)))
+    now_s = time.monotonic()
+    return PlanningProblem(
+        request=PlanningRequest(scene, "all", (goal,), "RRTConnect", 1, seconds, cancelled=cancelled),
+        model=model,
+        group=group,
+        start=positions,
+        checker=checker,
+        motion=MotionChecker(checker, group.indices, positions),
+        kinematics=KinematicsPool(model),
+        settings=PipelineSettings(),
+        max_velocity=np.ones(4),
+        max_acceleration=np.ones(4),
+        rng=np.random.default_rng(seed),
+        begun_s=now_s,
+        deadline_s=now_s + seconds,
+        end_s=now_s + seconds,
+        solution_validator=TrajectoryValidator(),
+        planner_id="RRTConnect",
+    )
+
+
+def search(problem: PlanningProblem, limit: int | None = None, goal: np.ndarray = GOAL) -> RrtConnect:
+    assert can_search(problem)
+    return RrtConnect(problem, goal[None], STEP, RANGE, limit)
+
+
+@pytest.mark.parametrize("is_weighted", [False, True])
+def test_a_path_round_a_wall_joins_start_and_goal_by_edges_that_plain_coal_calls_free(
+    small: RobotModel, is_weighted: bool
+) -> None:
+    problem = problem_in(scene_with(small, WALL, COVER))
+    plain = PlainCoalChecker(problem.scene, problem.group.indices)
+    straight = problem.motion.full_path(np.array([START, GOAL]))
+    assert not plain.path_is_free(straight, STEP), "the straight way is blocked"
+    path = RrtConnect(problem, GOAL[None], STEP, RANGE, is_weighted=is_weighted).run()
+    assert path is not None
+    assert np.array_equal(path[0], START) and np.array_equal(path[-1], GOAL)
+    longest = np.linalg.norm(np.diff(path, axis=0), axis=1).max()
+    assert longest > RANGE + 0.001 if is_weighted else longest <= RANGE + 1e-12
+    full = problem.motion.full_path(path)
+    follower, leader = (small.joint_names.index(name) for name in ("follow", "slide"))
+    assert np.array_equal(full[:, follower], full[:, leader])
+    assert plain.path_is_free(full, STEP)
+
+
+def test_a_seed_repeats_the_path_and_another_one_gives_another(small: RobotModel) -> None:
+    scene = scene_with(small, WALL, COVER)
+    one, again, other = (search(problem_in(scene, seed)).run() for seed in (1, 1, 2))
+    assert np.array_equal(one, again)
+    assert other is not None and not np.array_equal(one, other)
+
+
+def test_the_reach_of_a_joint_bounds_how_far_it_moves_what_it_carries(small: RobotModel) -> None:
+    checker = ExactCollisionChecker(scene_with(small, WALL))
+    assert checker.compiled_world is not None
+    bounds = dict(zip(small.joint_names, reaches(checker.compiled_world), strict=True))
+    assert bounds["slide"] == bounds["follow"] == 1.0
+    rng, data = np.random.default_rng(3), small.pin_model.createData()
+    for joint in ("pan", "lift", "bend"):
+        index, moved = small.joint_names.index(joint), 0.0
+        for _ in range(200):
+            states = np.tile(small.with_mimics(rng.uniform(small.lower, small.upper)), (2, 1))
+            states[1, index] += 1.0e-4
+            points = []
+            for state in states:
+                pin.forwardKinematics(small.pin_model, data, state)
+                points.append(
+                    [(data.oMi[item.joint_id] * item.placement).translation for item in small.link_geometries]
+                )
+            moved = max(moved, float(np.linalg.norm(np.diff(points, axis=0), axis=-1).max()) / 1.0e-4)
+        assert 0.7 * bounds[joint] < moved <= bounds[joint], joint
+
+
+class CountingMotion(MotionChecker):
+    """Counts the edges that it is asked about."""
+
+    asked = 0
+
+    def edge_is_free(self, start: np.ndarray, end: np.ndarray, step: float) -> bool:
+        self.asked += 1
+        return super().edge_is_free(start, end, step)
+
+
+def test_an_edge_too_close_for_the_bounds_is_decided_by_the_exact_check(small: RobotModel) -> None:
+    top = 0.1 + 0.25 + 0.45 + 0.38 + 0.05  # of the finger when the arm is upright [m]
+    cover = COVER[0], np.array([0.0, 0.0, top + 0.01 + 2.0e-6])  # nearer to it than the bounds can tell
+    problem = problem_in(scene_with(small, cover))
+    motion = CountingMotion(problem.checker, problem.group.indices, problem.start)
+    path = search(replace(problem, motion=motion), goal=UPRIGHT).run()
+    assert path is not None and np.array_equal(path[-1], UPRIGHT)
+    assert motion.asked > 0
+
+
+def test_a_goal_that_cannot_be_reached_ends_the_search_at_its_limit_however_large_the_trees_are(
+    small: RobotModel,
+) -> None:
+    closed = search(problem_in(scene_with(small, WALL)), 4000, UNREACHABLE)
+    assert closed.run() is None
+    assert closed.states > ROOM
+
+
+def test_the_clock_and_a_cancellation_end_the_search(small: RobotModel) -> None:
+    scene = scene_with(small, WALL)
+    begun_s = time.monotonic()
+    assert search(problem_in(scene, seconds=0.3), goal=UNREACHABLE).run() is None
+    assert 0.3 <= time.monotonic() - begun_s < 5.0
+    answers = iter([False] * 3 + [True] * 1000)
+    assert search(problem_in(scene, cancelled=lambda: next(answers)), goal=UNREACHABLE).run() is None
+    assert len(list(answers)) > 900
