@@ -77,8 +77,12 @@ class ExactCollisionChecker:
 
     @property
     def compiled_world(self) -> World | None:
-        """The world as `compiled_paths.check_path` takes it; None where pairs need the exact check at every state."""
-        return None if self._tolerated or self._compiled.uncompiled else self._compiled.world
+        """The world as `compiled_paths.check_path` takes it.
+
+        None where pairs need the exact check at every state, and for a subclass with a `path_is_free` of its own.
+        """
+        is_own = type(self).path_is_free is not ExactCollisionChecker.path_is_free
+        return None if is_own or self._tolerated or self._compiled.uncompiled else self._compiled.world
 
     def build(self, check_interrupt: Callable[[], None]) -> None:
         """Builds now what the first check would build: it takes seconds for 100,000 triangles.

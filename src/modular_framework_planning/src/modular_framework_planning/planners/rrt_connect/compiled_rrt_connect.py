@@ -19,12 +19,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 from modular_framework_planning.geometry.spatial import Array
 
 # What `grow` returns
-FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED = 0, 1, 2, 3
+FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED, PAUSED = range(5)
 # What is known of the edge that it was about to add
 UNKNOWN, FREE, BLOCKED = 0, 1, 2
 EXTENDS, CONNECTS = 0, 1
 NEW = -1  # target, for which the nearest state is not known yet
-REACHED = 1.0e-12
+EDGES = 200  # that are checked in one call, so that the clock and a cancellation are looked at in between
 
 
 class Trees(NamedTuple):
@@ -52,7 +52,7 @@ class Space(NamedTuple):
 
     Attributes:
         weights: of each joint in a length; shape (joints,).
-        longest: most a tree grows by at once, in that length.
+        longest: most a tree grows by at once, in weighted length.
         step: distance of the checks along an edge, of any joint [rad or m].
         rest: positions of the whole robot where the group's are 0; shape (all,).
         map: change of the robot's positions by the group's, mimic joints included; shape (all, joints).
@@ -86,11 +86,16 @@ def _nearest(states, size, target, weights):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def write_step(here, target, space, out):  # type: ignore[no-untyped-def]
-    """Writes the state (joints,) on the way from one state to another, `longest` away from the first at most."""
+    """Writes the state (joints,) on the way from one state to another, `longest` away from the first at most.
+
+    Returns:
+        Whether it is the other state.
+    """
     length = np.sqrt(_squared_length(here, target, space.weights))
     share = space.longest / length if length > space.longest else 1.0
     for joint in range(len(out)):
         out[joint] = target[joint] if share == 1.0 else here[joint] + share * (target[joint] - here[joint])
+    return share == 1.0
 
 
 @njit(cache=True, nogil=True)
@@ -124,13 +129,17 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
 
     Returns:
         FOUND: the last states of both trees are the same. NEEDS_SAMPLES: all samples are used. NEEDS_ROOM: a tree is
-        full. UNDECIDED: the edge from the state at which a tree grows to `target`, `longest` of it at most.
+        full. UNDECIDED: the edge from the state at which a tree grows to `target`, `longest` of it at most. PAUSED:
+        EDGES edges were checked; to be called again.
     """
     bodies = world_of(world)
     states, parents, sizes, position, target, counts = trees
     state, vertices = np.empty(len(target)), np.empty((2, len(space.rest)))
-    nobody_asks = np.empty((0, 2), np.int64)
+    no_rows = np.empty((0, 2), np.int64)
+    end = counts[0] + EDGES
     while True:
+        if counts[0] >= end and verdict == UNKNOWN:
+            return PAUSED
         tree = position[1]
         if position[3] == NEW:
             if position[2] == EXTENDS:
@@ -142,10 +151,10 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
         if sizes[tree] == len(parents[tree]):
             return NEEDS_ROOM
         here = states[tree, position[3]]
-        write_step(here, target, space, state)
+        reached = write_step(here, target, space, state)
         if verdict == UNKNOWN:
             counts[0] += 1
-            verdict = _check_edge(space, bodies, here, state, vertices, nobody_asks)
+            verdict = _check_edge(space, bodies, here, state, vertices, no_rows)
             if verdict == UNKNOWN:
                 return UNDECIDED
         is_free, verdict = verdict == FREE, UNKNOWN
@@ -153,7 +162,7 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
             number = sizes[tree]
             states[tree, number], parents[tree, number] = state, position[3]
             sizes[tree] += 1
-            if position[2] == CONNECTS and _squared_length(state, target, space.weights) < REACHED:
+            if position[2] == CONNECTS and reached:
                 return FOUND
             if position[2] == CONNECTS:
                 position[3] = number

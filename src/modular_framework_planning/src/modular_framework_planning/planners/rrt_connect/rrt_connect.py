@@ -15,6 +15,7 @@ from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import
     NEEDS_ROOM,
     NEEDS_SAMPLES,
     NEW,
+    UNDECIDED,
     UNKNOWN,
     Space,
     Trees,
@@ -24,8 +25,8 @@ from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import
 from modular_framework_planning.planning_interface.collision_checker import CompiledChecks
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 
-SAMPLES = 32  # that are drawn at once; the clock and a cancellation are looked at in between
-LEAST_WEIGHT = 0.1  # of a joint in a length, also of one that carries nothing
+SAMPLES = 32  # that are drawn at once
+LEAST_WEIGHT = 0.1  # of a joint in a length, also of one that carries nothing: it turns ten times the range at most
 ROOM = 1024  # of states in a tree, to begin with
 
 
@@ -38,12 +39,13 @@ def can_search(problem: PlanningProblem) -> bool:
 def reaches(world: World) -> Array:
     """Returns how far each joint can move a point that it carries, shape (joints,) [m/rad], 1 for a sliding joint.
 
-    It is a bound: the way along the joints to the far end of each body, as if the arm could be stretched out.
+    The way along the joints to the far end of each body, as if the arm could be stretched out, with sliding joints at
+    zero. Bodies without an end, as a plane, do not count.
     """
     tree = world.tree
     result = np.zeros(len(tree.parents))
     for joint, pose, sphere in zip(world.joints, world.poses, world.spheres, strict=True):
-        if joint >= 0:
+        if joint >= 0 and np.isfinite(sphere).all():
             centre = pose[:, :3] @ sphere[:3] + pose[:, 3]
             result[joint] = max(result[joint], float(np.linalg.norm(centre)) + sphere[3])
     for joint in reversed(range(len(result))):
@@ -96,7 +98,7 @@ class RrtConnect:
             problem: for which `can_search` holds.
             goals: joint vectors to reach, shape (n, joints).
             step: distance of collision checks along an edge [rad or m].
-            longest: most a tree grows by at once [rad or m].
+            longest: most a tree grows by at once, in weighted length if `is_weighted` [rad or m].
             limit: of random states; None: the clock ends the search.
             is_weighted: whether joints count in a length by the root of their reach, the one that reaches farthest as
                 1; else all count as 1. A wrist then turns further in one step than a shoulder.
@@ -125,15 +127,17 @@ class RrtConnect:
             if status == FOUND:
                 # a search that the clock ends is not repeatable
                 return None if problem.repeatable and problem.interrupted() else self._vertices()
+            if problem.interrupted():
+                return None
             if status == NEEDS_ROOM:
                 self._add_room()
             elif status == NEEDS_SAMPLES:
                 count = SAMPLES if self._limit is None else min(SAMPLES, self._limit - drawn)
-                if count <= 0 or problem.interrupted():
+                if count <= 0:
                     return None
                 samples = problem.rng.uniform(self._low, self._high, (count, len(self._low)))
                 drawn, self._trees.position[0] = drawn + count, 0
-            else:
+            elif status == UNDECIDED:
                 verdict = FREE if self._undecided_edge_is_free() else BLOCKED
 
     def _space_of(self, world: World, step: float, longest: float, is_weighted: bool) -> Space:
