@@ -58,10 +58,9 @@ def problem_in(
     seed: int = 1,
     seconds: float = 60.0,
     cancelled: Callable[[], bool] = lambda: False,
-    start: np.ndarray = START,
 ) -> PlanningProblem:
     model, group = scene.model, scene.model.group("all")
-    positions = model.merge(scene.positions, dict(zip(group.joints, start.tolist(), strict=True)))
+    positions = model.merge(scene.positions, dict(zip(group.joints, START.tolist(), strict=True)))
     scene = scene.with_positions(positions)
     checker = ExactCollisionChecker(scene, group.indices)
     goal = JointGoal(dict(zip(group.joints, GOAL.tolist(), strict=True)))
@@ -150,7 +149,7 @@ class CountingMotion(MotionChecker):
 
 def test_an_edge_too_close_for_the_bounds_is_decided_by_the_exact_check(small: RobotModel) -> None:
     top = 0.1 + 0.25 + 0.45 + 0.38 + 0.05  # of the finger when the arm is upright [m]
-    cover = COVER[0], np.array([0.0, 0.0, top + 0.01 + 2.0e-6])  # nearer to it than the bounds can tell
+    cover = COVER[0], np.array([0.0, 0.0, top + 0.01 + 2.0e-6])  # so near to it that the bounds do not decide
     problem = problem_in(scene_with(small, cover))
     motion = CountingMotion(problem.checker, problem.group.indices, problem.start)
     path = search(replace(problem, motion=motion), goal=UPRIGHT).run()

@@ -148,8 +148,12 @@ def _unreadable(key: str, read: Callable[[object], Any], value: object) -> list[
 
 
 def stages(planner_id: str, settings: Mapping[str, object]) -> tuple[tuple[float, int | None], ...]:
-    """Returns (default range [rad or m], most iterations or None) of each search to make, one after the other."""
-    if planner_id != "RRTConnect" or str(settings.get("range", "")).strip() not in ("", "0", "0.0"):
+    """Returns (default range [rad or m], most iterations or None) of each search to make, one after the other.
+
+    Raises:
+        PlanningError: the range in the settings cannot be read.
+    """
+    if planner_id != "RRTConnect" or connection_range(settings) is not None:
         return ((DEFAULT_RANGE, None),)
     return (LONG_RANGE, LONG_RANGE_ITERATIONS), (DEFAULT_RANGE, None)
 

@@ -2,7 +2,8 @@
 """RRT-Connect as one compiled loop: samples, trees and checks of edges without a call of Python between them.
 
 Kuffner, LaValle: RRT-Connect: An efficient approach to single-query path planning, ICRA 2000. The loop returns where
-it needs the interpreter: for more samples, for larger trees, and for an edge that the bounds leave undecided.
+it needs the interpreter: for more samples, for larger trees, for an edge that the bounds leave undecided, and every few
+edges for the clock.
 """
 
 from __future__ import annotations
@@ -159,17 +160,15 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
                 return UNDECIDED
         is_free, verdict = verdict == FREE, UNKNOWN
         if is_free:
-            number = sizes[tree]
-            states[tree, number], parents[tree, number] = state, position[3]
+            states[tree, sizes[tree]], parents[tree, sizes[tree]] = state, position[3]
             sizes[tree] += 1
-            if position[2] == CONNECTS and reached:
-                return FOUND
-            if position[2] == CONNECTS:
-                position[3] = number
-            else:
-                target[:] = state
-                position[1], position[2], position[3] = 1 - tree, CONNECTS, NEW
-        else:
-            if position[2] == EXTENDS:
-                position[1] = 1 - tree
+        if position[2] == EXTENDS:  # the other tree is next, to connect or to extend
+            position[1], position[3] = 1 - tree, NEW
+            if is_free:
+                position[2], target[:] = CONNECTS, state
+        elif not is_free:
             position[2], position[3] = EXTENDS, NEW
+        elif reached:
+            return FOUND
+        else:
+            position[3] = sizes[tree] - 1

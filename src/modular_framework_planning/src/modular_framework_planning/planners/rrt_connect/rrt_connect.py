@@ -42,16 +42,15 @@ def reaches(world: World) -> Array:
     The way along the joints to the far end of each body, as if the arm could be stretched out, with sliding joints at
     zero. Bodies without an end, as a plane, do not count.
     """
-    tree = world.tree
-    result = np.zeros(len(tree.parents))
-    for joint, pose, sphere in zip(world.joints, world.poses, world.spheres, strict=True):
-        if joint >= 0 and np.isfinite(sphere).all():
-            centre = pose[:, :3] @ sphere[:3] + pose[:, 3]
-            result[joint] = max(result[joint], float(np.linalg.norm(centre)) + sphere[3])
+    tree, result = world.tree, np.zeros(len(world.tree.parents))
+    carried = (world.joints >= 0) & np.isfinite(world.spheres).all(axis=1)
+    poses, spheres = world.poses[carried], world.spheres[carried]
+    centres = np.einsum("bij,bj->bi", poses[:, :, :3], spheres[:, :3]) + poses[:, :, 3]
+    np.maximum.at(result, world.joints[carried], np.linalg.norm(centres, axis=1) + spheres[:, 3])
+    lengths = np.linalg.norm(tree.placements[:, :, 3], axis=1)
     for joint in reversed(range(len(result))):
-        parent = tree.parents[joint]
-        if parent >= 0:
-            result[parent] = max(result[parent], float(np.linalg.norm(tree.placements[joint, :, 3])) + result[joint])
+        if tree.parents[joint] >= 0:
+            result[tree.parents[joint]] = max(result[tree.parents[joint]], lengths[joint] + result[joint])
     return np.where(tree.prismatic, 1.0, result)
 
 
