@@ -201,3 +201,9 @@ def test_the_clock_and_a_cancellation_end_the_search(small: RobotModel) -> None:
     answers = iter([False] * 3 + [True] * 10)
     assert search(problem_in(scene, cancelled=lambda: next(answers)), goal=UNREACHABLE).run() is None
     assert len(list(answers)) < 10 and time.monotonic() - begun_s < 5.0
+
+
+def test_the_smaller_tree_extends_until_it_is_as_large_as_the_other_one(small: RobotModel) -> None:
+    closed = search(problem_in(scene_with(small)), 60, UNREACHABLE)  # no state next to this goal is free
+    assert closed.run() is None
+    assert closed.tree_sizes == (2, 1), "the start's tree waits for that of the goal"

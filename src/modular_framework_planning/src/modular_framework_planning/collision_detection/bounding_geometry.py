@@ -50,18 +50,19 @@ class BoundingGeometry:
     Attributes:
         corners: gives the corners of the surface's triangles, shape (m, 9) [m]; None for no surface.
         inflation_radius: radius of a ball around every point of the surface that belongs to it [m].
-        surface_is_exact: whether the inflated surface is the geometry's own.
-        kind, size: closed form, SURFACE for none; solid_is_exact: whether it is the geometry's own.
+        surface_excess: how far the inflated surface lies outside of the geometry at most [m]; infinite if not known.
+        kind, size: closed form, SURFACE for none.
+        solid_excess: how far the closed form lies outside of the geometry at most [m].
         offset: pose of both in the geometry's frame.
         is_closed: whether the surface has an inside.
     """
 
     corners: Callable[[], Array] | None
     inflation_radius: float = 0.0
-    surface_is_exact: bool = True
+    surface_excess: float = 0.0
     kind: int = SURFACE
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    solid_is_exact: bool = True
+    solid_excess: float = 0.0
     offset: Transform = field(default_factory=pin.SE3.Identity)
     is_closed: bool = False
 
@@ -99,7 +100,8 @@ def bounding_geometry_of(part: PlacedGeometry) -> BoundingGeometry:
 def _make(source: Shape) -> BoundingGeometry:
     if isinstance(source, Octree):
         points = np.tile(source.centers, 3)
-        return BoundingGeometry(lambda: points, source.resolution * np.sqrt(0.75), surface_is_exact=False)
+        around = source.resolution * np.sqrt(0.75)  # radius of the ball around a voxel
+        return BoundingGeometry(lambda: points, around, around - 0.5 * source.resolution)
     if isinstance(source, Mesh):
         vertices, faces = np.asarray(source.vertices, dtype=float), np.asarray(source.triangles, dtype=np.int64)
         return BoundingGeometry(lambda: vertices[faces].reshape(-1, 9), is_closed=_is_closed(vertices, faces))
@@ -123,11 +125,19 @@ def _make(source: Shape) -> BoundingGeometry:
         case coal.Cylinder():
             radius, half = float(geometry.radius), float(geometry.halfLength)
             return BoundingGeometry(
-                lambda: _prism_triangles(radius, radius, half), 0.0, False, CYLINDER, (radius, half, 0.0)
+                lambda: _prism_triangles(radius, radius, half),
+                surface_excess=_prism_excess(radius),
+                kind=CYLINDER,
+                size=(radius, half, 0.0),
             )
         case coal.Cone():
             radius, half = float(geometry.radius), float(geometry.halfLength)
-            return BoundingGeometry(lambda: _prism_triangles(radius, 0.0, half), 0.0, False, CONE, (radius, half, 0.0))
+            return BoundingGeometry(
+                lambda: _prism_triangles(radius, 0.0, half),
+                surface_excess=_prism_excess(radius),
+                kind=CONE,
+                size=(radius, half, 0.0),
+            )
         case coal.Plane() | coal.Halfspace():
             normal = np.array(geometry.n, dtype=float)
             kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
@@ -147,7 +157,12 @@ def _bounding_box(geometry: Any) -> BoundingGeometry:
     x, y, z = (float(value) for value in 0.5 * (high - low))
     middle = 0.5 * (low + high)
     return BoundingGeometry(
-        lambda: _box_triangles(x, y, z), 0.0, False, BOX, (x, y, z), False, pin.SE3(np.eye(3), middle)
+        lambda: _box_triangles(x, y, z),
+        surface_excess=np.inf,
+        kind=BOX,
+        size=(x, y, z),
+        solid_excess=np.inf,
+        offset=pin.SE3(np.eye(3), middle),
     )
 
 
@@ -196,6 +211,11 @@ def _prism_triangles(below: float, above: float, half: float) -> Array:
         if above > 0.0:
             result.append([c, d, [0, 0, half]])
     return np.array(result, dtype=float).reshape(-1, 9)
+
+
+def _prism_excess(radius: float) -> float:
+    """Returns how far the prism around a cylinder (or cone) lies outside of it at most [m]."""
+    return radius * (1.0 / float(np.cos(np.pi / SIDES)) - 1.0)
 
 
 def moved(triangles: Array, pose: Transform) -> Array:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -20,18 +21,24 @@ from modular_framework_planning.collision_detection.bounding_geometry import (
 from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     CELLS,
+    FIELD,
     UNKNOWN,
     World,
     arguments,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
+from modular_framework_planning.collision_detection.kernels.compiled_distance_field import KEPT, DistanceField
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
+from modular_framework_planning.collision_detection.reaches import farthest_end
 from modular_framework_planning.contacts import LINK, WORLD, Body
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import tree_of
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 KEPT_MODELS, KEPT_GROUPINGS, KEPT_SCENES = 4, 16, 2
+SMALL_EXCESS = 2.0e-3  # [m]; a surface that lies no further outside of its body stands for it
+FIELD_CELLS = 64  # of the field along each axis
+FIELD_REACH_M = 2.5  # from the origin of the planning frame to the sides of the field at most
 Grouping = tuple[tuple[int, ...], ...]
 
 
@@ -183,7 +190,10 @@ def compile_world(
         table_joints=joints,
         table_of=np.array([-1 if key is None else next(numbers) for key in keys], dtype=np.int64),
     )
-    return CompiledWorld(world, arguments(world), tuple(tuple(item) for item in found.values()), tuple(uncompiled))
+    world, replaced = _with_field(world)
+    watched_by = [tuple(item) for item in found.values()]
+    watched_by += [tuple(number for pair in pairs_of for number in watched_by[pair]) for pairs_of in replaced]
+    return CompiledWorld(world, arguments(world), tuple(watched_by), tuple(uncompiled))
 
 
 def _link_members(
@@ -248,15 +258,15 @@ def _with_surface(
 ) -> set[int]:
     """Returns which bodies are checked by their surface.
 
-    A solid of the world against a body whose surface is exact is checked in closed form. Its triangles would not be
-    used, and building a tree over them takes longer than many plans.
+    A solid of the world against a body whose surface is (nearly) exact is checked in closed form. Its triangles would
+    not be used, and building a tree over them takes longer than many plans.
     """
     plain = {
         number
         for number, shape in shapes.items()
-        if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_is_exact
+        if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_excess == 0.0
     }
-    inexact = {number for number, shape in shapes.items() if not shape.surface_is_exact}
+    inexact = {number for number, shape in shapes.items() if shape.surface_excess > SMALL_EXCESS}
     needed = {
         number
         for pair in pairs
@@ -266,11 +276,10 @@ def _with_surface(
     return set(shapes) - (plain - needed)
 
 
-def _is_exact(members: Sequence[_Member], first: int, second: int) -> bool:
+def _excess(members: Sequence[_Member], first: int, second: int) -> float:
+    """Returns how far the surface of the first and the closed form or surface of the second body lie outside [m]."""
     other = members[second].shape
-    return members[first].shape.surface_is_exact and (
-        other.surface_is_exact if other.kind == SURFACE else other.solid_is_exact
-    )
+    return members[first].shape.surface_excess + (other.surface_excess if other.kind == SURFACE else other.solid_excess)
 
 
 def _ordered(members: Sequence[_Member], first: int, second: int) -> tuple[int, int] | None:
@@ -280,9 +289,12 @@ def _ordered(members: Sequence[_Member], first: int, second: int) -> tuple[int, 
         for one, two in ((first, second), (second, first))
         if members[one].root >= 0 and (members[two].root >= 0 or members[two].shape.kind != SURFACE)
     ]
-    return max(
-        choices, default=None, key=lambda item: (_is_exact(members, *item), members[item[1]].shape.kind != SURFACE)
-    )
+
+    def preference(item: tuple[int, int]) -> tuple[bool, bool, float]:
+        excess = _excess(members, *item)
+        return excess <= SMALL_EXCESS, members[item[1]].shape.kind != SURFACE, -excess
+
+    return max(choices, default=None, key=preference)
 
 
 def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
@@ -340,8 +352,65 @@ def _arrays(
         scene=scene,
         pairs=np.array([item[:2] for item in pairs], dtype=np.int64).reshape(-1, 2),
         margins=np.array([item[2] for item in pairs], dtype=float) + np.array(inflation, dtype=float),
-        exact=np.array([_is_exact(members, one, two) for one, two, _ in pairs], dtype=bool),
+        excess=np.array([_excess(members, one, two) for one, two, _ in pairs], dtype=float),
         tables=np.zeros((0, CELLS, CELLS), dtype=np.int8),
         table_joints=np.zeros((0, 2), dtype=np.int64),
         table_of=np.full(len(pairs), -1, dtype=np.int64),
+        watched=np.arange(len(pairs)),
+        field=_field(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)), 0.0),
+    )
+
+
+def _with_field(world: World) -> tuple[World, list[list[int]]]:
+    """Lets one pair with the field stand for the pairs of a body with all solids of the world.
+
+    Returns:
+        The world with its field, and the pairs for which each of the new pairs stands.
+    """
+    is_plain = (world.joints < 0) & (world.kinds != SURFACE)
+    partners: dict[int, dict[int, int]] = {}  # of each body: the pair with each solid
+    for pair, (first, second) in enumerate(world.pairs.tolist()):
+        if is_plain[second] and world.table_of[pair] < 0:
+            partners.setdefault(first, {})[second] = pair
+    counts = Counter(frozenset(item) for item in partners.values())
+    solids = max(counts, key=lambda item: (counts[item] * len(item), sorted(item)), default=frozenset())
+    replaced: list[list[int]] = []
+    rows, margins, excess = [], [], []
+    for body, item in partners.items() if len(solids) > 1 else ():
+        numbers = [item[solid] for solid in sorted(solids) if solid in item]
+        if len(numbers) == len(solids) and len(set(world.margins[numbers].tolist())) == 1:
+            replaced.append(numbers)
+            rows.append((body, FIELD))
+            margins.append(world.margins[numbers[0]])
+            excess.append(world.excess[numbers].max())
+    if not replaced:
+        return world, []
+    count, chosen = len(world.pairs), sorted(solids)
+    left_out = np.array([number for numbers in replaced for number in numbers])
+    field = _field(
+        world.kinds[chosen], world.sizes[chosen], world.poses[chosen], min(farthest_end(world), FIELD_REACH_M)
+    )
+    world = world._replace(
+        pairs=np.concatenate([world.pairs, np.array(rows, dtype=np.int64)]),
+        margins=np.concatenate([world.margins, margins]),
+        excess=np.concatenate([world.excess, excess]),
+        table_of=np.concatenate([world.table_of, np.full(len(rows), -1)]),
+        watched=np.concatenate([np.setdiff1d(np.arange(count), left_out), count + np.arange(len(rows))]),
+        field=field,
+    )
+    return world, replaced
+
+
+def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:
+    """Returns an empty field, `reach` [m] to every side of the origin of the planning frame."""
+    cells = (FIELD_CELLS if len(kinds) else 0,) * 3
+    kept = min(len(kinds), KEPT)
+    return DistanceField(
+        kinds,
+        sizes,
+        poses,
+        np.array([-reach, -reach, -reach, 2.0 * reach / FIELD_CELLS]),
+        np.zeros(cells, dtype=bool),
+        np.empty((*cells, kept), dtype=np.int32),
+        np.empty((*cells, kept)),
     )

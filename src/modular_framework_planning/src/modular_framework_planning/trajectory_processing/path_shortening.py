@@ -78,16 +78,21 @@ def cut_corners(
 
 
 def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
-    """Drops vertices equal to their predecessor and those in the middle of a straight line; keeps both ends."""
-    kept = [path[0]]
-    for number in range(1, len(path) - 1):
-        before, after = path[number] - kept[-1], path[number + 1] - path[number]
-        size = float(np.linalg.norm(before) * np.linalg.norm(after))
-        if size > tolerance and float(before @ after) < size * (1.0 - 1e-12):
-            kept.append(path[number])
-    if len(path) > 1 and float(np.linalg.norm(path[-1] - kept[-1])) > tolerance:
-        kept.append(path[-1])
-    return np.array(kept)
+    """Drops vertices equal to their predecessor and those in the middle of a straight line; keeps both ends.
+
+    Args:
+        path: polyline of shape (n, joints).
+        tolerance: shortest edge [rad or m], and most change of the unit direction of an edge at a dropped vertex.
+    """
+    ways = np.diff(path, axis=0)
+    lengths = np.linalg.norm(ways, axis=1)
+    moves = lengths > tolerance
+    if not moves.any():
+        return path[:1]
+    stops = path[1:][moves]
+    stops[-1] = path[-1]
+    turns = np.abs(np.diff(ways[moves] / lengths[moves, None], axis=0)).max(axis=1) > tolerance
+    return np.vstack([path[:1], stops[:-1][turns], stops[-1:]])
 
 
 def shorten(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator) -> Array:

@@ -9,22 +9,26 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_distance import (
     CLEAR,
     ROUNDING,
     SURFACE,
-    TOO_CLOSE,
-    TOUCHING,
     Solid,
     solid_distance,
     surface_to_solid,
     surface_to_surface,
+)
+from modular_framework_planning.collision_detection.kernels.compiled_distance_field import (
+    DistanceField,
+    surface_to_field,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces, encloses
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements
 
 CELLS = 128  # of a table along each joint, over a whole turn
+FIELD = -1  # in place of a pair's second body: all solids of the field
 UNKNOWN, APART, NEAR = range(3)
 
 
@@ -41,11 +45,15 @@ class World(NamedTuple):
         closed: whether each body's surface has an inside.
         robot, scene: the surfaces of links, and those of the world and of held objects.
         pairs: two bodies each, the first one has a surface, shape (p, 2); margins: distance they must keep [m].
-        exact: whether the pair touches where the bounding geometries of its bodies do; shape (p,).
+            Pairs with FIELD come last; they stand for other pairs.
+        excess: how far the bounding geometries of a pair's bodies may lie outside of these [m], infinite where that is
+            not known; shape (p,).
         tables: what is known about cells of pairs of links that two joints move against each other: UNKNOWN, APART
             (all through the cell) or NEAR; filled while checking, shape (t, CELLS, CELLS).
         table_joints: the two joints of each table, the one nearer to the base first, -1 for none; shape (t, 2).
         table_of: table of each pair, -1 for none; shape (p,).
+        watched: the pairs to check, those left out for which one with FIELD stands.
+        field: the solids of the world that all bodies with such a pair are checked against.
     """
 
     tree: Tree
@@ -61,10 +69,12 @@ class World(NamedTuple):
     scene: Surfaces
     pairs: NDArray[np.int64]
     margins: Array
-    exact: NDArray[np.bool_]
+    excess: Array
     tables: NDArray[np.int8]
     table_joints: NDArray[np.int64]
     table_of: NDArray[np.int64]
+    watched: NDArray[np.int64]
+    field: DistanceField
 
 
 @njit(cache=True, nogil=True)
@@ -125,23 +135,23 @@ def centre_gap(centres, first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def pair_bound(world, pair, poses, centres, limit, relative):  # type: ignore[no-untyped-def]
+def pair_bound(world, pair, poses, centres, limit, memory):  # type: ignore[no-untyped-def]
     """Returns (status, lower bound of the pair's distance less its margin, at most `limit`)."""
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
-    margin = world.margins[pair]
+    margin, excess = world.margins[pair], world.excess[pair]
+    if second == FIELD:
+        surface = world.scene if world.is_environment[first] else world.robot
+        return surface_to_field(surface, world.roots[first], poses[first], world.field, margin, excess, limit, memory)
     if centre_gap(centres, first, second) - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
         return CLEAR, limit
+    relative = memory.relative
     relative_pose(poses[first], poses[second], relative)
     surface, root = world.scene if world.is_environment[first] else world.robot, world.roots[first]
     if world.kinds[second] != SURFACE:
         solid = solid_of(world.kinds, world.sizes, second)
-        status, bound = surface_to_solid(surface, root, relative, solid, margin, limit)
-    else:
-        other = world.scene if world.is_environment[second] else world.robot
-        status, bound = surface_to_surface(surface, root, other, world.roots[second], relative, margin, limit)
-    if status == TOUCHING and not world.exact[pair]:
-        status = TOO_CLOSE
-    return status, bound
+        return surface_to_solid(surface, root, relative, solid, margin, excess, limit, memory)
+    other = world.scene if world.is_environment[second] else world.robot
+    return surface_to_surface(surface, root, other, world.roots[second], relative, margin, excess, limit, memory)
 
 
 @njit(cache=True, nogil=True)
@@ -182,11 +192,12 @@ def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
     """Returns the first pair of which one body lies wholly inside the other, or -1; they must not touch."""
-    pairs, exact, spheres = world.pairs, world.exact, world.spheres
+    pairs, excess, spheres = world.pairs, world.excess, world.spheres
     for pair in range(len(pairs)):
         first, second = pairs[pair, 0], pairs[pair, 1]
         if (
-            exact[pair]
+            second != FIELD
+            and np.isfinite(excess[pair])
             and centre_gap(centres, first, second) < spheres[first, 3] + spheres[second, 3]
             and (_contains(world, first, second, poses) or _contains(world, second, first, poses))
         ):
@@ -196,15 +207,28 @@ def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
 
 def arguments(world: World) -> tuple[NDArray[Any], ...]:
     """Returns the arrays of a world one by one: numba takes 70 microseconds to recognise a tuple, 4 for these."""
-    return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:])
+    return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:-1], *world.field)
 
 
 @njit(cache=True, nogil=True)
 def world_of(arrays):  # type: ignore[no-untyped-def]
-    """Puts the arrays that `arguments` gives together again; numba calls no class with more than one starred tuple."""
+    """Puts the arrays that `arguments` gives together again, without owners.
+
+    Numba calls no class with more than one starred tuple.
+    """
     a = arrays
-    tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
-    return World(tree, a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], robot, scene, *a[20:])
+    tree = Tree(borrowed(a[0]), borrowed(a[1]), borrowed(a[2]), borrowed(a[3]))
+    robot = Surfaces(borrowed(a[12]), borrowed(a[13]), borrowed(a[14]), borrowed(a[15]))
+    scene = Surfaces(borrowed(a[16]), borrowed(a[17]), borrowed(a[18]), borrowed(a[19]))
+    joints, poses, roots, is_environment = borrowed(a[4]), borrowed(a[5]), borrowed(a[6]), borrowed(a[7])
+    kinds, sizes, spheres, closed = borrowed(a[8]), borrowed(a[9]), borrowed(a[10]), borrowed(a[11])
+    bodies = (tree, joints, poses, roots, is_environment, kinds, sizes, spheres, closed, robot, scene)
+    pairs, margins, excess, tables = borrowed(a[20]), borrowed(a[21]), borrowed(a[22]), borrowed(a[23])
+    table_joints, table_of, watched = borrowed(a[24]), borrowed(a[25]), borrowed(a[26])
+    solids = (borrowed(a[27]), borrowed(a[28]), borrowed(a[29]))
+    cells = (borrowed(a[30]), borrowed(a[31]), borrowed(a[32]), borrowed(a[33]))
+    field = DistanceField(solids[0], solids[1], solids[2], cells[0], cells[1], cells[2], cells[3])
+    return World(*bodies, pairs, margins, excess, tables, table_joints, table_of, watched, field)
 
 
 @njit(cache=True, nogil=True)

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import (
     halve_longest_edge,
     triangle_distance,
@@ -52,6 +54,41 @@ class Turns(NamedTuple):
     origins: Array
     axes: Array
     change: Array
+
+
+class Memory(NamedTuple):
+    """Working memory of a check.
+
+    Attributes:
+        relative: a pose, shape (3, 4).
+        stack, bounds: nodes of two trees still to look at, and their bounds; shapes (STACK, 2) and (STACK,).
+        outer_stack, outer_bounds: the same of a check that makes others, for one tree; shape (STACK,).
+        pieces: of a triangle, shape (64, 9).
+        corners: of a triangle, shape (9,).
+    """
+
+    relative: Array
+    stack: NDArray[np.int32]
+    bounds: Array
+    outer_stack: NDArray[np.int32]
+    outer_bounds: Array
+    pieces: Array
+    corners: Array
+
+
+@njit(cache=True, nogil=True)
+def new_memory():  # type: ignore[no-untyped-def]
+    """Returns working memory."""
+    stack, outer = np.empty((STACK, 2), np.int32), np.empty(STACK, np.int32)
+    return Memory(np.empty((3, 4)), stack, np.empty(STACK), outer, np.empty(STACK), np.empty((64, 9)), np.empty(9))
+
+
+@njit(cache=True, nogil=True)
+def borrowed_memory(m):  # type: ignore[no-untyped-def]
+    """Returns the same memory without an owner, see `borrowed`."""
+    stack, outer = borrowed(m.stack), borrowed(m.outer_stack)
+    bounds, outer_bounds = borrowed(m.bounds), borrowed(m.outer_bounds)
+    return Memory(borrowed(m.relative), stack, bounds, outer, outer_bounds, borrowed(m.pieces), borrowed(m.corners))
 
 
 @njit(cache=True, nogil=True)
@@ -114,48 +151,50 @@ def _gap(low, high, half):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _span_bound(solid, t):  # type: ignore[no-untyped-def]
-    """Lower bound of a triangle's distance from a box or cylinder by the triangle's extent along the axes."""
+def _span_bound(solid, pieces, n):  # type: ignore[no-untyped-def]
+    """Lower bound of the distance of a triangle, pieces[n], from a box or cylinder by its extent along the axes."""
     kind, p0, p1, p2 = solid
-    gz = _gap(min(t[2], t[5], t[8]), max(t[2], t[5], t[8]), p2 if kind == BOX else p1)
-    gx = _gap(min(t[0], t[3], t[6]), max(t[0], t[3], t[6]), p0)
-    gy = _gap(min(t[1], t[4], t[7]), max(t[1], t[4], t[7]), p1 if kind == BOX else p0)
+    x, y, z = (
+        (pieces[n, 0], pieces[n, 3], pieces[n, 6]),
+        (pieces[n, 1], pieces[n, 4], pieces[n, 7]),
+        (pieces[n, 2], pieces[n, 5], pieces[n, 8]),
+    )
+    gx = _gap(min(x), max(x), p0)
+    gy = _gap(min(y), max(y), p1 if kind == BOX else p0)
+    gz = _gap(min(z), max(z), p2 if kind == BOX else p1)
     if kind == CYLINDER:  # its round side lies within the box of its extent, of which only one axis may count
         return np.sqrt(max(gx, gy) ** 2 + gz * gz)
     return np.sqrt(gx * gx + gy * gy + gz * gz)
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_solid(triangle, pose, solid, margin, limit):  # type: ignore[no-untyped-def]
+def _triangle_to_solid(triangles, number, pose, solid, margin, excess, limit, pieces):  # type: ignore[no-untyped-def]
     """Returns (status, lower bound capped at `limit`) of one triangle against a solid, cutting the triangle up."""
-    pieces = np.empty((64, 9))
-    for corner in range(3):
+    for corner in range(0, 9, 3):
+        x, y, z = triangles[number, corner], triangles[number, corner + 1], triangles[number, corner + 2]
         for row in range(3):
-            pieces[0, 3 * corner + row] = (
-                pose[row, 0] * triangle[3 * corner]
-                + pose[row, 1] * triangle[3 * corner + 1]
-                + pose[row, 2] * triangle[3 * corner + 2]
-                + pose[row, 3]
-            )
+            pieces[0, corner + row] = pose[row, 0] * x + pose[row, 1] * y + pose[row, 2] * z + pose[row, 3]
     depth, work, status = 1, 0, CLEAR
     while depth > 0:
         depth -= 1
         work += 1
-        t = pieces[depth]
-        if solid.kind in (BOX, CYLINDER) and _span_bound(solid, t) - margin >= limit:
+        if limit > 0.0 and solid.kind in (BOX, CYLINDER) and _span_bound(solid, pieces, depth) - margin >= limit:
             continue
-        cx, cy, cz = (t[0] + t[3] + t[6]) / 3.0, (t[1] + t[4] + t[7]) / 3.0, (t[2] + t[5] + t[8]) / 3.0
+        cx = (pieces[depth, 0] + pieces[depth, 3] + pieces[depth, 6]) / 3.0
+        cy = (pieces[depth, 1] + pieces[depth, 4] + pieces[depth, 7]) / 3.0
+        cz = (pieces[depth, 2] + pieces[depth, 5] + pieces[depth, 8]) / 3.0
         radius = 0.0
-        for corner in range(3):
-            radius = max(
-                radius, (t[3 * corner] - cx) ** 2 + (t[3 * corner + 1] - cy) ** 2 + (t[3 * corner + 2] - cz) ** 2
-            )
+        for corner in range(0, 9, 3):
+            x, y, z = pieces[depth, corner] - cx, pieces[depth, corner + 1] - cy, pieces[depth, corner + 2] - cz
+            radius = max(radius, x * x + y * y + z * z)
         radius = np.sqrt(radius)
         centre = solid_distance(solid, cx, cy, cz) - margin
         if centre - radius >= limit:
             continue
-        if centre < -ROUNDING:
+        if centre < -ROUNDING - excess:
             return TOUCHING, 0.0
+        if centre < -ROUNDING and centre - radius >= -ROUNDING - excess:  # no piece of it is deep enough
+            return TOO_CLOSE, 0.0
         if radius <= ACCEPTED_SHARE * centre or radius <= SMALLEST_PIECE < centre - ROUNDING:
             limit = centre - radius
             continue
@@ -167,7 +206,7 @@ def _triangle_to_solid(triangle, pose, solid, margin, limit):  # type: ignore[no
 
 
 @njit(cache=True, nogil=True)
-def _box_to_solid(box, pose, solid):  # type: ignore[no-untyped-def]
+def _box_to_solid(boxes, node, pose, solid):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of a tree's box from a solid, along the faces' normals of the boxes around both."""
     kind, p0, p1, p2 = solid
     if kind in (PLANE, HALF_SPACE):
@@ -175,16 +214,16 @@ def _box_to_solid(box, pose, solid):  # type: ignore[no-untyped-def]
     hx = p0
     hy = p1 if kind == BOX else p0
     hz = p2 if kind == BOX else (p0 if kind == SPHERE else (p0 + p1 if kind == CAPSULE else p1))
-    cx = pose[0, 0] * box[0] + pose[0, 1] * box[1] + pose[0, 2] * box[2] + pose[0, 3]
-    cy = pose[1, 0] * box[0] + pose[1, 1] * box[1] + pose[1, 2] * box[2] + pose[1, 3]
-    cz = pose[2, 0] * box[0] + pose[2, 1] * box[1] + pose[2, 2] * box[2] + pose[2, 3]
+    cx = pose[0, 0] * boxes[node, 0] + pose[0, 1] * boxes[node, 1] + pose[0, 2] * boxes[node, 2] + pose[0, 3]
+    cy = pose[1, 0] * boxes[node, 0] + pose[1, 1] * boxes[node, 1] + pose[1, 2] * boxes[node, 2] + pose[1, 3]
+    cz = pose[2, 0] * boxes[node, 0] + pose[2, 1] * boxes[node, 1] + pose[2, 2] * boxes[node, 2] + pose[2, 3]
     best, ex, ey, ez = -np.inf, hx, hy, hz
     for axis in range(3):
-        a, b, c = box[3 + 3 * axis], box[4 + 3 * axis], box[5 + 3 * axis]
+        a, b, c = boxes[node, 3 + 3 * axis], boxes[node, 4 + 3 * axis], boxes[node, 5 + 3 * axis]
         ax = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
         ay = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
         az = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
-        half = box[12 + axis]
+        half = boxes[node, 12 + axis]
         best = max(best, abs(cx * ax + cy * ay + cz * az) - half - abs(hx * ax) - abs(hy * ay) - abs(hz * az))
         ex, ey, ez = ex + half * abs(ax), ey + half * abs(ay), ez + half * abs(az)
     gx, gy, gz = max(abs(cx) - ex, 0.0), max(abs(cy) - ey, 0.0), max(abs(cz) - ez, 0.0)
@@ -192,32 +231,57 @@ def _box_to_solid(box, pose, solid):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _box_to_box(box, other, pose):  # type: ignore[no-untyped-def]
+def _box_to_box(boxes, node, other_boxes, other, pose):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of two trees' boxes along their faces' normals."""
-    dx = pose[0, 0] * box[0] + pose[0, 1] * box[1] + pose[0, 2] * box[2] + pose[0, 3] - other[0]
-    dy = pose[1, 0] * box[0] + pose[1, 1] * box[1] + pose[1, 2] * box[2] + pose[1, 3] - other[1]
-    dz = pose[2, 0] * box[0] + pose[2, 1] * box[1] + pose[2, 2] * box[2] + pose[2, 3] - other[2]
+    dx = (
+        pose[0, 0] * boxes[node, 0]
+        + pose[0, 1] * boxes[node, 1]
+        + pose[0, 2] * boxes[node, 2]
+        + pose[0, 3]
+        - other_boxes[other, 0]
+    )
+    dy = (
+        pose[1, 0] * boxes[node, 0]
+        + pose[1, 1] * boxes[node, 1]
+        + pose[1, 2] * boxes[node, 2]
+        + pose[1, 3]
+        - other_boxes[other, 1]
+    )
+    dz = (
+        pose[2, 0] * boxes[node, 0]
+        + pose[2, 1] * boxes[node, 1]
+        + pose[2, 2] * boxes[node, 2]
+        + pose[2, 3]
+        - other_boxes[other, 2]
+    )
     best = 0.0
-    e0, e1, e2 = other[12], other[13], other[14]
+    e0, e1, e2 = other_boxes[other, 12], other_boxes[other, 13], other_boxes[other, 14]
     for axis in range(3):
-        a, b, c = box[3 + 3 * axis], box[4 + 3 * axis], box[5 + 3 * axis]
+        a, b, c = boxes[node, 3 + 3 * axis], boxes[node, 4 + 3 * axis], boxes[node, 5 + 3 * axis]
         ax = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
         ay = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
         az = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
-        c0 = abs(ax * other[3] + ay * other[4] + az * other[5])
-        c1 = abs(ax * other[6] + ay * other[7] + az * other[8])
-        c2 = abs(ax * other[9] + ay * other[10] + az * other[11])
-        half = box[12 + axis]
-        best = max(best, abs(dx * ax + dy * ay + dz * az) - half - c0 * other[12] - c1 * other[13] - c2 * other[14])
+        c0 = abs(ax * other_boxes[other, 3] + ay * other_boxes[other, 4] + az * other_boxes[other, 5])
+        c1 = abs(ax * other_boxes[other, 6] + ay * other_boxes[other, 7] + az * other_boxes[other, 8])
+        c2 = abs(ax * other_boxes[other, 9] + ay * other_boxes[other, 10] + az * other_boxes[other, 11])
+        half = boxes[node, 12 + axis]
+        best = max(
+            best,
+            abs(dx * ax + dy * ay + dz * az)
+            - half
+            - c0 * other_boxes[other, 12]
+            - c1 * other_boxes[other, 13]
+            - c2 * other_boxes[other, 14],
+        )
         e0, e1, e2 = e0 + half * c0, e1 + half * c1, e2 + half * c2
-    g0 = max(abs(dx * other[3] + dy * other[4] + dz * other[5]) - e0, 0.0)
-    g1 = max(abs(dx * other[6] + dy * other[7] + dz * other[8]) - e1, 0.0)
-    g2 = max(abs(dx * other[9] + dy * other[10] + dz * other[11]) - e2, 0.0)
+    g0 = max(abs(dx * other_boxes[other, 3] + dy * other_boxes[other, 4] + dz * other_boxes[other, 5]) - e0, 0.0)
+    g1 = max(abs(dx * other_boxes[other, 6] + dy * other_boxes[other, 7] + dz * other_boxes[other, 8]) - e1, 0.0)
+    g2 = max(abs(dx * other_boxes[other, 9] + dy * other_boxes[other, 10] + dz * other_boxes[other, 11]) - e2, 0.0)
     return max(best, np.sqrt(g0 * g0 + g1 * g1 + g2 * g2))
 
 
 @njit(cache=True, nogil=True)
-def surface_to_solid(surface, root, pose, solid, margin, limit):  # type: ignore[no-untyped-def]
+def surface_to_solid(surface, root, pose, solid, margin, excess, limit, memory):  # type: ignore[no-untyped-def]
     """Bounds the distance of a surface from a solid.
 
     Args:
@@ -226,25 +290,30 @@ def surface_to_solid(surface, root, pose, solid, margin, limit):  # type: ignore
         pose: (3, 4) of the surface in the solid's frame.
         solid: the closed form.
         margin: what is taken off every distance [m].
+        excess: how far the surface may lie outside of its body [m]: only a deeper point says that both touch.
         limit: a distance [m] beyond which nothing needs to be known.
+        memory: working memory.
 
     Returns:
         (status, lower bound of the distance, at most `limit`).
     """
     spheres, boxes, links, triangles = surface
-    stack = np.empty(STACK, np.int32)
-    bounds = np.empty(STACK)
-    stack[0], bounds[0] = root, -np.inf
-    depth = 1
+    stack, bounds, pieces = memory.stack, memory.bounds, memory.pieces
+    stack[0, 0], bounds[0] = root, -np.inf
+    depth, result = 1, CLEAR
     while depth > 0:
         depth -= 1
-        node = stack[depth]
+        node = stack[depth, 0]
         if bounds[depth] >= limit:
             continue
         if links[node, 0] < 0:
-            status, bound = _triangle_to_solid(triangles[links[node, 1]], pose, solid, margin, limit)
-            if status != CLEAR:
-                return status, 0.0
+            number = links[node, 1]
+            status, bound = _triangle_to_solid(triangles, number, pose, solid, margin, excess, limit, pieces)
+            if status == TOUCHING:
+                return TOUCHING, 0.0
+            if status == TOO_CLOSE:  # what is left to find out is whether it touches elsewhere
+                result, limit = TOO_CLOSE, -ROUNDING - excess
+                continue
             limit = min(limit, bound)
             continue
         far, near = links[node, 0], links[node, 1]
@@ -258,10 +327,10 @@ def surface_to_solid(surface, root, pose, solid, margin, limit):  # type: ignore
                 continue
             if radius <= ACCEPTED_SHARE * gap:
                 limit = gap - radius
-            elif _box_to_solid(boxes[child], pose, solid) - margin < limit:
-                stack[depth], bounds[depth] = child, gap - radius
+            elif limit <= 0.0 or _box_to_solid(boxes, child, pose, solid) - margin < limit:
+                stack[depth, 0], bounds[depth] = child, gap - radius
                 depth += 1
-    return CLEAR, limit
+    return result, max(limit, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -287,25 +356,27 @@ def _sphere_gap(spheres, node, other_spheres, other, pose):  # type: ignore[no-u
 
 @njit(cache=True, nogil=True)
 def surface_to_surface(  # type: ignore[no-untyped-def]
-    surface, root, other_surface, other_root, pose, margin, limit
+    surface, root, other_surface, other_root, pose, margin, excess, limit, memory
 ):
     """Bounds the distance of two surfaces; `pose` (3, 4) is the first one's in the frame of the other."""
     spheres, boxes, links, triangles = surface
     other_spheres, other_boxes, other_links, other_triangles = other_surface
-    stack = np.empty((STACK, 2), np.int32)
-    bounds = np.empty(STACK)
+    stack, bounds, corners = memory.stack, memory.bounds, memory.corners
     stack[0, 0], stack[0, 1], bounds[0] = root, other_root, -np.inf
-    depth, hopeless = 1, HOPELESS_SHARE * limit
+    depth, hopeless, result = 1, HOPELESS_SHARE * limit, CLEAR
     while depth > 0:
         depth -= 1
         node, other = stack[depth, 0], stack[depth, 1]
         if bounds[depth] >= limit:
             continue
         if links[node, 0] < 0 and other_links[other, 0] < 0:
-            triangle, other_triangle = triangles[links[node, 1]], other_triangles[other_links[other, 1]]
-            distance = _triangle_to_triangle(triangle, pose, other_triangle) - margin
-            if distance <= ROUNDING:
-                return (TOUCHING if distance <= 0.0 else TOO_CLOSE), 0.0
+            one, two = links[node, 1], other_links[other, 1]
+            distance = _triangle_to_triangle(triangles, one, pose, other_triangles, two, corners) - margin
+            if distance <= -excess:
+                return TOUCHING, 0.0
+            if distance <= ROUNDING:  # what is left to find out is whether they touch elsewhere
+                result, limit = TOO_CLOSE, -excess
+                continue
             limit = min(limit, distance)
             if limit < hopeless:  # of little use: all that is still asked is whether they touch
                 limit = min(limit, 2.0 * ROUNDING)
@@ -327,24 +398,19 @@ def surface_to_surface(  # type: ignore[no-untyped-def]
                 continue
             if both <= ACCEPTED_SHARE * gap:
                 limit = gap - both
-            elif _box_to_box(boxes[child], other_boxes[partner], pose) - margin < limit:
+            elif limit <= 0.0 or _box_to_box(boxes, child, other_boxes, partner, pose) - margin < limit:
                 stack[depth, 0], stack[depth, 1], bounds[depth] = child, partner, gap - both
                 depth += 1
-    return CLEAR, limit
+    return result, max(limit, 0.0)
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_triangle(triangle, pose, other):  # type: ignore[no-untyped-def]
-    corners = np.empty(9)
-    for corner in range(3):
+def _triangle_to_triangle(triangles, number, pose, others, other, corners):  # type: ignore[no-untyped-def]
+    for corner in range(0, 9, 3):
+        x, y, z = triangles[number, corner], triangles[number, corner + 1], triangles[number, corner + 2]
         for row in range(3):
-            corners[3 * corner + row] = (
-                pose[row, 0] * triangle[3 * corner]
-                + pose[row, 1] * triangle[3 * corner + 1]
-                + pose[row, 2] * triangle[3 * corner + 2]
-                + pose[row, 3]
-            )
-    return triangle_distance(corners, other)
+            corners[corner + row] = pose[row, 0] * x + pose[row, 1] * y + pose[row, 2] * z + pose[row, 3]
+    return triangle_distance(corners, others[other])
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -378,7 +444,7 @@ def surfaces_stay_apart(surface, root, other_surface, other_root, pose, turns): 
     spheres, boxes, links, triangles = surface
     other_spheres, other_boxes, other_links, other_triangles = other_surface
     origins, axes, change = turns
-    stack = np.empty((STACK, 2), np.int32)
+    stack, corners = np.empty((STACK, 2), np.int32), np.empty(9)
     stack[0, 0], stack[0, 1] = root, other_root
     depth, work = 1, 0
     while depth > 0:
@@ -389,12 +455,12 @@ def surfaces_stay_apart(surface, root, other_surface, other_root, pose, turns): 
         gap = _sphere_gap(spheres, node, other_spheres, other, pose)
         if (
             gap - spheres[node, 3] - other_spheres[other, 3] >= needed
-            or _box_to_box(boxes[node], other_boxes[other], pose) >= needed
+            or _box_to_box(boxes, node, other_boxes, other, pose) >= needed
         ):
             continue
         if links[node, 0] < 0 and other_links[other, 0] < 0:
-            triangle, other_triangle = triangles[links[node, 1]], other_triangles[other_links[other, 1]]
-            if _triangle_to_triangle(triangle, pose, other_triangle) < needed:
+            one, two = links[node, 1], other_links[other, 1]
+            if _triangle_to_triangle(triangles, one, pose, other_triangles, two, corners) < needed:
                 return False
             continue
         if depth > STACK - 3 or work > MOST_PAIRS:

@@ -15,8 +15,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     APART,
+    FIELD,
     UNKNOWN,
     centre_gap,
     pair_bound,
@@ -31,13 +33,18 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     SURFACE,
     TOO_CLOSE,
     TOUCHING,
+    Memory,
+    borrowed_memory,
+    new_memory,
     placed_solid_distance,
 )
+from modular_framework_planning.collision_detection.kernels.compiled_distance_field import field_distance
 from modular_framework_planning.collision_detection.kernels.compiled_tables import fill_cells, table_answer
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
 UNDECIDED_ROWS = 256  # to begin with
+LONG_MOTION = 0.2  # [m]; a stretch on which a body can move farther is halved without asking for clearances
 
 
 class Samples(NamedTuple):
@@ -57,8 +64,17 @@ class Samples(NamedTuple):
 @njit(cache=True, nogil=True)
 def sample(vertices, step):  # type: ignore[no-untyped-def]
     """Numbers samples at most `step` apart in every joint."""
+    samples = Samples(vertices, np.zeros(len(vertices), np.int64), np.zeros(vertices.shape))
+    number_samples(samples, step)
+    return samples
+
+
+@njit(cache=True, nogil=True)
+def number_samples(samples, step):  # type: ignore[no-untyped-def]
+    """Writes the numbers of the samples at the vertices and how far the joints have gone there."""
+    vertices, numbers, travelled = samples
     count, joints = vertices.shape
-    numbers, travelled = np.zeros(count, np.int64), np.zeros((count, joints))
+    numbers[0], travelled[0] = 0, 0.0
     for vertex in range(1, count):
         widest = 0.0
         for joint in range(joints):
@@ -66,7 +82,6 @@ def sample(vertices, step):  # type: ignore[no-untyped-def]
             travelled[vertex, joint] = travelled[vertex - 1, joint] + change
             widest = max(widest, change)
         numbers[vertex] = numbers[vertex - 1] + max(1, int(np.ceil(widest / step)))
-    return Samples(vertices, numbers, travelled)
 
 
 @njit(cache=True, nogil=True)
@@ -115,6 +130,7 @@ class Stretch(NamedTuple):
         still: least and largest positions at the sample, shape (2, joints).
         reach: least and largest positions on the stretch, shape (2, joints).
         change: how far each joint moves at most from the sample to either end, shape (joints,).
+        signs: in which direction each joint moves, 1 or -1, all 0 where the stretch is not straight; shape (joints,).
         motions: how far a point of each body moves at most meanwhile [m]; shape (b,).
         rows: working memory, shape (3, joints).
     """
@@ -126,6 +142,7 @@ class Stretch(NamedTuple):
     still: Array
     reach: Array
     change: Array
+    signs: Array
     motions: Array
     rows: Array
 
@@ -134,12 +151,51 @@ class Stretch(NamedTuple):
 def _new_stretch(joints, bodies):  # type: ignore[no-untyped-def]
     placements, poses, centres = np.empty((joints, 3, 4)), np.empty((bodies, 3, 4)), np.empty((bodies, 3))
     axes, still, reach = np.empty((joints, 6)), np.empty((2, joints)), np.empty((2, joints))
-    change, motions, rows = np.empty(joints), np.zeros(bodies), np.empty((3, joints))
-    return Stretch(placements, poses, centres, axes, still, reach, change, motions, rows)
+    change, signs, motions, rows = np.empty(joints), np.empty(joints), np.zeros(bodies), np.empty((3, joints))
+    return Stretch(placements, poses, centres, axes, still, reach, change, signs, motions, rows)
+
+
+class Workspace(NamedTuple):
+    """Working memory of the check of a path."""
+
+    stretch: Stretch
+    memory: Memory
 
 
 @njit(cache=True, nogil=True)
-def _look_at(world, samples, low, high, begins, stretch):  # type: ignore[no-untyped-def]
+def new_workspace(world):  # type: ignore[no-untyped-def]
+    """Returns working memory for paths in a world."""
+    return Workspace(_new_stretch(len(world.tree.parents), len(world.joints)), new_memory())
+
+
+@njit(cache=True, nogil=True)
+def borrowed_workspace(workspace):  # type: ignore[no-untyped-def]
+    """Returns the same memory without an owner, see `borrowed`."""
+    return Workspace(_borrowed_stretch(workspace.stretch), borrowed_memory(workspace.memory))
+
+
+@njit(cache=True, nogil=True)
+def borrowed_samples(samples):  # type: ignore[no-untyped-def]
+    """Returns the same samples without an owner, see `borrowed`."""
+    return Samples(borrowed(samples.vertices), borrowed(samples.numbers), borrowed(samples.travelled))
+
+
+@njit(cache=True, nogil=True)
+def release(workspace):  # type: ignore[no-untyped-def]
+    """Marks where working memory was used last: until here it has an owner."""
+    workspace.stretch.motions[:], workspace.memory.bounds[0] = 0.0, 0.0
+
+
+@njit(cache=True, nogil=True)
+def _borrowed_stretch(s):  # type: ignore[no-untyped-def]
+    placements, poses, centres, axes = borrowed(s.placements), borrowed(s.poses), borrowed(s.centres), borrowed(s.axes)
+    still, reach, change, signs = borrowed(s.still), borrowed(s.reach), borrowed(s.change), borrowed(s.signs)
+    motions, rows = borrowed(s.motions), borrowed(s.rows)
+    return Stretch(placements, poses, centres, axes, still, reach, change, signs, motions, rows)
+
+
+@njit(cache=True, nogil=True)
+def look_at(world, samples, low, high, begins, stretch):  # type: ignore[no-untyped-def]
     """Places the bodies at the sample in the middle of two others, and bounds their motion to these.
 
     Args:
@@ -149,64 +205,102 @@ def _look_at(world, samples, low, high, begins, stretch):  # type: ignore[no-unt
         high: the last of them.
         begins: whether this is the first sample looked at; only then are bodies of the world placed.
         stretch: filled; what bounds the motion only where low and high differ.
+
+    Returns:
+        How far a body moves at most [m], bodies without an end left out.
     """
     numbers, middle, still, hangs_on = samples.numbers, (low + high) // 2, stretch.still, world.joints
     write_row(samples.vertices, numbers, middle, still[0])
     still[1] = still[0]
     joint_placements(world.tree, still[0], stretch.placements)
     place_bodies(world, stretch.placements, stretch.poses, stretch.centres, begins)
+    longest = 0.0
     if low == high:
-        return
+        return longest
     begun, ended, row, change, axes = stretch.rows[0], stretch.rows[1], stretch.rows[2], stretch.change, stretch.axes
+    signs = stretch.signs
     write_row(samples.vertices, numbers, low, begun)
     write_row(samples.vertices, numbers, high, ended)
     _write_reach(samples.vertices, numbers, low, high, begun, ended, stretch.reach)
+    straight = 1.0 if _is_straight(numbers, low, high) else 0.0
+    for joint in range(len(signs)):
+        signs[joint] = straight if ended[joint] > begun[joint] else -straight
     write_row(samples.travelled, numbers, low, begun)
     write_row(samples.travelled, numbers, high, ended)
     write_row(samples.travelled, numbers, middle, row)
     for joint in range(len(change)):
         change[joint] = max(row[joint] - begun[joint], ended[joint] - row[joint])
-    _write_axes(world.tree.axes, world.tree.prismatic, stretch.placements, axes)
-    parents, centres, spheres = world.tree.parents, stretch.centres, world.spheres
+    _write_axes(world.tree.axes, stretch.placements, axes)
+    parents, prismatic, centres, spheres = world.tree.parents, world.tree.prismatic, stretch.centres, world.spheres
     for body in range(len(hangs_on)):
         if hangs_on[body] >= 0:
-            stretch.motions[body] = _motion_of(parents, axes, change, centres, spheres, body, hangs_on[body], -1)
+            joint = hangs_on[body]
+            motion = _motion_of(parents, prismatic, axes, change, signs, centres, spheres, body, joint, -1)
+            stretch.motions[body] = motion
+            longest = max(longest, motion if motion < np.inf else 0.0)
+    return longest
 
 
 @njit(cache=True, nogil=True)
-def _write_axes(directions, prismatic, placements, out):  # type: ignore[no-untyped-def]
-    """Writes a point and the direction of each joint's axis; the direction is not a number where a joint slides."""
+def _write_axes(directions, placements, out):  # type: ignore[no-untyped-def]
+    """Writes a point and the direction of each joint's axis."""
     for joint in range(len(out)):
         a, b, c = directions[joint, 0], directions[joint, 1], directions[joint, 2]
         for row in range(3):
             pose = placements[joint, row]
             out[joint, row] = pose[3]
-            out[joint, 3 + row] = np.nan if prismatic[joint] else pose[0] * a + pose[1] * b + pose[2] * c
+            out[joint, 3 + row] = pose[0] * a + pose[1] * b + pose[2] * c
 
 
 @njit(cache=True, nogil=True)
-def _motion_of(parents, axes, change, centres, spheres, body, joint, until):  # type: ignore[no-untyped-def]
-    """Bounds how far a point of a body moves [m], seen from the joint `until`, when every joint changes by `change`.
+def _is_straight(numbers, low, high):  # type: ignore[no-untyped-def]
+    """Whether all samples between two samples lie on one straight piece."""
+    begin, (end, share) = _piece_of(numbers, low)[0], _piece_of(numbers, high)
+    return end == begin or (end == begin + 1 and share == 0.0)
 
-    Going from the body's joint to the base, the distance of the body (a sphere) from each axis can grow by what the
-    joints already passed can move it.
+
+@njit(cache=True, nogil=True)
+def _motion_of(parents, prismatic, axes, change, signs, centres, spheres, body, joint, until):  # type: ignore[no-untyped-def]
+    """Bounds how far a point of a body moves [m], seen from the joint `until`, when joints change by `change` at most.
+
+    The smaller one of two bounds. Let a joint j change by d_j, and R_j be the distance of the body (a sphere with
+    centre c and radius r) from its axis a_j, which grows by what the joints between can move the body.
+
+    - The lengths of all arcs: M = sum d_j R_j.
+    - On a straight stretch, the velocity v at its sample and half the acceleration: |v| + sum d_j (M_j + d_j R_j / 2),
+      where M_j is the part of M that the joints between j and the body make, and |v| at most
+      |sum d_j a_j x (c - o_j)| + r |sum d_j a_j|, with the sign of each change. Joints that turn against each other
+      then count against each other.
     """
-    moved = 0.0
+    moved, bent = 0.0, 0.0
+    vx, vy, vz, wx, wy, wz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    radius, is_straight = spheres[body, 3], True
     while joint != until:
-        if change[joint] > 0.0:
+        turn = change[joint]
+        if turn > 0.0:
             ax, ay, az = axes[joint, 3], axes[joint, 4], axes[joint, 5]
-            if np.isnan(ax):
-                moved += change[joint]
+            signed = turn * signs[joint]
+            is_straight = is_straight and signed != 0.0
+            if prismatic[joint]:
+                moved += turn
+                vx, vy, vz = vx + signed * ax, vy + signed * ay, vz + signed * az
             else:
                 x, y, z = (
                     centres[body, 0] - axes[joint, 0],
                     centres[body, 1] - axes[joint, 1],
                     centres[body, 2] - axes[joint, 2],
                 )
-                reach = np.sqrt((ay * z - az * y) ** 2 + (az * x - ax * z) ** 2 + (ax * y - ay * x) ** 2)
-                moved += change[joint] * (reach + spheres[body, 3] + moved)
+                cx, cy, cz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+                arc = turn * (np.sqrt(cx * cx + cy * cy + cz * cz) + radius + moved)
+                bent += turn * (moved + 0.5 * arc)
+                moved += arc
+                vx, vy, vz = vx + signed * cx, vy + signed * cy, vz + signed * cz
+                wx, wy, wz = wx + signed * ax, wy + signed * ay, wz + signed * az
         joint = parents[joint]
-    return moved
+    if not is_straight:
+        return moved
+    speed = np.sqrt(vx * vx + vy * vy + vz * vz) + radius * np.sqrt(wx * wx + wy * wy + wz * wz)
+    return min(moved, speed + bent)
 
 
 @njit(cache=True, nogil=True)
@@ -268,8 +362,6 @@ def _with_room(rows, count):  # type: ignore[no-untyped-def]
     return larger
 
 
-# What is done to each pair stands in the loop, on single arrays: numba counts references to every array of a tuple in
-# a call, which costs more than most of what is asked about a pair.
 @njit(cache=True, nogil=True)
 def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def]
     """Checks samples of a path; those within the clearance of a looked-at sample are not looked at.
@@ -284,13 +376,24 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         (status, number): TOUCHING with the number of a sample that touches; TOO_CLOSE with the number of undecided
         entries, more than n when they do not fit; CLEAR with the number of samples looked at.
     """
+    workspace = new_workspace(world)
+    result = check_samples(world, borrowed_samples(samples), first, undecided, borrowed_workspace(workspace))
+    release(workspace)
+    return result
+
+
+# What is done to each pair stands in the loop, on single arrays: a call costs more than most of what is asked.
+@njit(cache=True, nogil=True)
+def check_samples(world, samples, first, undecided, workspace):  # type: ignore[no-untyped-def]
+    """Does what check_path does, in given working memory; none of the arrays should have an owner (see `borrowed`)."""
+    stretch, memory = workspace
     pairs, margins, spheres, kinds, sizes = world.pairs, world.margins, world.spheres, world.kinds, world.sizes
     tables, table_joints, table_of = world.tables, world.table_joints, world.table_of
-    parents, hangs_on, relative = world.tree.parents, world.joints, np.empty((3, 4))
-    stretch = _new_stretch(samples.vertices.shape[1], len(hangs_on))
-    _, poses, centres, axes, still, reach, change, motions, rows = stretch
+    parents, prismatic, hangs_on, field = world.tree.parents, world.tree.prismatic, world.joints, world.field
+    _, poses, centres, axes, still, reach, change, signs, motions, rows = stretch
     ranges = np.empty((64, 4), np.int64)  # first sample, last sample, and their pairs' indices in `active`
-    active, used, last = np.arange(4 * len(pairs) + 16), len(pairs), samples.numbers[-1]
+    active, used, last = np.empty(4 * len(pairs) + 16, np.int64), len(world.watched), samples.numbers[-1]
+    active[:used] = world.watched
     ranges[0], ranges[1] = (last, last, 0, used), (first, last - 1, 0, used)
     head, tail, looked_at, open_questions = 0, 2, 0, 0
     while head < tail:
@@ -298,9 +401,10 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         head += 1
         if low > high:
             continue
-        middle, moves, kept, share = (low + high) // 2, low < high, used, 1.0
-        _look_at(world, samples, low, high, looked_at == 0, stretch)
+        middle, kept, share = (low + high) // 2, used, 1.0
+        is_long = look_at(world, samples, low, high, looked_at == 0, stretch) > LONG_MOTION
         looked_at += 1
+        moves = low < high and not is_long
         active = _with_room(active, used + end - begin)
         for index in range(begin, end):
             pair = active[index]
@@ -308,37 +412,53 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
                 if moves and _table_says(world, tables, table_joints, table_of, pair, reach) == APART:
                     continue
                 if _table_says(world, tables, table_joints, table_of, pair, still) == APART:
-                    active[kept] = pair
-                    kept, share = kept + 1, 0.0
+                    if moves:
+                        active[kept] = pair
+                        kept, share = kept + 1, 0.0
                     continue
             one, two, needed = pairs[pair, 0], pairs[pair, 1], 2.0 * ROUNDING
-            if moves:
-                common = _common_joint(parents, hangs_on[one], hangs_on[two])
-                if common < 0:
-                    needed += motions[one] + motions[two]
-                else:
-                    needed += _motion_of(parents, axes, change, centres, spheres, one, hangs_on[one], common)
-                    needed += _motion_of(parents, axes, change, centres, spheres, two, hangs_on[two], common)
-            if centre_gap(centres, one, two) - spheres[one, 3] - spheres[two, 3] - margins[pair] >= needed:
-                continue
-            if kinds[two] != SURFACE:
-                x, y, z = centres[one, 0], centres[one, 1], centres[one, 2]
-                gap = placed_solid_distance(solid_of(kinds, sizes, two), poses, two, x, y, z)
-                if gap - spheres[one, 3] - margins[pair] >= needed:
+            x, y, z = centres[one, 0], centres[one, 1], centres[one, 2]
+            if two == FIELD:
+                needed += motions[one] if moves else 0.0
+                apart = needed + spheres[one, 3] + margins[pair]
+                if field_distance(field, x, y, z, apart) >= apart:
                     continue
-            status, bound = pair_bound(world, pair, poses, centres, needed, relative)
+            else:
+                if moves:
+                    joint, other = hangs_on[one], hangs_on[two]
+                    common = _common_joint(parents, joint, other)
+                    if common < 0:
+                        needed += motions[one] + motions[two]
+                    else:
+                        needed += _motion_of(
+                            parents, prismatic, axes, change, signs, centres, spheres, one, hangs_on[one], common
+                        )
+                        needed += _motion_of(
+                            parents, prismatic, axes, change, signs, centres, spheres, two, hangs_on[two], common
+                        )
+                if centre_gap(centres, one, two) - spheres[one, 3] - spheres[two, 3] - margins[pair] >= needed:
+                    continue
+                if kinds[two] != SURFACE:
+                    gap = placed_solid_distance(solid_of(kinds, sizes, two), poses, two, x, y, z)
+                    if gap - spheres[one, 3] - margins[pair] >= needed:
+                        continue
+            status, bound = pair_bound(world, pair, poses, centres, needed, memory)
             if status == TOUCHING:
                 return TOUCHING, middle
             if status == TOO_CLOSE:
                 if open_questions < len(undecided):
                     undecided[open_questions] = middle, pair
                 open_questions += 1
-            if bound < needed:
+            if bound < needed and moves:
                 active[kept] = pair
                 kept, share = kept + 1, min(share, bound / needed)
         if len(samples.vertices) == 1 and surrounded_pair(world, poses, centres) >= 0:  # a path would cross the surface
             return TOUCHING, middle
-        if moves and kept > used:
+        if is_long:
+            ranges = _with_room(ranges, tail + 2)
+            ranges[tail], ranges[tail + 1] = (low, middle - 1, begin, end), (middle + 1, high, begin, end)
+            tail += 2
+        elif kept > used:
             change *= share
             ranges = _with_room(ranges, tail + 2)
             ranges[tail] = low, _certified(samples, middle, low, change, rows) - 1, used, kept

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
+    FIELD,
     World,
     pair_bound,
     place_bodies,
@@ -22,6 +23,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 from modular_framework_planning.collision_detection.kernels.compiled_distance import (
     CLEAR,
     SURFACE,
+    new_memory,
     placed_solid_distance,
 )
 from modular_framework_planning.geometry.spatial import Array
@@ -102,13 +104,15 @@ def penetrations(world, cover, states):  # type: ignore[no-untyped-def]
     bodies = len(world.joints)
     result = np.zeros(len(states))
     placements, poses = np.empty((states.shape[1], 3, 4)), np.empty((bodies, 3, 4))
-    placed, middles, relative = np.empty((len(cover.spheres), 3)), np.empty((bodies, 3)), np.empty((3, 4))
+    placed, middles, memory = np.empty((len(cover.spheres), 3)), np.empty((bodies, 3)), new_memory()
     for number in range(len(states)):
         joint_placements(world.tree, states[number], placements)
         place_bodies(world, placements, poses, middles)
         has_spheres = False
         for pair in range(len(world.pairs)):
-            status, _ = pair_bound(world, pair, poses, middles, NEAR, relative)
+            if world.pairs[pair, 1] == FIELD:
+                break  # what follows stands for pairs that were looked at
+            status, _ = pair_bound(world, pair, poses, middles, NEAR, memory)
             if status == CLEAR:
                 continue
             if not has_spheres:

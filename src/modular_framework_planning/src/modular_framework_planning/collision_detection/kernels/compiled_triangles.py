@@ -54,19 +54,20 @@ def halve_longest_edge(pieces, at, enough):  # type: ignore[no-untyped-def]
     Returns:
         True, and changes nothing, where the square of that edge is at most `enough`.
     """
-    t = pieces[at]
-    a = (t[0] - t[3]) ** 2 + (t[1] - t[4]) ** 2 + (t[2] - t[5]) ** 2
-    b = (t[3] - t[6]) ** 2 + (t[4] - t[7]) ** 2 + (t[5] - t[8]) ** 2
-    c = (t[6] - t[0]) ** 2 + (t[7] - t[1]) ** 2 + (t[8] - t[2]) ** 2
+    a, b, c = 0.0, 0.0, 0.0
+    for row in range(3):
+        a += (pieces[at, row] - pieces[at, 3 + row]) ** 2
+        b += (pieces[at, 3 + row] - pieces[at, 6 + row]) ** 2
+        c += (pieces[at, 6 + row] - pieces[at, row]) ** 2
     if max(a, max(b, c)) <= enough:
         return True
     first, second = (0, 3) if a >= b and a >= c else ((3, 6) if b >= c else (6, 0))
     for row in range(9):
-        pieces[at + 1, row] = t[row]
+        pieces[at + 1, row] = pieces[at, row]
     for row in range(3):
-        middle = 0.5 * (t[first + row] + t[second + row])
+        middle = 0.5 * (pieces[at, first + row] + pieces[at, second + row])
         pieces[at + 1, first + row] = middle
-        t[second + row] = middle
+        pieces[at, second + row] = middle
     return False
 
 
@@ -232,13 +233,11 @@ def _faces_distance(face, other):  # type: ignore[no-untyped-def]
     if size <= 0.0:
         return np.inf
     best = np.inf
-    heights = np.empty(3)
-    for corner in range(3):
-        heights[corner] = (
-            (other[3 * corner] - face[0]) * nx
-            + (other[3 * corner + 1] - face[1]) * ny
-            + (other[3 * corner + 2] - face[2]) * nz
-        )
+    heights = (
+        (other[0] - face[0]) * nx + (other[1] - face[1]) * ny + (other[2] - face[2]) * nz,
+        (other[3] - face[0]) * nx + (other[4] - face[1]) * ny + (other[5] - face[2]) * nz,
+        (other[6] - face[0]) * nx + (other[7] - face[1]) * ny + (other[8] - face[2]) * nz,
+    )
     for corner in range(3):
         following = (corner + 1) % 3
         span = heights[corner] - heights[following]

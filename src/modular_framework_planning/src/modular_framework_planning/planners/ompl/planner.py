@@ -25,7 +25,6 @@ from modular_framework_planning.planners.ompl.planner_settings import (
     keeps_intermediate_states,
     make_planner,
     parameter_faults,
-    stages,
 )
 from modular_framework_planning.planners.ompl.projection import projection_evaluator
 from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, can_search
@@ -107,14 +106,11 @@ def _paths(problem: PlanningProblem, goals: Array, step: float) -> tuple[list[Ar
     """Returns the paths that `attempts` searches find, and how many states they looked at."""
     paths, states = [], 0
     for _ in range(max(1, problem.request.attempts)):
-        for reach, limit in stages(problem.planner_id, problem.planner_parameters):
-            search = _search(problem, goals, step, reach, limit)
-            path = search.run()
-            states += search.states
-            if path is not None:
-                paths.append(path)
-            if path is not None or problem.interrupted():
-                break
+        search = _search(problem, goals, step)
+        path = search.run()
+        states += search.states
+        if path is not None:
+            paths.append(path)
         if problem.interrupted():
             break
     return paths, states
@@ -137,19 +133,17 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
             return ConstrainedSearch(near, fine, second[None], CONSTRAINED_CONNECTION_STATES).run().vertices
         except PlanningError:
             return None
-    return _search(near, second[None], fine, DEFAULT_RANGE, CONNECTION_ITERATIONS).run()
+    return _search(near, second[None], fine, CONNECTION_ITERATIONS).run()
 
 
-def _search(
-    problem: PlanningProblem, goals: Array, step: float, reach: float, limit: int | None
-) -> _Search | RrtConnect:
+def _search(problem: PlanningProblem, goals: Array, step: float, limit: int | None = None) -> _Search | RrtConnect:
     """Returns the search of the problem's planner; RRTConnect is compiled where the checker allows it."""
     parameters = problem.planner_parameters
     if problem.planner_id == "RRTConnect" and can_search(problem) and not keeps_intermediate_states(parameters):
         limit = problem.request.most_iterations if limit is None else limit
         wanted = connection_range(parameters)
-        return RrtConnect(problem, goals, step, wanted or reach, limit, is_weighted=wanted is None)
-    return _Search(problem, goals, step, reach, limit)
+        return RrtConnect(problem, goals, step, wanted or DEFAULT_RANGE, limit, is_weighted=wanted is None)
+    return _Search(problem, goals, step, limit)
 
 
 def edge_step(problem: PlanningProblem) -> float:
@@ -194,7 +188,6 @@ class _Search:
         problem: PlanningProblem,
         goals: Array,
         step: float,
-        default_range: float = DEFAULT_RANGE,
         limit: int | None = None,
     ) -> None:
         """Stores what to search.
@@ -203,11 +196,10 @@ class _Search:
             problem: what to plan.
             goals: joint vectors to reach, shape (n, joints).
             step: distance of checks along an edge [rad or m].
-            default_range: longest step of the planner where no parameter sets it [rad or m].
             limit: of iterations; None: the clock ends the search.
         """
         self._problem, self._goals, self._step = problem, goals, step
-        self._range, self._limit = default_range, limit
+        self._limit = limit
         self._count = len(problem.group.joints)
         self._condition: Any = None
         self._iterations = 0
@@ -231,7 +223,7 @@ class _Search:
         for values in self._goals:
             goal.addState(self._state(information, values))
         definition.setGoal(goal)
-        planner = make_planner(problem.planner_id, problem.planner_parameters, information, self._range)
+        planner = make_planner(problem.planner_id, problem.planner_parameters, information, DEFAULT_RANGE)
         text = str(problem.planner_parameters.get("projection_evaluator") or "")
         projection = None
         if text and hasattr(planner, "setProjectionEvaluator"):

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RRT-Connect as one compiled loop: samples, trees and checks of edges without a call of Python between them.
 
-Kuffner, LaValle: RRT-Connect: An efficient approach to single-query path planning, ICRA 2000. The loop returns where
-it needs the interpreter: for more samples, for larger trees, for an edge that the bounds leave undecided, and every few
-edges for the clock.
+Kuffner, LaValle: RRT-Connect: An efficient approach to single-query path planning, ICRA 2000. The smaller tree extends
+to the next sample and the other one connects to it, as in the same authors' "An efficient approach to path planning
+using balanced bidirectional RRT search", CMU-RI-TR-05-34: the tree in the narrower place grows as large as the other
+one. The loop returns where it needs the interpreter: for more samples, for larger trees, for an edge that the bounds
+leave undecided, and every few edges for the clock.
 """
 
 from __future__ import annotations
@@ -14,9 +16,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
 from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOUCHING
-from modular_framework_planning.collision_detection.kernels.compiled_paths import check_path, sample
+from modular_framework_planning.collision_detection.kernels.compiled_paths import (
+    Samples,
+    borrowed_samples,
+    borrowed_workspace,
+    check_samples,
+    new_workspace,
+    number_samples,
+    release,
+)
 from modular_framework_planning.geometry.spatial import Array
 
 # What `grow` returns
@@ -76,10 +87,14 @@ def _squared_length(one, other, weights):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _nearest(states, size, target, weights):  # type: ignore[no-untyped-def]
-    best, found = np.inf, 0
+def _nearest(states, tree, size, target, weights):  # type: ignore[no-untyped-def]
+    """Returns the number of the state of a tree that is nearest to a joint vector."""
+    best, found, joints = np.inf, 0, len(target)
     for number in range(size):
-        length = _squared_length(states[number], target, weights)
+        length = 0.0
+        for joint in range(joints):
+            gap = weights[joint] * (target[joint] - states[tree, number, joint])
+            length += gap * gap
         if length < best:
             best, found = length, number
     return found
@@ -109,11 +124,12 @@ def _write_positions(space, state, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _check_edge(space, world, start, end, vertices, undecided):  # type: ignore[no-untyped-def]
+def _check_edge(space, world, start, end, samples, undecided, workspace):  # type: ignore[no-untyped-def]
     """Returns FREE, BLOCKED, or UNKNOWN where the bounds do not decide; the start of the edge is not checked."""
-    _write_positions(space, start, vertices[0])
-    _write_positions(space, end, vertices[1])
-    status, _ = check_path(world, sample(vertices, space.step), 1, undecided)
+    _write_positions(space, start, samples.vertices[0])
+    _write_positions(space, end, samples.vertices[1])
+    number_samples(samples, space.step)
+    status, _ = check_samples(world, samples, 1, undecided, workspace)
     return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
 
 
@@ -134,38 +150,59 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
         EDGES edges were checked; to be called again.
     """
     bodies = world_of(world)
+    workspace, all_joints = new_workspace(bodies), len(space.rest)
+    edge = Samples(np.empty((2, all_joints)), np.empty(2, np.int64), np.empty((2, all_joints)))
+    lent = Trees(
+        borrowed(trees.states),
+        borrowed(trees.parents),
+        borrowed(trees.sizes),
+        borrowed(trees.position),
+        borrowed(trees.target),
+        borrowed(trees.counts),
+    )
+    lent_space = Space(borrowed(space.weights), space.longest, space.step, borrowed(space.rest), borrowed(space.map))
+    status = _grow(lent, lent_space, samples, verdict, bodies, borrowed_samples(edge), borrowed_workspace(workspace))
+    release(workspace)
+    edge.numbers[0] = 0
+    return status
+
+
+@njit(cache=True, nogil=True)
+def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: ignore[no-untyped-def]
+    """Does what `grow` does, in given working memory; none of the arrays should have an owner (see `borrowed`)."""
     states, parents, sizes, position, target, counts = trees
-    state, vertices = np.empty(len(target)), np.empty((2, len(space.rest)))
-    no_rows = np.empty((0, 2), np.int64)
+    state, no_rows = np.empty(len(target)), np.empty((0, 2), np.int64)
     end = counts[0] + EDGES
     while True:
         if counts[0] >= end and verdict == UNKNOWN:
             return PAUSED
-        tree = position[1]
         if position[3] == NEW:
             if position[2] == EXTENDS:
                 if position[0] == len(samples):
                     return NEEDS_SAMPLES
+                position[1] = 0 if sizes[0] <= sizes[1] else 1
                 target[:] = samples[position[0]]
                 position[0] += 1
-            position[3] = _nearest(states[tree], sizes[tree], target, space.weights)
-        if sizes[tree] == len(parents[tree]):
+            tree = position[1]
+            position[3] = _nearest(states, tree, sizes[tree], target, space.weights)
+        tree = position[1]
+        if sizes[tree] == parents.shape[1]:
             return NEEDS_ROOM
         here = states[tree, position[3]]
         reached = write_step(here, target, space, state)
         if verdict == UNKNOWN:
             counts[0] += 1
-            verdict = _check_edge(space, bodies, here, state, vertices, no_rows)
+            verdict = _check_edge(space, world, here, state, edge, no_rows, workspace)
             if verdict == UNKNOWN:
                 return UNDECIDED
         is_free, verdict = verdict == FREE, UNKNOWN
         if is_free:
             states[tree, sizes[tree]], parents[tree, sizes[tree]] = state, position[3]
             sizes[tree] += 1
-        if position[2] == EXTENDS:  # the other tree is next, to connect or to extend
-            position[1], position[3] = 1 - tree, NEW
+        if position[2] == EXTENDS:
+            position[3] = NEW
             if is_free:
-                position[2], target[:] = CONNECTS, state
+                position[1], position[2], target[:] = 1 - tree, CONNECTS, state
         elif not is_free:
             position[2], position[3] = EXTENDS, NEW
         elif reached:

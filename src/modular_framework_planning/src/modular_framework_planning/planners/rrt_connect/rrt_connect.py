@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, arguments
+from modular_framework_planning.collision_detection.reaches import reaches
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import (
     BLOCKED,
@@ -34,24 +35,6 @@ def can_search(problem: PlanningProblem) -> bool:
     """Whether a problem has no path constraints and a checker whose arrays decide all pairs."""
     checker = problem.checker
     return problem.constraints is None and isinstance(checker, CompiledChecks) and checker.compiled_world is not None
-
-
-def reaches(world: World) -> Array:
-    """Returns how far each joint can move a point that it carries, shape (joints,) [m/rad], 1 for a sliding joint.
-
-    The way along the joints to the far end of each body, as if the arm could be stretched out, with sliding joints at
-    zero. Bodies without an end, as a plane, do not count.
-    """
-    tree, result = world.tree, np.zeros(len(world.tree.parents))
-    carried = (world.joints >= 0) & np.isfinite(world.spheres).all(axis=1)
-    poses, spheres = world.poses[carried], world.spheres[carried]
-    centres = np.einsum("bij,bj->bi", poses[:, :, :3], spheres[:, :3]) + poses[:, :, 3]
-    np.maximum.at(result, world.joints[carried], np.linalg.norm(centres, axis=1) + spheres[:, 3])
-    lengths = np.linalg.norm(tree.placements[:, :, 3], axis=1)
-    for joint in reversed(range(len(result))):
-        if tree.parents[joint] >= 0:
-            result[tree.parents[joint]] = max(result[tree.parents[joint]], lengths[joint] + result[joint])
-    return np.where(tree.prismatic, 1.0, result)
 
 
 def warm_up(checker: CompiledChecks, positions: Array) -> None:
@@ -115,6 +98,11 @@ class RrtConnect:
     def states(self) -> int:
         """How many edges were checked."""
         return int(self._trees.counts[0])
+
+    @property
+    def tree_sizes(self) -> tuple[int, int]:
+        """How many states the trees from the start and from the goals have."""
+        return int(self._trees.sizes[0]), int(self._trees.sizes[1])
 
     def run(self) -> Array | None:
         """Returns vertices of shape (n, joints) from the start to one of the goals, or None."""

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The distance of points from the nearest of many solids, compiled: a grid keeps which solids are nearest to a cell.
+
+A link is checked against all solids of the world at once. Where the link is far from all of them, the distance at the
+centre of a cell says so; where it is near, only the few solids nearest to the cell are asked. Cells are filled on
+first use and never change.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from modular_framework_planning.collision_detection.kernels.compiled_distance import (
+    ACCEPTED_SHARE,
+    CLEAR,
+    ROUNDING,
+    STACK,
+    TOO_CLOSE,
+    TOUCHING,
+    Solid,
+    placed_solid_distance,
+    surface_to_solid,
+)
+from modular_framework_planning.geometry.spatial import Array
+
+KEPT = 6  # nearest solids of a cell
+FINE_SPHERE = 1.0  # [m]; the part of a surface in a sphere of at most this radius is checked solid by solid
+
+
+class DistanceField(NamedTuple):
+    """Solids that stand still in the planning frame, and the grid over them.
+
+    Attributes:
+        kinds, sizes: closed form of each solid and its three numbers, shapes (n,) and (n, 3).
+        poses: of the solids in the planning frame, shape (n, 3, 4).
+        corner: of the grid, and the edge of its cells [m]; shape (4,).
+        known: whether a cell is filled; shape (x, y, z).
+        nearest: the solids nearest to a cell's centre, the nearest first; shape (x, y, z, min(n, KEPT)).
+        distances: of these solids from the centre [m], below 0 inside; same shape.
+    """
+
+    kinds: NDArray[np.int64]
+    sizes: Array
+    poses: Array
+    corner: Array
+    known: NDArray[np.bool_]
+    nearest: NDArray[np.int32]
+    distances: Array
+
+
+@njit(cache=True, nogil=True)
+def _solid_gap(kinds, sizes, poses, number, x, y, z):  # type: ignore[no-untyped-def]
+    solid = Solid(kinds[number], sizes[number, 0], sizes[number, 1], sizes[number, 2])
+    return placed_solid_distance(solid, poses, number, x, y, z)
+
+
+@njit(cache=True, nogil=True)
+def _fill_cell(kinds, sizes, poses, nearest, distances, x, y, z):  # type: ignore[no-untyped-def]
+    """Writes the solids nearest to a point, and their distances; both of shape (k,)."""
+    kept, used = len(nearest), 0
+    for number in range(len(kinds)):
+        gap = _solid_gap(kinds, sizes, poses, number, x, y, z)
+        if used == kept and gap >= distances[used - 1]:
+            continue
+        at = min(used, kept - 1)
+        while at > 0 and distances[at - 1] > gap:
+            distances[at], nearest[at] = distances[at - 1], nearest[at - 1]
+            at -= 1
+        distances[at], nearest[at] = gap, number
+        used = min(used + 1, kept)
+
+
+@njit(cache=True, nogil=True)
+def field_cell(field, x, y, z):  # type: ignore[no-untyped-def]
+    """Returns the cell of a point, filled (three numbers, -1 outside of the grid), and how far its centre is [m]."""
+    corner, known = field.corner, field.known
+    edge = corner[3]
+    i, j, k = int((x - corner[0]) / edge), int((y - corner[1]) / edge), int((z - corner[2]) / edge)
+    if x < corner[0] or y < corner[1] or z < corner[2]:
+        return -1, 0, 0, 0.0
+    if i >= known.shape[0] or j >= known.shape[1] or k >= known.shape[2]:
+        return -1, 0, 0, 0.0
+    u, v, w = corner[0] + (i + 0.5) * edge, corner[1] + (j + 0.5) * edge, corner[2] + (k + 0.5) * edge
+    if not known[i, j, k]:
+        _fill_cell(field.kinds, field.sizes, field.poses, field.nearest[i, j, k], field.distances[i, j, k], u, v, w)
+        known[i, j, k] = True
+    return i, j, k, np.sqrt((x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def field_distance(field, x, y, z, enough):  # type: ignore[no-untyped-def]
+    """Returns a lower bound of a point's distance [m] from the nearest solid, exact where it is less than `enough`."""
+    kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
+    i, j, k, away = field_cell(field, x, y, z)
+    best = np.inf
+    if i >= 0:
+        kept = nearest.shape[3]
+        lower = distances[i, j, k, 0] - away
+        if lower >= enough:
+            return lower
+        for order in range(kept):
+            if distances[i, j, k, order] - away >= best:
+                return best
+            best = min(best, _solid_gap(kinds, sizes, poses, nearest[i, j, k, order], x, y, z))
+        if kept == len(kinds) or distances[i, j, k, kept - 1] - away >= best:
+            return best
+    for number in range(len(kinds)):
+        best = min(best, _solid_gap(kinds, sizes, poses, number, x, y, z))
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _pose_in_solid(pose, poses, number, out):  # type: ignore[no-untyped-def]
+    """Writes a pose (3, 4) in the frame of a solid."""
+    for row in range(3):
+        for column in range(4):
+            value = 0.0
+            for inner in range(3):
+                part = pose[inner, column] - (poses[number, inner, 3] if column == 3 else 0.0)
+                value += poses[number, inner, row] * part
+            out[row, column] = value
+
+
+@njit(cache=True, nogil=True)
+def surface_to_field(surface, root, pose, field, margin, excess, limit, memory):  # type: ignore[no-untyped-def]
+    """Bounds the distance of a surface from all solids; arguments and result are those of surface_to_solid.
+
+    `pose` (3, 4) is the surface's in the planning frame.
+    """
+    spheres, links = surface.spheres, surface.links
+    kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
+    kept, relative, stack, bounds = nearest.shape[3], memory.relative, memory.outer_stack, memory.outer_bounds
+    stack[0], bounds[0] = root, -np.inf
+    depth, result = 1, CLEAR
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if bounds[depth] >= limit:
+            continue
+        radius = spheres[node, 3]
+        if links[node, 0] < 0 or radius <= FINE_SPHERE or depth > STACK - 3:
+            x, y, z = _placed_centre(spheres, node, pose)
+            i, j, k, away = field_cell(field, x, y, z)
+            every = i < 0
+            count = len(kinds) if every else kept
+            order = 0
+            while order < count:
+                number = order
+                if not every:
+                    if distances[i, j, k, order] - away - margin - radius >= limit:
+                        break
+                    number = nearest[i, j, k, order]
+                if _solid_gap(kinds, sizes, poses, number, x, y, z) - margin - radius < limit:
+                    _pose_in_solid(pose, poses, number, relative)
+                    solid = Solid(kinds[number], sizes[number, 0], sizes[number, 1], sizes[number, 2])
+                    status, bound = surface_to_solid(surface, node, relative, solid, margin, excess, limit, memory)
+                    if status == TOUCHING:
+                        return TOUCHING, 0.0
+                    if status == TOO_CLOSE:  # what is left to find out is whether it touches elsewhere
+                        result, limit = TOO_CLOSE, -ROUNDING - excess
+                    limit = min(limit, bound)
+                order += 1
+                if order == count and not every and kept < len(kinds):  # more solids may be as near: ask all
+                    every, order, count = True, 0, len(kinds)
+            continue
+        far, near = links[node, 0], links[node, 1]
+        far_gap = _node_gap(field, spheres, far, pose, margin, limit)
+        near_gap = _node_gap(field, spheres, near, pose, margin, limit)
+        if far_gap - spheres[far, 3] < near_gap - spheres[near, 3]:
+            far, near, far_gap, near_gap = near, far, near_gap, far_gap
+        for child, gap in ((far, far_gap), (near, near_gap)):  # the nearer one comes to lie on top of the stack
+            radius = spheres[child, 3]
+            if gap - radius >= limit:
+                continue
+            if radius <= ACCEPTED_SHARE * gap:
+                limit = gap - radius
+            else:
+                stack[depth], bounds[depth] = child, gap - radius
+                depth += 1
+    return result, max(limit, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _node_gap(field, spheres, node, pose, margin, limit):  # type: ignore[no-untyped-def]
+    """Returns the distance of a node's centre from the nearest solid less `margin`, or a bound beyond all interest."""
+    x, y, z = _placed_centre(spheres, node, pose)
+    return field_distance(field, x, y, z, limit + margin + spheres[node, 3]) - margin
+
+
+@njit(cache=True, nogil=True)
+def _placed_centre(spheres, node, pose):  # type: ignore[no-untyped-def]
+    x, y, z = spheres[node, 0], spheres[node, 1], spheres[node, 2]
+    return (
+        pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],
+        pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3],
+        pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3],
+    )
