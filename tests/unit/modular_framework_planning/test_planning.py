@@ -163,6 +163,13 @@ def test_a_pose_goal_is_reached_above_the_table(model: RobotModel, pipeline: Pla
     assert distance < 1e-6 and angle < 1e-6
 
 
+def test_an_answer_says_how_long_each_part_of_the_plan_took(model: RobotModel, pipeline: PlanningPipeline) -> None:
+    answer = pipeline.plan(PlanningRequest(table_scene(model), GROUP, (down(0.1, 0.5, 0.95),)))
+    assert set(answer.phases_s) == {"setup", "goals", "search", "repair", "shortening", "timing", "check"}
+    assert all(spent > 0.0 for spent in answer.phases_s.values())
+    assert 0.5 * answer.total_time_s < sum(answer.phases_s.values()) <= answer.total_time_s
+
+
 def test_scaling_makes_the_motion_slower_in_proportion(model: RobotModel, pipeline: PlanningPipeline) -> None:
     request = PlanningRequest(table_scene(model), GROUP, (down(0.1, 0.5, 0.95),), "", 1, 5.0, 1.0, 1.0)
     full = pipeline.plan(request).trajectory.duration_s

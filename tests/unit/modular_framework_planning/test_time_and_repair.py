@@ -25,6 +25,7 @@ from modular_framework_planning.planners.pilz.command_planner import CommandPlan
 from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.path_repair import EdgeError, repaired
+from modular_framework_planning.planning_interface.phase_times import PhaseTimes
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
@@ -143,6 +144,7 @@ def test_a_check_does_not_go_on_long_after_the_allowed_time() -> None:
     problem = SimpleNamespace(
         settings=PipelineSettings(),
         constraints=None,
+        phases=PhaseTimes(),
         checker=None,
         cancelled=lambda: False,
         end_s=time.monotonic() - GRACE_S - 1.0,

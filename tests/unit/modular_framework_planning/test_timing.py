@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.planning_interface.phase_times import PhaseTimes
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
 from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
@@ -164,6 +165,7 @@ def checked_problem(colliding_state: Callable[[np.ndarray, float], np.ndarray | 
     return SimpleNamespace(
         settings=PipelineSettings(),
         constraints=None,
+        phases=PhaseTimes(),
         checker=Checker(),
         end_s=np.inf,
         cancelled=lambda: False,

@@ -18,6 +18,7 @@ from modular_framework_planning.kinematics.inverse_kinematics import KinematicsP
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
+from modular_framework_planning.planning_interface.phase_times import GOALS, PhaseTimes
 from modular_framework_planning.planning_interface.planning_request import (
     PipelineSettings,
     PlanningRequest,
@@ -67,6 +68,7 @@ class PlanningProblem:
         step: distance of collision checks along an edge of the search [rad or m].
         solution_validator: what every timed motion must pass.
         repeatable: the search is bounded by iterations and not by the clock.
+        phases: how long the parts of the plan took so far.
     """
 
     request: PlanningRequest
@@ -89,6 +91,7 @@ class PlanningProblem:
     constraints: KinematicConstraints | None = None
     step: float = 0.05
     repeatable: bool = False
+    phases: PhaseTimes = field(default_factory=PhaseTimes)
     _goals: list[Array] = field(default_factory=list)
 
     @property
@@ -124,18 +127,19 @@ class PlanningProblem:
             PlanningError: there is none; says why.
         """
         if not self._goals:
-            self._goals.append(
-                GoalResolver(
-                    self.request,
-                    self.group,
-                    self.kinematics,
-                    self.checker,
-                    self.motion,
-                    self.rng,
-                    self.constraints,
-                    self._goals_must_end,
-                ).resolve()
-            )
+            with self.phases.measured(GOALS):
+                self._goals.append(
+                    GoalResolver(
+                        self.request,
+                        self.group,
+                        self.kinematics,
+                        self.checker,
+                        self.motion,
+                        self.rng,
+                        self.constraints,
+                        self._goals_must_end,
+                    ).resolve()
+                )
         return self._goals[0]
 
     def other_ways_round(self, goals: Array) -> Array:

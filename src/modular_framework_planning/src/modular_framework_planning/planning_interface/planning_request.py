@@ -220,6 +220,7 @@ class PlanningAnswer:
         start, goal: positions of the whole robot.
         planning_time_s: time until a path was found; total_time_s: until the checked, timed motion was ready.
         path: vertices of the shortened path, shape (n, joints).
+        phases_s: how long the parts of the plan took, see phase_times [s].
     """
 
     trajectory: Trajectory
@@ -229,3 +230,4 @@ class PlanningAnswer:
     planner_id: str
     planning_time_s: float
     total_time_s: float
+    phases_s: Mapping[str, float] = field(default_factory=dict)

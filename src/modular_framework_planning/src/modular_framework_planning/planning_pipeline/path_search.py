@@ -10,6 +10,7 @@ from dataclasses import replace
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.phase_times import REPAIR, SEARCH, SHORTENING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.trajectory_processing.path_shortening import shorten
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -31,7 +32,8 @@ class PathSearch:
         """Returns the path; that of the first call, repaired once more, where it is called again."""
         _require_start(problem)
         if self._found is None:
-            found = self._planner.plan(problem)
+            with problem.phases.measured(SEARCH):
+                found = self._planner.plan(problem)
             now = time.monotonic()
             self._found = (
                 PlannedPath(found.positions, found, found_s=now, is_short=True)
@@ -41,9 +43,11 @@ class PathSearch:
         path = self._found
         if path.is_short or path.trajectory is not None:
             return path
-        vertices = self._planner.repaired(problem, path.vertices) if self.repairs else path.vertices  # type: ignore
+        with problem.phases.measured(REPAIR):
+            vertices = self._planner.repaired(problem, path.vertices) if self.repairs else path.vertices  # type: ignore
         if problem.settings.sampling.simplify_solutions:
-            vertices = _shortened(problem, vertices)
+            with problem.phases.measured(SHORTENING):
+                vertices = _shortened(problem, vertices)
         self._found = replace(path, vertices=vertices)
         return self._found
 
@@ -85,7 +89,12 @@ def _shortened(problem: PlanningProblem, path: Array) -> Array:
         limit = math.inf
     fine = problem.settings.finest_step
 
+    verdicts: dict[bytes, bool] = {}  # the same vertices are tried again after corners were cut
+
     def edge(first: Array, second: Array) -> bool:
-        return problem.edge_is_valid(first, second, fine)
+        key = first.tobytes() + second.tobytes()
+        if key not in verdicts:
+            verdicts[key] = problem.edge_is_valid(first, second, fine)
+        return verdicts[key]
 
     return shorten(path, edge, limit, problem.rng)

@@ -20,6 +20,7 @@ from modular_framework_planning.planning_interface.collision_checker import Coll
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.path_repair import EdgeError
+from modular_framework_planning.planning_interface.phase_times import SETUP, PhaseTimes
 from modular_framework_planning.planning_interface.planner_configurations import PlannerConfigurations
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
@@ -127,8 +128,9 @@ class PlanningPipeline:
 
     def _plan(self, request: PlanningRequest, repeatable: bool) -> PlanningAnswer:
         """Searches, and repairs what the check of the motion finds, until the motion passes or the time is over."""
-        begun = time.monotonic()
-        problem = replace(self._problem(request, begun), repeatable=repeatable)
+        begun, phases = time.monotonic(), PhaseTimes()
+        with phases.measured(SETUP):
+            problem = replace(self._problem(request, begun), repeatable=repeatable, phases=phases)
         adapters, fault, steps = self._adapters_for(request), "", list(self._steps())
         search = PathSearch(self._planner)
         while steps:
@@ -188,6 +190,7 @@ class PlanningPipeline:
             path.planner_id or problem.planner_id,
             path.found_s - begun,
             time.monotonic() - begun,
+            dict(problem.phases.seconds),
         )
 
     def checker(

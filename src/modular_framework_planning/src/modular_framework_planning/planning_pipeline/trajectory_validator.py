@@ -12,7 +12,9 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.path_repair import describe_state
+from modular_framework_planning.planning_interface.phase_times import CHECK
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
+from modular_framework_planning.trajectory_processing.path_shortening import without_repeats
 
 SAMPLES_AT_ONCE = 200  # of a motion, between two checks of the time
 GRACE_S = 0.2  # after the allowed time, in which a check that has begun may end
@@ -36,21 +38,22 @@ class TrajectoryValidator:
         )
         if key in self._passed and self._passed[key] is problem.checker:
             return ""
-        text = _not_in_order(path)
-        if not text:
-            curve = path.trajectory.curve(problem.settings.motion_step)
-            chords = path.trajectory.chords(_sample_at(path.trajectory.positions, path, path.path_prefix))
-            text = next(
-                filter(
-                    None,
-                    (
-                        _collision(problem, line)
-                        for line in (curve[_sample_at(curve, path, path.path_prefix) :], *chords)
+        with problem.phases.measured(CHECK):
+            text = _not_in_order(path)
+            if not text:
+                curve = path.trajectory.curve(problem.settings.motion_step)
+                chords = path.trajectory.chords(_sample_at(path.trajectory.positions, path, path.path_prefix))
+                text = next(
+                    filter(
+                        None,
+                        (
+                            _collision(problem, line)
+                            for line in (curve[_sample_at(curve, path, path.path_prefix) :], *chords)
+                        ),
                     ),
-                ),
-                "",
-            )
-            text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
+                    "",
+                )
+                text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
         if not text:
             self._passed[key] = problem.checker
         return text
@@ -72,6 +75,7 @@ def _not_in_order(path: PlannedPath) -> str:
 
 def _collision(problem: PlanningProblem, samples: Array) -> str:
     step = problem.settings.finest_step
+    samples = without_repeats(samples)  # long straight pieces are checked faster than many short ones
     for begin in range(0, max(1, len(samples) - 1), SAMPLES_AT_ONCE):
         _require_time(problem)
         hit = problem.motion.colliding_state(samples[begin : begin + SAMPLES_AT_ONCE + 1], step)

@@ -10,6 +10,7 @@ import numpy as np
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.phase_times import TIMING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.trajectory_processing.blended_path import choose_blends
@@ -35,6 +36,11 @@ class AddTimeOptimalParameterization(RequestAdapter):
 
 def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     """Returns the path with a trajectory; raises PlanningError where a limit or a parameter is not usable."""
+    with problem.phases.measured(TIMING):
+        return _timed(problem, path)
+
+
+def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     vertices = path.vertices
     if len(vertices) == 2 and np.abs(vertices[1] - vertices[0]).max() < 1e-9:
         vertices = vertices[1:]
