@@ -15,7 +15,7 @@ from modular_framework_planning.collision_detection.kernels import compiled_path
 from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD, World
 from modular_framework_planning.collision_detection.kernels.compiled_distance_field import field_distance
 from modular_framework_planning.collision_detection.reaches import farthest_end
-from modular_framework_planning.geometry.shapes import Box, Cylinder, Shape, Sphere
+from modular_framework_planning.geometry.shapes import Box, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -102,6 +102,43 @@ def test_a_link_that_may_touch_one_of_the_solids_is_checked_against_the_others_a
     owners = {int(world.pairs[pair, 0]) for pair in alone if world.joints[world.pairs[pair, 1]] < 0}
     assert len(owners - by_field) == 1, "one body has pairs of its own"
     assert by_field
+
+
+def test_states_that_are_no_numbers_or_beyond_all_reach_do_no_harm(small: RobotModel) -> None:
+    scene, _ = random_world(small, np.random.default_rng(13))
+    checker, field = ExactCollisionChecker(scene), world_in(scene).field
+    assert not checker.is_free(np.full(len(small.joint_names), np.nan))
+    for far in (1.0e6, 1.0e20, -1.0e100):
+        assert field_distance(field, far, 0.1, 0.1, 0.1) == pytest.approx(abs(far), rel=1.0e-3)
+
+
+def test_an_obstacle_without_a_closed_form_of_its_own_is_left_out_of_the_field(small: RobotModel) -> None:
+    scene, _ = random_world(small, np.random.default_rng(14))
+    corners = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]])
+    peak = Mesh(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    pose = pin.SE3(np.eye(3), np.array([0.6, 0.6, 0.2]))
+    world = world_in(scene.with_object(CollisionObject("peak", pose, ((peak, pin.SE3.Identity()),))))
+    assert len(world.field.kinds) == SOLIDS
+    assert np.isfinite(world.excess[world.pairs[:, 1] == FIELD]).all()
+
+
+def test_a_box_beside_a_thick_cylinder_does_not_touch_it(small: RobotModel) -> None:
+    thick = SMALL_URDF.replace("<geometry>", '<geometry><cylinder radius="0.3" length="0.2"/></geometry><!--').replace(
+        "</geometry></collision>", "--></collision>"
+    )
+    model = RobotModel(thick, SMALL_SRDF)
+    height = float(model.link_geometries[0].placement.translation[2])
+    free = []
+    for angle in np.array([0, 7, 18, 31, 39, 45, 52, 60]) * 2.0 * np.pi / 64:  # corners of the prism around it
+        turned = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
+        pose = turned * pin.SE3(np.eye(3), np.array([0.3 + 0.00025 + 1.0, 0.0, height]))
+        other = turned * pin.SE3(np.eye(3), np.array([-3.0, 0.0, height]))
+        scene = empty_scene(model)
+        for name, at in (("near", pose), ("far", other)):
+            scene = scene.with_object(CollisionObject(name, at, ((Box(2.0, 0.1, 0.05), pin.SE3.Identity()),)))
+        state = np.zeros(len(model.joint_names))
+        free.append((ExactCollisionChecker(scene).is_free(state), PlainCoalChecker(scene).is_free(state)))
+    assert all(ours == plain for ours, plain in free)
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7])

@@ -370,7 +370,7 @@ def _with_field(world: World) -> tuple[World, list[list[int]]]:
     is_plain = (world.joints < 0) & (world.kinds != SURFACE)
     partners: dict[int, dict[int, int]] = {}  # of each body: the pair with each solid
     for pair, (first, second) in enumerate(world.pairs.tolist()):
-        if is_plain[second] and world.table_of[pair] < 0:
+        if is_plain[second] and np.isfinite(world.excess[pair]):
             partners.setdefault(first, {})[second] = pair
     counts = Counter(frozenset(item) for item in partners.values())
     solids = max(counts, key=lambda item: (counts[item] * len(item), sorted(item)), default=frozenset())

@@ -80,6 +80,8 @@ def cut_corners(
 def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
     """Drops vertices equal to their predecessor and those in the middle of a straight line; keeps both ends.
 
+    Of a path that stays where it is, the first vertex is left.
+
     Args:
         path: polyline of shape (n, joints).
         tolerance: shortest edge [rad or m], and most change of the unit direction of an edge at a dropped vertex.
@@ -88,7 +90,7 @@ def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
     lengths = np.linalg.norm(ways, axis=1)
     moves = lengths > tolerance
     if not moves.any():
-        return path[:1]
+        return path[:1].copy()
     stops = path[1:][moves]
     stops[-1] = path[-1]
     turns = np.abs(np.diff(ways[moves] / lengths[moves, None], axis=0)).max(axis=1) > tolerance

@@ -159,8 +159,8 @@ def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
     """Whether a body without touching it surrounds a point of another body."""
     if not np.isfinite(world.spheres[inner, 3]) or (world.kinds[outer] == SURFACE and not world.closed[outer]):
         return False
-    corner = np.zeros(3)  # of a body in closed form: its centre
-    if world.roots[inner] >= 0:
+    corner = np.zeros(3)  # of a body in closed form: its centre, since its surface may be larger than the body
+    if world.kinds[inner] == SURFACE:
         surface = world.scene if world.is_environment[inner] else world.robot
         node = world.roots[inner]
         while surface.links[node, 0] >= 0:

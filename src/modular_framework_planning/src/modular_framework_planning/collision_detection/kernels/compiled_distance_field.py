@@ -79,11 +79,10 @@ def field_cell(field, x, y, z):  # type: ignore[no-untyped-def]
     """Returns the cell of a point, filled (three numbers, -1 outside of the grid), and how far its centre is [m]."""
     corner, known = field.corner, field.known
     edge = corner[3]
-    i, j, k = int((x - corner[0]) / edge), int((y - corner[1]) / edge), int((z - corner[2]) / edge)
-    if x < corner[0] or y < corner[1] or z < corner[2]:
+    u, v, w = (x - corner[0]) / edge, (y - corner[1]) / edge, (z - corner[2]) / edge
+    if not (0.0 <= u < known.shape[0] and 0.0 <= v < known.shape[1] and 0.0 <= w < known.shape[2]):  # or not a number
         return -1, 0, 0, 0.0
-    if i >= known.shape[0] or j >= known.shape[1] or k >= known.shape[2]:
-        return -1, 0, 0, 0.0
+    i, j, k = int(u), int(v), int(w)
     u, v, w = corner[0] + (i + 0.5) * edge, corner[1] + (j + 0.5) * edge, corner[2] + (k + 0.5) * edge
     if not known[i, j, k]:
         _fill_cell(field.kinds, field.sizes, field.poses, field.nearest[i, j, k], field.distances[i, j, k], u, v, w)

@@ -297,7 +297,7 @@ def _motion_of(parents, prismatic, axes, change, signs, centres, spheres, body, 
                 vx, vy, vz = vx + signed * cx, vy + signed * cy, vz + signed * cz
                 wx, wy, wz = wx + signed * ax, wy + signed * ay, wz + signed * az
         joint = parents[joint]
-    if not is_straight:
+    if not is_straight or moved == np.inf:
         return moved
     speed = np.sqrt(vx * vx + vy * vy + vz * vz) + radius * np.sqrt(wx * wx + wy * wy + wz * wz)
     return min(moved, speed + bent)
