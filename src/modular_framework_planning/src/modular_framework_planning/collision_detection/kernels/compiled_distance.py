@@ -233,27 +233,10 @@ def _box_to_solid(boxes, node, pose, solid):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def _box_to_box(boxes, node, other_boxes, other, pose):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of two trees' boxes along their faces' normals."""
-    dx = (
-        pose[0, 0] * boxes[node, 0]
-        + pose[0, 1] * boxes[node, 1]
-        + pose[0, 2] * boxes[node, 2]
-        + pose[0, 3]
-        - other_boxes[other, 0]
-    )
-    dy = (
-        pose[1, 0] * boxes[node, 0]
-        + pose[1, 1] * boxes[node, 1]
-        + pose[1, 2] * boxes[node, 2]
-        + pose[1, 3]
-        - other_boxes[other, 1]
-    )
-    dz = (
-        pose[2, 0] * boxes[node, 0]
-        + pose[2, 1] * boxes[node, 1]
-        + pose[2, 2] * boxes[node, 2]
-        + pose[2, 3]
-        - other_boxes[other, 2]
-    )
+    x, y, z = boxes[node, 0], boxes[node, 1], boxes[node, 2]
+    dx = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_boxes[other, 0]
+    dy = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3] - other_boxes[other, 1]
+    dz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3] - other_boxes[other, 2]
     best = 0.0
     e0, e1, e2 = other_boxes[other, 12], other_boxes[other, 13], other_boxes[other, 14]
     for axis in range(3):
