@@ -9,20 +9,31 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.core import cgutils
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 
-def _borrow(typing_context: Any, array: Any) -> Any:  # noqa: ARG001 - numba calls it with the context
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """Generates the value with the owners of its arrays left out."""
+    if isinstance(kind, types.BaseTuple):
+        members: Any = kind
+        unpack: Any = cgutils.unpack_tuple
+        parts = zip(members.types, unpack(builder, value), strict=True)
+        return context.make_tuple(builder, kind, [_without_owner(context, builder, *part) for part in parts])
+    if not isinstance(kind, types.Array):
+        return value
+    view = context.make_array(kind)(context, builder, value)
+    null: Any = cgutils.get_null_value
+    view.meminfo, view.parent = null(view.meminfo.type), null(view.parent.type)
+    return view._getvalue()
 
+
+def _borrow(_: Any, kind: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        view = context.make_array(signature.args[0])(context, builder, arguments[0])
-        null: Any = cgutils.get_null_value
-        view.meminfo, view.parent = null(view.meminfo.type), null(view.parent.type)
-        return view._getvalue()  # noqa: SLF001 - numba's way to read a struct
+        return _without_owner(context, builder, signature.args[0], arguments[0])
 
-    return array(array), generate
+    return kind(kind), generate
 
 
 borrowed: Any = intrinsic(_borrow)
-"""Returns an array without an owner: whoever has the owning one must keep it as long as this one is used."""
+"""Returns an array, or a tuple with arrays in it, without owners: the caller has to keep the owning ones meanwhile."""

@@ -216,19 +216,11 @@ def world_of(arrays):  # type: ignore[no-untyped-def]
 
     Numba calls no class with more than one starred tuple.
     """
-    a = arrays
-    tree = Tree(borrowed(a[0]), borrowed(a[1]), borrowed(a[2]), borrowed(a[3]))
-    robot = Surfaces(borrowed(a[12]), borrowed(a[13]), borrowed(a[14]), borrowed(a[15]))
-    scene = Surfaces(borrowed(a[16]), borrowed(a[17]), borrowed(a[18]), borrowed(a[19]))
-    joints, poses, roots, is_environment = borrowed(a[4]), borrowed(a[5]), borrowed(a[6]), borrowed(a[7])
-    kinds, sizes, spheres, closed = borrowed(a[8]), borrowed(a[9]), borrowed(a[10]), borrowed(a[11])
-    bodies = (tree, joints, poses, roots, is_environment, kinds, sizes, spheres, closed, robot, scene)
-    pairs, margins, excess, tables = borrowed(a[20]), borrowed(a[21]), borrowed(a[22]), borrowed(a[23])
-    table_joints, table_of, watched = borrowed(a[24]), borrowed(a[25]), borrowed(a[26])
-    solids = (borrowed(a[27]), borrowed(a[28]), borrowed(a[29]))
-    cells = (borrowed(a[30]), borrowed(a[31]), borrowed(a[32]), borrowed(a[33]))
-    field = DistanceField(solids[0], solids[1], solids[2], cells[0], cells[1], cells[2], cells[3])
-    return World(*bodies, pairs, margins, excess, tables, table_joints, table_of, watched, field)
+    a = borrowed(arrays)
+    tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
+    field = DistanceField(*a[27:])
+    bodies = (tree, a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], robot, scene)
+    return World(*bodies, a[20], a[21], a[22], a[23], a[24], a[25], a[26], field)
 
 
 @njit(cache=True, nogil=True)

@@ -14,7 +14,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import (
     halve_longest_edge,
     triangle_distance,
@@ -62,7 +61,6 @@ class Memory(NamedTuple):
     Attributes:
         relative: a pose, shape (3, 4).
         stack, bounds: nodes of two trees still to look at, and their bounds; shapes (STACK, 2) and (STACK,).
-        outer_stack, outer_bounds: the same of a check that makes others, for one tree; shape (STACK,).
         pieces: of a triangle, shape (64, 9).
         corners: of a triangle, shape (9,).
     """
@@ -70,8 +68,6 @@ class Memory(NamedTuple):
     relative: Array
     stack: NDArray[np.int32]
     bounds: Array
-    outer_stack: NDArray[np.int32]
-    outer_bounds: Array
     pieces: Array
     corners: Array
 
@@ -79,16 +75,8 @@ class Memory(NamedTuple):
 @njit(cache=True, nogil=True)
 def new_memory():  # type: ignore[no-untyped-def]
     """Returns working memory."""
-    stack, outer = np.empty((STACK, 2), np.int32), np.empty(STACK, np.int32)
-    return Memory(np.empty((3, 4)), stack, np.empty(STACK), outer, np.empty(STACK), np.empty((64, 9)), np.empty(9))
-
-
-@njit(cache=True, nogil=True)
-def borrowed_memory(m):  # type: ignore[no-untyped-def]
-    """Returns the same memory without an owner, see `borrowed`."""
-    stack, outer = borrowed(m.stack), borrowed(m.outer_stack)
-    bounds, outer_bounds = borrowed(m.bounds), borrowed(m.outer_bounds)
-    return Memory(borrowed(m.relative), stack, bounds, outer, outer_bounds, borrowed(m.pieces), borrowed(m.corners))
+    stack = np.empty((STACK, 2), np.int32)
+    return Memory(np.empty((3, 4)), stack, np.empty(STACK), np.empty((64, 9)), np.empty(9))
 
 
 @njit(cache=True, nogil=True)

@@ -15,10 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_distance import (
-    ACCEPTED_SHARE,
     CLEAR,
     ROUNDING,
-    STACK,
     TOO_CLOSE,
     TOUCHING,
     Solid,
@@ -28,7 +26,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 from modular_framework_planning.geometry.spatial import Array
 
 KEPT = 6  # nearest solids of a cell
-FINE_SPHERE = 1.0  # [m]; the part of a surface in a sphere of at most this radius is checked solid by solid
 
 
 class DistanceField(NamedTuple):
@@ -130,64 +127,27 @@ def surface_to_field(surface, root, pose, field, margin, excess, limit, memory):
 
     `pose` (3, 4) is the surface's in the planning frame.
     """
-    spheres, links = surface.spheres, surface.links
     kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
-    kept, relative, stack, bounds = nearest.shape[3], memory.relative, memory.outer_stack, memory.outer_bounds
-    stack[0], bounds[0] = root, -np.inf
-    depth, result = 1, CLEAR
-    while depth > 0:
-        depth -= 1
-        node = stack[depth]
-        if bounds[depth] >= limit:
+    relative, result, reach = memory.relative, CLEAR, surface.spheres[root, 3] + margin
+    x, y, z = _placed_centre(surface.spheres, root, pose)
+    i, j, k, away = field_cell(field, x, y, z)
+    kept, count = nearest.shape[3], 0
+    while i >= 0 and count < kept and distances[i, j, k, count] - away - reach < limit:
+        count += 1
+    asks_all = i < 0 or (count == kept and kept < len(kinds))
+    for order in range(len(kinds) if asks_all else count):
+        number = order if asks_all else nearest[i, j, k, order]
+        if _solid_gap(kinds, sizes, poses, number, x, y, z) - reach >= limit:
             continue
-        radius = spheres[node, 3]
-        if links[node, 0] < 0 or radius <= FINE_SPHERE or depth > STACK - 3:
-            x, y, z = _placed_centre(spheres, node, pose)
-            i, j, k, away = field_cell(field, x, y, z)
-            every = i < 0
-            count = len(kinds) if every else kept
-            order = 0
-            while order < count:
-                number = order
-                if not every:
-                    if distances[i, j, k, order] - away - margin - radius >= limit:
-                        break
-                    number = nearest[i, j, k, order]
-                if _solid_gap(kinds, sizes, poses, number, x, y, z) - margin - radius < limit:
-                    _pose_in_solid(pose, poses, number, relative)
-                    solid = Solid(kinds[number], sizes[number, 0], sizes[number, 1], sizes[number, 2])
-                    status, bound = surface_to_solid(surface, node, relative, solid, margin, excess, limit, memory)
-                    if status == TOUCHING:
-                        return TOUCHING, 0.0
-                    if status == TOO_CLOSE:  # what is left to find out is whether it touches elsewhere
-                        result, limit = TOO_CLOSE, -ROUNDING - excess
-                    limit = min(limit, bound)
-                order += 1
-                if order == count and not every and kept < len(kinds):  # more solids may be as near: ask all
-                    every, order, count = True, 0, len(kinds)
-            continue
-        far, near = links[node, 0], links[node, 1]
-        far_gap = _node_gap(field, spheres, far, pose, margin, limit)
-        near_gap = _node_gap(field, spheres, near, pose, margin, limit)
-        if far_gap - spheres[far, 3] < near_gap - spheres[near, 3]:
-            far, near, far_gap, near_gap = near, far, near_gap, far_gap
-        for child, gap in ((far, far_gap), (near, near_gap)):  # the nearer one comes to lie on top of the stack
-            radius = spheres[child, 3]
-            if gap - radius >= limit:
-                continue
-            if radius <= ACCEPTED_SHARE * gap:
-                limit = gap - radius
-            else:
-                stack[depth], bounds[depth] = child, gap - radius
-                depth += 1
+        _pose_in_solid(pose, poses, number, relative)
+        solid = Solid(kinds[number], sizes[number, 0], sizes[number, 1], sizes[number, 2])
+        status, bound = surface_to_solid(surface, root, relative, solid, margin, excess, limit, memory)
+        if status == TOUCHING:
+            return TOUCHING, 0.0
+        if status == TOO_CLOSE:  # what is left to find out is whether it touches elsewhere
+            result, limit = TOO_CLOSE, -ROUNDING - excess
+        limit = min(limit, bound)
     return result, max(limit, 0.0)
-
-
-@njit(cache=True, nogil=True)
-def _node_gap(field, spheres, node, pose, margin, limit):  # type: ignore[no-untyped-def]
-    """Returns the distance of a node's centre from the nearest solid less `margin`, or a bound beyond all interest."""
-    x, y, z = _placed_centre(spheres, node, pose)
-    return field_distance(field, x, y, z, limit + margin + spheres[node, 3]) - margin
 
 
 @njit(cache=True, nogil=True)

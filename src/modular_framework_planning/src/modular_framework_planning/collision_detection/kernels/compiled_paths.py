@@ -34,7 +34,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     TOO_CLOSE,
     TOUCHING,
     Memory,
-    borrowed_memory,
     new_memory,
     placed_solid_distance,
 )
@@ -169,29 +168,9 @@ def new_workspace(world):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def borrowed_workspace(workspace):  # type: ignore[no-untyped-def]
-    """Returns the same memory without an owner, see `borrowed`."""
-    return Workspace(_borrowed_stretch(workspace.stretch), borrowed_memory(workspace.memory))
-
-
-@njit(cache=True, nogil=True)
-def borrowed_samples(samples):  # type: ignore[no-untyped-def]
-    """Returns the same samples without an owner, see `borrowed`."""
-    return Samples(borrowed(samples.vertices), borrowed(samples.numbers), borrowed(samples.travelled))
-
-
-@njit(cache=True, nogil=True)
 def release(workspace):  # type: ignore[no-untyped-def]
     """Marks where working memory was used last: until here it has an owner."""
     workspace.stretch.motions[:], workspace.memory.bounds[0] = 0.0, 0.0
-
-
-@njit(cache=True, nogil=True)
-def _borrowed_stretch(s):  # type: ignore[no-untyped-def]
-    placements, poses, centres, axes = borrowed(s.placements), borrowed(s.poses), borrowed(s.centres), borrowed(s.axes)
-    still, reach, change, signs = borrowed(s.still), borrowed(s.reach), borrowed(s.change), borrowed(s.signs)
-    motions, rows = borrowed(s.motions), borrowed(s.rows)
-    return Stretch(placements, poses, centres, axes, still, reach, change, signs, motions, rows)
 
 
 @njit(cache=True, nogil=True)
@@ -377,7 +356,7 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         entries, more than n when they do not fit; CLEAR with the number of samples looked at.
     """
     workspace = new_workspace(world)
-    result = check_samples(world, borrowed_samples(samples), first, undecided, borrowed_workspace(workspace))
+    result = check_samples(world, borrowed(samples), first, undecided, borrowed(workspace))
     release(workspace)
     return result
 

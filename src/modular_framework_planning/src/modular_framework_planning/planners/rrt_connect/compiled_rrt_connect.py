@@ -21,8 +21,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     Samples,
-    borrowed_samples,
-    borrowed_workspace,
     check_samples,
     new_workspace,
     number_samples,
@@ -152,16 +150,7 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
     bodies = world_of(world)
     workspace, all_joints = new_workspace(bodies), len(space.rest)
     edge = Samples(np.empty((2, all_joints)), np.empty(2, np.int64), np.empty((2, all_joints)))
-    lent = Trees(
-        borrowed(trees.states),
-        borrowed(trees.parents),
-        borrowed(trees.sizes),
-        borrowed(trees.position),
-        borrowed(trees.target),
-        borrowed(trees.counts),
-    )
-    lent_space = Space(borrowed(space.weights), space.longest, space.step, borrowed(space.rest), borrowed(space.map))
-    status = _grow(lent, lent_space, samples, verdict, bodies, borrowed_samples(edge), borrowed_workspace(workspace))
+    status = _grow(borrowed(trees), borrowed(space), samples, verdict, bodies, borrowed(edge), borrowed(workspace))
     release(workspace)
     edge.numbers[0] = 0
     return status
