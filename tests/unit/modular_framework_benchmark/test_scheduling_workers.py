@@ -146,6 +146,21 @@ def test_a_worker_keeps_the_episodes_of_one_stack_and_helps_at_the_end(tmp_path:
     assert queue.next_for("a") is None
 
 
+def test_the_last_episode_of_a_stack_is_left_to_the_worker_that_has_it_running(tmp_path: Path) -> None:
+    episodes = lay_out(read(PICK + "block: 3\n", tmp_path))
+    first, second = episodes[:3], episodes[6:9]  # six of each stack
+    queue = EpisodeQueue([*first, *second])
+    assert [queue.next_for("a"), queue.next_for("b")] == [first[0], second[0]]
+    assert [queue.next_for("a"), queue.next_for("a")] == first[1:]
+    assert queue.next_for("a") == second[1], "two are left: one of them is worth the start of a stack"
+    assert queue.next_for("a") == second[2], "its stack runs here too by now"
+
+    queue = EpisodeQueue([*first[:1], *second[:2]])
+    assert [queue.next_for("a"), queue.next_for("b")] == [first[0], second[0]]
+    assert queue.next_for("a") is None and len(queue) == 1
+    assert queue.next_for("a", alone=True) == second[1], "the worker that had it running is lost"
+
+
 def test_processes_in_sessions_of_their_own_are_found_by_their_mark_and_ended() -> None:
     mark = f"search{os.getpid()}"
     sleeper = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'],"

@@ -26,19 +26,29 @@ class EpisodeQueue:
             self._groups[-1][1].append(spec)
         self._groups.reverse()  # the next one is the last of the list, from where it is taken off at no cost
         self._owned: dict[str, deque[EpisodeSpec]] = {}
+        self._running: dict[str, str] = {}  # the stack of the last episode of each slot
 
     def __len__(self) -> int:
         return sum(len(group) for _, group in self._groups) + sum(len(group) for group in self._owned.values())
 
-    def next_for(self, slot: str) -> EpisodeSpec | None:
-        """Returns the next episode for a slot; None when there is none left.
+    def next_for(self, slot: str, alone: bool = False) -> EpisodeSpec | None:
+        """Returns the next episode for a slot; None when there is none left for it.
 
         A slot goes through the episodes of one stack, then takes the next ones that no other slot has. At the end it
-        helps the slot that has most left.
+        helps the slot that has most left. It leaves that slot its last episode where it would have to start another
+        stack for it: the other one has it running.
+
+        Args:
+            slot: Name of the slot.
+            alone: Whether no other slot runs an episode; then this one takes whatever is left.
         """
         own = self._owned.get(slot)
         if not own and self._groups:
             own = self._owned[slot] = self._groups.pop()[1]
         if not own:
             own = max(self._owned.values(), key=len, default=None)
-        return own.popleft() if own else None
+            if not own or (len(own) == 1 and not alone and self._running.get(slot) != stack_of(own[0].settings)):
+                return None
+        spec = own.popleft()
+        self._running[slot] = stack_of(spec.settings)
+        return spec

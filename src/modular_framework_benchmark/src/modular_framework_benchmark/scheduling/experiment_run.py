@@ -77,7 +77,7 @@ class ExperimentRun:
             queue, running = EpisodeQueue(self._pending), 0
             while True:
                 if not reason:
-                    running += self._fill(pool, queue)
+                    running = self._fill(pool, queue, running)
                 if not running:
                     break
                 for record in pool.wait(POLL_S):
@@ -92,15 +92,14 @@ class ExperimentRun:
             pool.kill()
         return RunEnd(progress.ended, reason if len(queue) else "")
 
-    def _fill(self, pool: Pool, queue: EpisodeQueue) -> int:
-        begun = 0
+    def _fill(self, pool: Pool, queue: EpisodeQueue, running: int) -> int:
+        """Gives an episode to each free slot that can take one; returns how many run then."""
         for slot in pool.free():
-            spec = queue.next_for(slot)
-            if spec is None:
-                break
-            pool.submit(slot, spec, self._folder_of(spec))
-            begun += 1
-        return begun
+            spec = queue.next_for(slot, alone=not running)
+            if spec is not None:
+                pool.submit(slot, spec, self._folder_of(spec))
+                running += 1
+        return running
 
     def _folder_of(self, spec: EpisodeSpec) -> Path:
         return self._folder / f"{spec.number:06}"
