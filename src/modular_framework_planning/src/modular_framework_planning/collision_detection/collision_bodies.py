@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 from modular_framework_planning.contacts import ATTACHED, LINK, WORLD, Body
 from modular_framework_planning.geometry.shapes import Shape
 from modular_framework_planning.geometry.spatial import Transform
+from modular_framework_planning.planning_scene.allowed_collisions import AllowedCollisionMatrix
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 Joints = Sequence[int] | NDArray[np.int64] | None
+KEPT_LINK_PAIRS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,15 +76,17 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
         parts: geometries of the scene.
         moving: joints that will move, as indices in a position vector; all by default.
     """
-    supports = _supports(scene.model, moving)
-    standing = _standing(scene.model, moving)
+    chosen = None if moving is None else tuple(int(number) for number in moving)
+    acm, links = scene.acm, len(scene.model.link_geometries)
+    result = list(_link_pairs(scene.model, chosen, frozenset(acm.entries.items()), frozenset(acm.defaults.items())))
+    supports = _supports(scene.model, chosen)
+    standing = _standing(scene.model, chosen)
     joints = [standing.get(part.joint_id, part.joint_id) for part in parts]
     verdicts: dict[tuple[str, str, str, str], bool] = {}
-    result = []
     for first, one in enumerate(parts):
         if one.body.kind == WORLD:
             break  # the world comes last, and its bodies do not move relative to each other
-        for second in range(first + 1, len(parts)):
+        for second in range(max(first + 1, links), len(parts)):
             other = parts[second]
             if joints[first] == joints[second] and ATTACHED not in (one.body.kind, other.body.kind):
                 continue  # rigidly connected: no motion changes whether they touch
@@ -90,15 +95,36 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
             if allowed is None:
                 allowed = verdicts[key] = _may_touch(scene, one.body, other.body)
             if not allowed:
-                result.append(
-                    WatchedPair(
-                        first,
-                        second,
-                        one.margin if other.body.kind == WORLD else 0.0,
-                        supports[one.joint_id] == supports[other.joint_id],
-                    )
-                )
+                margin = one.margin if other.body.kind == WORLD else 0.0
+                is_fixed = supports[one.joint_id] == supports[other.joint_id]
+                result.append(WatchedPair(first, second, margin, is_fixed))
     return result
+
+
+@lru_cache(maxsize=KEPT_LINK_PAIRS)
+def _link_pairs(
+    model: RobotModel,
+    moving: tuple[int, ...] | None,
+    entries: frozenset[tuple[frozenset[str], bool]],
+    defaults: frozenset[tuple[str, bool]],
+) -> tuple[WatchedPair, ...]:
+    """Returns the pairs of the robot's own links that may not touch; they are the same in most scenes.
+
+    Args:
+        model: the robot.
+        moving: as for watched_pairs.
+        entries: of the allowed collision matrix.
+        defaults: of the same.
+    """
+    acm = AllowedCollisionMatrix(dict(entries), dict(defaults))
+    supports, standing = _supports(model, moving), _standing(model, moving)
+    joints = [standing.get(item.joint_id, item.joint_id) for item in model.link_geometries]
+    return tuple(
+        WatchedPair(first, second, 0.0, supports[one.joint_id] == supports[other.joint_id])
+        for first, one in enumerate(model.link_geometries)
+        for second, other in enumerate(model.link_geometries[first + 1 :], first + 1)
+        if joints[first] != joints[second] and one.link != other.link and not acm.allows(one.link, other.link)
+    )
 
 
 def _standing(model: RobotModel, moving: Joints) -> dict[int, int]:

@@ -33,6 +33,7 @@ from modular_framework_planning.collision_detection.reaches import farthest_end
 from modular_framework_planning.contacts import LINK, WORLD, Body
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import tree_of
+from modular_framework_planning.kinematics.compiled_kinematics import Tree
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 KEPT_MODELS, KEPT_GROUPINGS, KEPT_SCENES = 4, 16, 2
@@ -77,6 +78,11 @@ class _Member:
     root: int
     is_environment: bool
     sphere: Array
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _tree(model: RobotModel) -> Tree:
+    return tree_of(model)
 
 
 @lru_cache(maxsize=KEPT_MODELS)
@@ -339,7 +345,7 @@ def _arrays(
         for one, two, _ in pairs
     ]
     return World(
-        tree=tree_of(model),
+        tree=_tree(model),
         joints=np.array([item.joint for item in members], dtype=np.int64),
         poses=np.array([item.pose for item in members], dtype=float).reshape(-1, 3, 4),
         roots=np.array([item.root for item in members], dtype=np.int64),
@@ -369,9 +375,9 @@ def _with_field(world: World) -> tuple[World, list[list[int]]]:
     """
     is_plain = (world.joints < 0) & (world.kinds != SURFACE)
     partners: dict[int, dict[int, int]] = {}  # of each body: the pair with each solid
-    for pair, (first, second) in enumerate(world.pairs.tolist()):
-        if is_plain[second] and np.isfinite(world.excess[pair]):
-            partners.setdefault(first, {})[second] = pair
+    solid_pairs = np.flatnonzero(is_plain[world.pairs[:, 1]] & np.isfinite(world.excess))
+    for pair, (first, second) in zip(solid_pairs.tolist(), world.pairs[solid_pairs].tolist(), strict=True):
+        partners.setdefault(first, {})[second] = pair
     counts = Counter(frozenset(item) for item in partners.values())
     solids = max(counts, key=lambda item: (counts[item] * len(item), sorted(item)), default=frozenset())
     replaced: list[list[int]] = []

@@ -53,6 +53,7 @@ from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.pick_place.settings import PickPlaceSettings
 from modular_framework_planning.planning_interface.collision_detectors import collision_detector
 from modular_framework_planning.process_setup.compile_loops import compile_all
+from modular_framework_planning.process_setup.garbage_collection import freeze_loaded_objects
 from modular_framework_planning.process_setup.many_threads import prepare
 from modular_framework_ros.service_backlog import widen_backlog
 
@@ -135,6 +136,7 @@ def warm_up(context: MoveGroupContext) -> None:
         raise ModelError(f"collision_detector: {type(checker).__name__} has no attribute model, the robot; add it")
     checker.is_free(scene.positions)
     checker.distance(scene.positions)
+    freeze_loaded_objects()
 
 
 def main() -> int:

@@ -8,23 +8,37 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
+from modular_framework_planning.trajectory_processing.compiled_polylines import pieces_on_edges
+
+KNOWN_STEPS = 8  # a straight piece of fewer steps is checked again sooner than looked for among the free edges
+ON_EDGE = 1.0e-8  # [rad or m]; a point that is no farther from an edge lies on it
 
 
 class MotionChecker:
-    """Checks joint vectors of one group; all other joints stay at given positions."""
+    """Checks joint vectors of one group; all other joints stay at given positions.
 
-    def __init__(self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array) -> None:
+    Edges that were checked finely are remembered: what lies on a free one is not checked again.
+    """
+
+    def __init__(
+        self, checker: CollisionChecker, indices: NDArray[np.int64], rest: Array, remembered_step: float = 0.0
+    ) -> None:
         """Stores the checker and the group.
 
         Args:
             checker: of the scene.
             indices: of the group's joints.
             rest: positions of the whole robot, for all other joints [rad or m].
+            remembered_step: edges that are checked at such steps or finer ones are remembered [rad or m].
         """
         self._checker = checker
         self._indices = indices
         self._rest = np.array(rest, dtype=float)
         self._state, self._edge = self._rest[None].copy(), np.tile(self._rest, (2, 1))
+        self._remembered_step = remembered_step
+        self._verdicts: dict[bytes, bool] = {}  # of edges, by both ends and the step
+        self._free: list[Array] = []  # edges, shape (2, joints)
+        self._edges = np.zeros((0, 2, len(indices)))  # the same
         model = checker.model
         members = {int(number) for number in indices}
         self._members = members if any(leader in members for _, leader, _, _ in model.mimics) else set()
@@ -47,6 +61,16 @@ class MotionChecker:
 
         The end is checked, the start is not.
         """
+        if step > self._remembered_step:
+            return self._edge_is_free(start, end, step)
+        key = np.concatenate([start, end, [step]]).tobytes()
+        if key not in self._verdicts:
+            self._verdicts[key] = self._edge_is_free(start, end, step)
+            if self._verdicts[key]:
+                self._free.append(np.array([start, end]))
+        return self._verdicts[key]
+
+    def _edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         if self._members:
             return self._checker.path_is_free(self.full_path(np.array([start, end])), step, 1)
         edge = self._edge
@@ -55,8 +79,20 @@ class MotionChecker:
 
     def colliding_state(self, polyline: Array, step: float) -> Array | None:
         """Returns a colliding sample along straight pieces (start included), or None."""
-        found = self._checker.colliding_state(self.full_path(polyline), step)
-        return None if found is None else found[self._indices]
+        for part in self._unchecked(polyline, step):
+            found = self._checker.colliding_state(self.full_path(part), step)
+            if found is not None:
+                return found[self._indices]
+        return None
+
+    def _unchecked(self, polyline: Array, step: float) -> list[Array]:
+        """Returns a polyline without its pieces on free edges; all of its vertices stay."""
+        if step < self._remembered_step or not self._free:
+            return [polyline]
+        if len(self._edges) < len(self._free):
+            self._edges = np.array(self._free)
+        known = pieces_on_edges(np.ascontiguousarray(polyline), self._edges, KNOWN_STEPS * step, ON_EDGE)
+        return np.split(polyline, known + 1) if len(known) else [polyline]
 
     def full_path(self, path: Array) -> Array:
         """Returns positions of the whole robot for joint vectors of the group, shape (n, joints)."""

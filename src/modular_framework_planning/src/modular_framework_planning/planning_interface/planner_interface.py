@@ -203,9 +203,8 @@ class PlanningProblem:
     def with_start(self, start: Array) -> PlanningProblem:
         """Returns the problem from another start (positions of the whole robot)."""
         request = replace(self.request, scene=self.scene.with_positions(start))
-        return replace(
-            self, request=request, start=start, _goals=[], motion=MotionChecker(self.checker, self.group.indices, start)
-        )
+        motion = MotionChecker(self.checker, self.group.indices, start, self.settings.finest_step)
+        return replace(self, request=request, start=start, _goals=[], motion=motion)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

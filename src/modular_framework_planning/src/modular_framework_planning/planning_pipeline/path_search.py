@@ -5,14 +5,16 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.phase_times import REPAIR, SEARCH, SHORTENING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
-from modular_framework_planning.trajectory_processing.path_shortening import shorten
+from modular_framework_planning.trajectory_processing.path_shortening import drop_vertices, shorten
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
@@ -43,11 +45,14 @@ class PathSearch:
         path = self._found
         if path.is_short or path.trajectory is not None:
             return path
-        with problem.phases.measured(REPAIR):
-            vertices = self._planner.repaired(problem, path.vertices) if self.repairs else path.vertices  # type: ignore
-        if problem.settings.sampling.simplify_solutions:
-            with problem.phases.measured(SHORTENING):
-                vertices = _shortened(problem, vertices)
+        simplify, vertices = problem.settings.sampling.simplify_solutions, path.vertices
+        if simplify:  # first, so that fewer edges have to be repaired
+            vertices = _shortened(problem, vertices, drop_vertices)
+        if self.repairs:
+            with problem.phases.measured(REPAIR):
+                vertices = self._planner.repaired(problem, vertices)  # type: ignore[attr-defined]
+        if simplify:
+            vertices = _shortened(problem, vertices, partial(shorten, rng=problem.rng))
         self._found = replace(path, vertices=vertices)
         return self._found
 
@@ -81,20 +86,13 @@ def _require_start(problem: PlanningProblem) -> None:
         )
 
 
-def _shortened(problem: PlanningProblem, path: Array) -> Array:
+def _shortened(problem: PlanningProblem, path: Array, shorten_path: Callable[..., Array]) -> Array:
     """Shortens a path; what it accepts was checked as finely as the solution validator does."""
-    now = time.monotonic()
+    now, fine = time.monotonic(), problem.settings.finest_step
     limit = min(max(problem.deadline_s, now + SHORTENING_SHARE * (problem.end_s - now)), now + MAX_SHORTENING_S)
-    if problem.repeatable:
-        limit = math.inf
-    fine = problem.settings.finest_step
-
-    verdicts: dict[bytes, bool] = {}  # the same vertices are tried again after corners were cut
-
-    def edge(first: Array, second: Array) -> bool:
-        key = first.tobytes() + second.tobytes()
-        if key not in verdicts:
-            verdicts[key] = problem.edge_is_valid(first, second, fine)
-        return verdicts[key]
-
-    return shorten(path, edge, limit, problem.rng)
+    with problem.phases.measured(SHORTENING):
+        return shorten_path(
+            path,
+            lambda first, second: problem.edge_is_valid(first, second, fine),
+            math.inf if problem.repeatable else limit,
+        )

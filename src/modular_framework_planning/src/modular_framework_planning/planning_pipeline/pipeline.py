@@ -249,7 +249,7 @@ class PlanningPipeline:
             group,
             start,
             checker,
-            MotionChecker(checker, group.indices, start),
+            MotionChecker(checker, group.indices, start, self.settings.finest_step),
             self._kinematics,
             self.settings,
             velocity,

@@ -28,7 +28,7 @@ from modular_framework_planning.planning_scene.planning_scene import (
     empty_scene,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
-from modular_framework_planning.trajectory_processing import time_parameterization
+from modular_framework_planning.trajectory_processing import compiled_polylines, time_parameterization
 
 LINKS = 4
 MOTION_STEP = 0.05  # [rad]
@@ -38,6 +38,7 @@ def compile_all() -> float:
     """Compiles every loop, or loads it from the cache; returns how long that took [s]."""
     begun = time.monotonic()
     compiled_kinematics.warm_up()
+    compiled_polylines.warm_up()
     time_parameterization.warm_up()
     robot = _robot()
     _check_motions(_scene(robot, _voxels()))

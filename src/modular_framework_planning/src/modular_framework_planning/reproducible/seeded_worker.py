@@ -37,6 +37,7 @@ from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineS
 from modular_framework_planning.planning_pipeline.plugins import make_adapters
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
 from modular_framework_planning.process_setup.compile_loops import compile_all
+from modular_framework_planning.process_setup.garbage_collection import freeze_loaded_objects
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -155,6 +156,7 @@ def main() -> None:
     kinematics = KinematicsPool(model)
     pipelines = {spec.name: spec.build(model, kinematics) for spec in setup.pipelines}
     _warm_up(model, kinematics)
+    freeze_loaded_objects()
     serve(setup, model, pipelines)
 
 

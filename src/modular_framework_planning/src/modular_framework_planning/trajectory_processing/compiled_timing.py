@@ -298,12 +298,14 @@ def largest_shares(
     """
     fastest, hardest = 0.0, 0.0
     for i in range(len(times) - 1):
-        for k in range(samples + 1):
-            t = (times[i + 1] - times[i]) * k / samples
-            for j in range(len(velocity)):
-                c = coefficients[i, :, j]
-                speed = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])))
-                rate = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]))
+        step = (times[i + 1] - times[i]) / samples
+        for j in range(len(velocity)):
+            c1, c2, c3 = coefficients[i, 1, j], coefficients[i, 2, j], coefficients[i, 3, j]
+            c4, c5 = coefficients[i, 4, j], coefficients[i, 5, j]
+            for k in range(samples + 1):
+                t = k * step
+                speed = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5)))
+                rate = 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
                 fastest = max(fastest, abs(speed) / velocity[j])
                 hardest = max(hardest, abs(rate) / acceleration[j])
     return fastest, hardest

@@ -25,7 +25,7 @@ def jerk_overrun(trajectory: Trajectory, velocity: Array, acceleration: Array, j
 
 def _largest_jerks(trajectory: Trajectory) -> Array:
     """Largest jerk of each joint: that of a parabola at its ends and its turning point, shape (joints,)."""
-    c3, c4, c5 = np.moveaxis(trajectory.coefficients(), 1, 0)[3:]
+    c3, c4, c5 = np.moveaxis(trajectory.coefficients, 1, 0)[3:]
     spans = np.diff(trajectory.times)[:, None]
     turns = np.clip(-0.2 * c4 / np.where(c5 == 0.0, np.inf, c5), 0.0, spans)
     return np.max(
@@ -91,7 +91,7 @@ def along_straight_lines(
 def _integrals(trajectory: Trajectory, times: Array) -> Array:
     """Integrals of the positions from time 0; the motion rests before and after."""
     powers = np.arange(1.0, 7.0)
-    coefficients = trajectory.coefficients() / powers[:, None]
+    coefficients = trajectory.coefficients / powers[:, None]
     spans = np.diff(trajectory.times)
     piece_integrals = np.einsum("npj,np->nj", coefficients, spans[:, None] ** powers)
     areas = np.concatenate([np.zeros_like(piece_integrals[:1]), np.cumsum(piece_integrals, axis=0)])

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 
 EdgeTest = Callable[[Array, Array], bool]
 
@@ -35,9 +36,14 @@ def drop_vertices(path: Array, edge_is_free: EdgeTest, deadline: float) -> Array
     return path[kept]
 
 
-def _point_at(path: Array, lengths: Array, position: float) -> tuple[int, Array]:
+def _lengths(path: Array) -> list[float]:
+    """Returns how long the path is up to each vertex."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]).tolist()
+
+
+def _point_at(path: Array, lengths: list[float], position: float) -> tuple[int, Array]:
     number = min(max(bisect_right(lengths, position) - 1, 0), len(path) - 2)
-    span = float(lengths[number + 1] - lengths[number])
+    span = lengths[number + 1] - lengths[number]
     share = 0.0 if span <= 0.0 else (position - lengths[number]) / span
     return number, path[number] + share * (path[number + 1] - path[number])
 
@@ -60,12 +66,11 @@ def cut_corners(
         attempts: most tries.
         patience: tries without success in a row after which it stops.
     """
-    failures = 0
+    failures, lengths = 0, _lengths(path)
     for _ in range(attempts):
         if len(path) < 3 or failures >= patience or time.monotonic() > deadline:
             break
-        lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-        low, high = np.sort(rng.uniform(0.0, lengths[-1], 2))
+        low, high = sorted(rng.uniform(0.0, lengths[-1], 2).tolist())
         first, start = _point_at(path, lengths, low)
         last, end = _point_at(path, lengths, high)
         gain = (high - low) - float(np.linalg.norm(end - start))
@@ -73,7 +78,7 @@ def cut_corners(
             failures += 1
             continue
         path = np.vstack([path[: first + 1], start, end, path[last + 1 :]])
-        failures = 0
+        failures, lengths = 0, _lengths(path)
     return without_repeats(path)
 
 
@@ -86,15 +91,7 @@ def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
         path: polyline of shape (n, joints).
         tolerance: shortest edge [rad or m], and most change of the unit direction of an edge at a dropped vertex.
     """
-    ways = np.diff(path, axis=0)
-    lengths = np.linalg.norm(ways, axis=1)
-    moves = lengths > tolerance
-    if not moves.any():
-        return path[:1].copy()
-    stops = path[1:][moves]
-    stops[-1] = path[-1]
-    turns = np.abs(np.diff(ways[moves] / lengths[moves, None], axis=0)).max(axis=1) > tolerance
-    return np.vstack([path[:1], stops[:-1][turns], stops[-1:]])
+    return path[needed_vertices(np.ascontiguousarray(path), tolerance)]
 
 
 def shorten(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator) -> Array:

@@ -44,7 +44,7 @@ def point_times(wanted: Array, end: float, longest_period_s: float = LONGEST_PER
 def overrun(trajectory: Trajectory, velocity: Array, acceleration: Array) -> float:
     """Returns how many times slower the curve through the points must run to keep the limits; 1 where it keeps them."""
     fastest, hardest = largest_shares(
-        trajectory.times, trajectory.coefficients(), velocity, acceleration, SAMPLES_PER_SEGMENT
+        trajectory.times, trajectory.coefficients, velocity, acceleration, SAMPLES_PER_SEGMENT
     )
     return max(1.0, fastest, float(np.sqrt(hardest)))
 

@@ -8,6 +8,7 @@ limits hold for the robot only if they hold along that curve, not just at the po
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,7 @@ SAMPLE_PERIOD_S = 0.001  # of a controller
 STRAIGHT = 1.0e-5  # [rad or m]; a curve that leaves its chord by less counts as straight
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Samples of a motion.
 
@@ -38,8 +39,9 @@ class Trajectory:
         """Length of the motion."""
         return float(self.times[-1])
 
+    @cached_property
     def coefficients(self) -> Array:
-        """Returns the polynomials between the points, lowest power first, shape (n - 1, 6, joints)."""
+        """The polynomials between the points, lowest power first, shape (n - 1, 6, joints)."""
         span = np.diff(self.times)[:, None]
         way = np.diff(self.positions, axis=0) / span
         v0, v1 = self.velocities[:-1], self.velocities[1:]
@@ -78,7 +80,7 @@ class Trajectory:
         """Returns times since the point before, shape (m, 1), and the coefficients there, shape (6, m, joints)."""
         segment = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
         since = (np.clip(times, self.times[0], self.times[-1]) - self.times[segment])[:, None]
-        return since, np.moveaxis(self.coefficients()[segment], 1, 0)
+        return since, np.moveaxis(self.coefficients[segment], 1, 0)
 
     def sample_times(self, period_s: float = SAMPLE_PERIOD_S) -> Array:
         """Returns even times from start to end, both included, at most `period_s` apart."""
@@ -105,11 +107,13 @@ class Trajectory:
         """
         if len(self.times) < 2:
             return []
-        spans, ways = np.diff(self.times), np.diff(self.positions, axis=0)
+        spans, ways = np.diff(self.times)[:, None], np.diff(self.positions, axis=0)
         lengths = np.maximum((ways**2).sum(axis=1), 1e-30)
         is_bent = np.zeros(len(spans), dtype=bool)
+        _, c1, c2, c3, c4, c5 = np.moveaxis(self.coefficients, 1, 0)
         for share in (1.0 / 3.0, 2.0 / 3.0):
-            offsets = self.positions_at(self.times[:-1] + share * spans) - self.positions[:-1]
+            t = share * spans
+            offsets = t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
             along = ((offsets * ways).sum(axis=1) / lengths)[:, None] * ways
             is_bent |= np.abs(offsets - along).max(axis=1, initial=0.0) > STRAIGHT
         bent = first + np.flatnonzero(is_bent[first:])
