@@ -30,7 +30,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PlanningRequest,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec
+from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, read_pipeline_spec
 from modular_framework_planning.planning_pipeline.plugins import DEFAULT_ADAPTERS, make_adapters, make_planner
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.reproducible.scene_pickling import from_bytes, to_bytes
@@ -328,3 +328,14 @@ def test_seeded_plans_fail_with_a_reason_and_can_be_cancelled(
         with pytest.raises(PlanningError, match=text) as caught:
             seeded[0].plan(pipeline, request, seed)
         assert caught.value.code == code
+
+
+@pytest.mark.parametrize("value", [0, -1, 1.5, "two", True])
+def test_a_number_of_search_threads_that_is_none_is_refused_with_what_is_allowed(value: object) -> None:
+    with pytest.raises(PlanningError, match=r"pipeline 'ompl': search_threads is .*; allowed are whole numbers from 1"):
+        read_pipeline_spec("ompl", {"search_threads": value}, {}, {})
+
+
+def test_search_threads_of_a_pipeline_come_before_those_of_the_node() -> None:
+    assert read_pipeline_spec("ompl", {"search_threads": 3}, {}, {"search_threads": 2}).settings.search_threads == 3
+    assert read_pipeline_spec("ompl", {}, {}, {"search_threads": 2}).settings.search_threads == 2

@@ -16,8 +16,8 @@ from test_collision_checkers import SHAPES, SMALL_SRDF, SMALL_URDF
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.geometry.shapes import Box, Mesh, Plane, Shape
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planners.rrt_connect import rrt_connect
-from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, can_search, reaches
+from modular_framework_planning.planners.rrt_connect import compiled_rrt_connect, rrt_connect
+from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, SideBySide, can_search, reaches
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
@@ -114,6 +114,49 @@ def test_a_seed_repeats_the_path_and_another_one_gives_another(small: RobotModel
     one, again, other = (search(problem_in(scene, seed)).run() for seed in (1, 1, 2))
     assert np.array_equal(one, again)
     assert other is not None and not np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_of_searches_side_by_side_the_first_path_wins_whatever_the_threads_do(small: RobotModel, count: int) -> None:
+    scene = scene_with(small, WALL, COVER)
+    plain = PlainCoalChecker(scene, small.group("all").indices)
+
+    def searches(seed: int) -> SideBySide:
+        problem = problem_in(scene, seed)
+        generators = [problem.rng, *problem.rng.spawn(count - 1)]
+        return SideBySide(
+            problem,
+            [
+                RrtConnect(replace(problem, rng=rng), GOAL[None], STEP, RANGE, number=number)
+                for number, rng in enumerate(generators)
+            ],
+        )
+
+    fewer = 0
+    for seed in range(6):
+        together, again, alone = searches(seed), searches(seed), search(problem_in(scene, seed))
+        path = together.run()
+        assert path is not None and np.array_equal(path, again.run()) and together.states == again.states
+        assert alone.run() is not None
+        assert plain.path_is_free(problem_in(scene).motion.full_path(path), STEP)
+        fewer += together.states < count * alone.states
+        assert together.states <= count * (alone.states + compiled_rrt_connect.EDGES)
+    assert fewer > 0, "some search other than the first one found its path earlier"
+
+
+def test_searches_side_by_side_end_with_the_time_and_when_cancelled(small: RobotModel) -> None:
+    scene, asked = scene_with(small, WALL, COVER), [0]
+
+    def cancelled() -> bool:
+        asked[0] += 1
+        return asked[0] > 3
+
+    for problem in (problem_in(scene, seconds=0.2), problem_in(scene, cancelled=cancelled)):
+        both = [
+            RrtConnect(replace(problem, rng=rng), UNREACHABLE[None], STEP, RANGE, number=number)
+            for number, rng in enumerate(problem.rng.spawn(2))
+        ]
+        assert SideBySide(problem, both).run() is None
 
 
 def test_the_reach_of_a_joint_bounds_how_far_it_moves_what_it_carries(small: RobotModel) -> None:

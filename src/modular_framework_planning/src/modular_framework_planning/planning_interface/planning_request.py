@@ -106,6 +106,7 @@ class PipelineSettings:
         robot_planning: robot_description_planning (joint_limits, cartesian_limits, ...).
         seed: of every plan of the pipeline; None for fresh random numbers each time.
         seeded_iterations: after how many a planner that goes on to improve its path stops, where a seed is set.
+        search_threads: searches of RRTConnect that run at the same time for one request; the first path wins.
         sampling: of paths that are searched.
     """
 
@@ -127,6 +128,7 @@ class PipelineSettings:
     robot_planning: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
     seeded_iterations: int = 2000
+    search_threads: int = 1
     sampling: SamplingSettings = field(default_factory=SamplingSettings)
 
     @property

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.collision_detectors import (
     DEFAULT_COLLISION_DETECTOR,
@@ -68,7 +69,17 @@ def read_pipeline_spec(
         planning: robot_description_planning.
         node: parameters of the node that plans.
         collision_detector: name of the collision checker.
+
+    Raises:
+        PlanningError: `search_threads` is not a whole number above 0.
     """
+    threads = parameters.get("search_threads", node.get("search_threads", 1))
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise PlanningError(
+            ErrorCode.PLANNING_FAILED,
+            f"pipeline '{name}': search_threads is {threads!r}; allowed are whole numbers from 1: of searches of "
+            "RRTConnect that run at the same time",
+        )
     known = {item.name for item in fields(PipelineSettings)}
     values: dict[str, Any] = {}
     for source in (planning, node, parameters):

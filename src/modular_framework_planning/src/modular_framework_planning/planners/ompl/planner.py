@@ -27,7 +27,7 @@ from modular_framework_planning.planners.ompl.planner_settings import (
     parameter_faults,
 )
 from modular_framework_planning.planners.ompl.projection import projection_evaluator
-from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, can_search
+from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, SideBySide, can_search
 from modular_framework_planning.planning_interface.path_repair import repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
@@ -136,13 +136,22 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
     return _search(near, second[None], fine, CONNECTION_ITERATIONS).run()
 
 
-def _search(problem: PlanningProblem, goals: Array, step: float, limit: int | None = None) -> _Search | RrtConnect:
+def _search(problem: PlanningProblem, goals: Array, step: float, limit: int | None = None) -> _Search | SideBySide:
     """Returns the search of the problem's planner; RRTConnect is compiled where the checker allows it."""
     parameters = problem.planner_parameters
     if problem.planner_id == "RRTConnect" and can_search(problem) and not keeps_intermediate_states(parameters):
         limit = problem.request.most_iterations if limit is None else limit
         wanted = connection_range(parameters)
-        return RrtConnect(problem, goals, step, wanted or DEFAULT_RANGE, limit, is_weighted=wanted is None)
+        generators = [problem.rng, *problem.rng.spawn(problem.settings.search_threads - 1)]
+        return SideBySide(
+            problem,
+            [
+                RrtConnect(
+                    replace(problem, rng=rng), goals, step, wanted or DEFAULT_RANGE, limit, wanted is None, number
+                )
+                for number, rng in enumerate(generators)
+            ],
+        )
     return _Search(problem, goals, step, limit)
 
 

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, arguments
+from modular_framework_planning.collision_detection.kernels.compiled_distance_field import DistanceField
 from modular_framework_planning.collision_detection.reaches import reaches
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import (
@@ -16,6 +20,7 @@ from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import
     NEEDS_ROOM,
     NEEDS_SAMPLES,
     NEW,
+    PAUSED,
     UNDECIDED,
     UNKNOWN,
     Space,
@@ -25,6 +30,7 @@ from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import
 )
 from modular_framework_planning.planning_interface.collision_checker import CompiledChecks
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
+from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
 SAMPLES = 32  # that are drawn at once
 LEAST_WEIGHT = 0.1  # of a joint in a length, also of one that carries nothing: it turns ten times the range at most
@@ -62,6 +68,13 @@ def _trees(start: Array, goals: Array) -> Trees:
     )
 
 
+def empty_field(field: DistanceField) -> DistanceField:
+    """Returns a field of the same solids of which no cell is filled yet."""
+    return field._replace(
+        known=np.zeros_like(field.known), nearest=np.empty_like(field.nearest), distances=np.empty_like(field.distances)
+    )
+
+
 class RrtConnect:
     """One search."""
 
@@ -73,6 +86,7 @@ class RrtConnect:
         longest: float,
         limit: int | None = None,
         is_weighted: bool = True,
+        number: int = 0,
     ) -> None:
         """Stores what to search.
 
@@ -84,15 +98,20 @@ class RrtConnect:
             limit: of random states; None: the clock ends the search.
             is_weighted: whether joints count in a length by the root of their reach, the one that reaches farthest as
                 1; else all count as 1. A wrist then turns further in one step than a shoulder.
+            number: of the search among those that run at the same time; all but number 0 have a distance field of their
+                own, which they fill.
         """
         self._problem, self._limit = problem, limit
         start = problem.start_values
         self._low, self._high = problem.search_bounds(np.vstack([start, goals]))
         checker = problem.checker
         assert isinstance(checker, CompiledChecks) and checker.compiled_world is not None
-        self._world = arguments(checker.compiled_world)
-        self._space = self._space_of(checker.compiled_world, step, longest, is_weighted)
+        world = checker.compiled_world
+        self._world = arguments(world if number == 0 else world._replace(field=empty_field(world.field)))
+        self._space = self._space_of(world, step, longest, is_weighted)
         self._trees = _trees(start, goals)
+        self._samples, self._drawn = np.empty((0, len(self._low))), 0
+        self._verdict, self._status = UNKNOWN, PAUSED
 
     @property
     def states(self) -> int:
@@ -104,28 +123,33 @@ class RrtConnect:
         """How many states the trees from the start and from the goals have."""
         return int(self._trees.sizes[0]), int(self._trees.sizes[1])
 
+    def grow(self) -> None:
+        """Grows the trees until they meet, or for some edges; other searches may do the same in other threads."""
+        self._status = grow(self._trees, self._space, self._samples, self._verdict, *self._world)
+        self._verdict = UNKNOWN
+
+    @property
+    def path(self) -> Array | None:
+        """Vertices of shape (n, joints) from the start to one of the goals; None as long as the trees have not met."""
+        return self._vertices() if self._status == FOUND else None
+
+    def prepare(self) -> bool:
+        """Provides what the trees need to grow on; returns whether they may."""
+        if self._status == NEEDS_ROOM:
+            self._add_room()
+        elif self._status == NEEDS_SAMPLES:
+            count = SAMPLES if self._limit is None else min(SAMPLES, self._limit - self._drawn)
+            if count <= 0:
+                return False
+            self._samples = self._problem.rng.uniform(self._low, self._high, (count, len(self._low)))
+            self._drawn, self._trees.position[0] = self._drawn + count, 0
+        elif self._status == UNDECIDED:
+            self._verdict = FREE if self._undecided_edge_is_free() else BLOCKED
+        return True
+
     def run(self) -> Array | None:
         """Returns vertices of shape (n, joints) from the start to one of the goals, or None."""
-        problem = self._problem
-        samples, verdict, drawn = np.empty((0, len(self._low))), UNKNOWN, 0
-        while True:
-            status = grow(self._trees, self._space, samples, verdict, *self._world)
-            verdict = UNKNOWN
-            if status == FOUND:
-                # a search that the clock ends is not repeatable
-                return None if problem.repeatable and problem.interrupted() else self._vertices()
-            if problem.interrupted():
-                return None
-            if status == NEEDS_ROOM:
-                self._add_room()
-            elif status == NEEDS_SAMPLES:
-                count = SAMPLES if self._limit is None else min(SAMPLES, self._limit - drawn)
-                if count <= 0:
-                    return None
-                samples = problem.rng.uniform(self._low, self._high, (count, len(self._low)))
-                drawn, self._trees.position[0] = drawn + count, 0
-            elif status == UNDECIDED:
-                verdict = FREE if self._undecided_edge_is_free() else BLOCKED
+        return SideBySide(self._problem, [self]).run()
 
     def _space_of(self, world: World, step: float, longest: float, is_weighted: bool) -> Space:
         problem = self._problem
@@ -161,3 +185,42 @@ class RrtConnect:
                 number = int(self._trees.parents[tree, number])
             branches.append(branch)
         return np.array([*reversed(branches[0]), *branches[1][1:]])
+
+
+class SideBySide:
+    """Searches of one problem that run at the same time, in a thread each; the first path that one of them finds wins.
+
+    They take turns of some edges, after which all are waited for: which one is first does not depend on the machine.
+    """
+
+    def __init__(self, problem: PlanningProblem, searches: Sequence[RrtConnect]) -> None:
+        """Stores the searches; each needs a random generator of its own."""
+        self._problem, self._searches = problem, list(searches)
+
+    @property
+    def states(self) -> int:
+        """How many edges were checked."""
+        return sum(search.states for search in self._searches)
+
+    def run(self) -> Array | None:
+        """Returns the first path that is found, the shortest of several; None where time or samples are over."""
+        if len(self._searches) == 1:
+            return self._take_turns(map)
+        with ThreadPoolExecutor(len(self._searches)) as threads:
+            return self._take_turns(threads.map)
+
+    def _take_turns(
+        self, each: Callable[[Callable[[RrtConnect], None], list[RrtConnect]], Iterable[None]]
+    ) -> Array | None:
+        problem, searches = self._problem, self._searches
+        while searches:
+            for _ in each(RrtConnect.grow, searches):
+                pass
+            paths = [search.path for search in searches if search.path is not None]
+            if paths:
+                # a search that the clock ends is not repeatable
+                return None if problem.repeatable and problem.interrupted() else min(paths, key=path_length)
+            if problem.interrupted():
+                return None
+            searches = [search for search in searches if search.prepare()]
+        return None
