@@ -87,3 +87,19 @@ def _geometry(geometry: Element) -> int:
             else:
                 triangles += sum(one - 2 for one in corners)
     return triangles
+
+
+def keep_part(root: Element, name: str) -> list[str]:
+    """Takes out what does not belong to the node of a name; returns the names of all nodes that have a body.
+
+    A body belongs to the nearest node around it; a node without a name is called by its id.
+    """
+    names: dict[str, None] = {}
+    for node in list(root.iter("node")):
+        own = node.get("name") or node.get("id") or ""
+        bodies = [*node.findall("instance_geometry"), *node.findall("instance_controller")]
+        if bodies:
+            names[own] = None
+        for body in bodies if own != name else ():
+            node.remove(body)
+    return list(names)

@@ -34,7 +34,7 @@ def load_mesh(mesh: Mesh) -> TriangleMesh:
         DescriptionError: The file cannot be read whole or holds no triangles.
     """
     try:
-        return read_mesh(mesh.path, mesh.scale)
+        return read_mesh(mesh.path, mesh.scale, mesh.submesh, mesh.center)
     except MeshError as error:
         raise DescriptionError(f"mesh file {error.path}", error.found, error.allowed) from error
 
@@ -81,7 +81,7 @@ class ConvexParts:
         except OSError as error:
             raise DescriptionError(str(mesh.path), f"cannot be read ({error})", "give a readable mesh file") from error
         key = hashlib.sha256(content)
-        key.update(f"{mesh.scale}|{kind}|{_CACHE_VERSION}|{_CONCAVITY_THRESHOLD}".encode())
+        key.update(f"{mesh.scale}|{mesh.submesh}|{mesh.center}|{kind}|{_CACHE_VERSION}|{_CONCAVITY_THRESHOLD}".encode())
         folder = self._cache_folder / f"{mesh.path.stem}-{kind}-{key.hexdigest()[:20]}"
         if not folder.is_dir():
             self._write_atomically(folder, self._make(mesh, kind))

@@ -3,12 +3,20 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
 from modular_framework_urdf.mesh_paths import PackageFinder
+
+MODEL_PATH, RESOURCE_PATH = "GAZEBO_MODEL_PATH", "GAZEBO_RESOURCE_PATH"
+"""Environment variables with folders, separated by colons, as Gazebo reads them."""
+
+NEWEST_VERSION = (1, 11)
+OLDEST_VERSION = (1, 2)
 
 
 def no_packages(name: str) -> str:
@@ -23,10 +31,12 @@ class Resources:
     Attributes:
         model_folders: Folders holding one folder a model, searched in order.
         find_package: Looks up ROS packages for package:// URIs.
+        resource_folders: Folders that relative file:// URIs start at, beside that of the file they stand in.
     """
 
     model_folders: tuple[Path, ...] = ()
     find_package: PackageFinder = no_packages
+    resource_folders: tuple[Path, ...] = ()
 
     def resolve(self, node: XmlNode, uri: str) -> Path:
         """Returns the file or folder a URI stands for.
@@ -40,10 +50,11 @@ class Resources:
         """
         scheme, separator, rest = uri.partition("://")
         if not separator:
-            candidates = [Path(uri) if Path(uri).is_absolute() else Path(node.source).parent / uri]
+            candidates = self._relative(node, uri)
         elif scheme == "file":
-            candidates = [Path(rest) if Path(rest).is_absolute() else Path(node.source).parent / rest]
+            candidates = self._relative(node, rest)
         elif scheme == "model":
+            rest = rest.lstrip("/")
             candidates = [folder / rest for folder in self.model_folders]
         elif scheme == "package":
             candidates = [self._in_package(node, rest)]
@@ -52,10 +63,16 @@ class Resources:
                 node.where, f"got URI '{uri}'", "allowed: model://, package://, file:// or a path relative to the file"
             )
         for candidate in candidates:
-            if candidate.exists():
+            if (rest if separator else uri) and candidate.exists():
                 return candidate
         looked_in = ", ".join(str(candidate) for candidate in candidates) or "nowhere: no model folder is known"
-        raise DescriptionError(node.where, f"'{uri}' does not exist", f"looked for {looked_in}; set gazebo_model_path")
+        ways = f"set gazebo_model_path or {MODEL_PATH}"
+        raise DescriptionError(node.where, f"'{uri}' does not exist", f"looked for {looked_in}; {ways}")
+
+    def _relative(self, node: XmlNode, path: str) -> list[Path]:
+        if Path(path).is_absolute():
+            return [Path(path)]
+        return [folder / path for folder in (Path(node.source).parent, *self.resource_folders)]
 
     def _in_package(self, node: XmlNode, rest: str) -> Path:
         package, _, relative = rest.partition("/")
@@ -73,22 +90,49 @@ class Resources:
         path = self.resolve(node, uri)
         if path.is_file():
             return path
-        config = path / "model.config"
-        if not config.is_file():
+        config = next((path / name for name in ("model.config", "manifest.xml") if (path / name).is_file()), None)
+        if config is None:
             fallback = path / "model.sdf"
             if fallback.is_file():
                 return fallback
             raise DescriptionError(node.where, f"'{path}' holds no model", "a model folder needs a model.config")
-        root = read_xml(config)
-        entries = root.find_all("sdf")
-        if not entries:
-            raise DescriptionError(root.where, "names no <sdf> file", "add <sdf version='1.6'>model.sdf</sdf>")
-        newest = max(entries, key=lambda entry: _version_key(entry.attributes.get("version", "0")))
-        file = path / newest.text.strip()
-        if not file.is_file():
-            raise DescriptionError(newest.where, f"'{file}' does not exist", "name a file of the model's folder")
-        return file
+        return _newest_file(config)
 
 
-def _version_key(version: str) -> tuple[int, ...]:
-    return tuple(int(part) if part.isdigit() else 0 for part in version.split("."))
+def _newest_file(config: Path) -> Path:
+    """Returns the file of the newest version of SDF that is read here, of those a model.config names."""
+    root = read_xml(config)
+    entries = root.find_all("sdf")
+    if not entries:
+        raise DescriptionError(root.where, "names no <sdf> file", "add <sdf version='1.6'>model.sdf</sdf>")
+    readable = [entry for entry in entries if _version_of(entry) <= NEWEST_VERSION]
+    newest = max(readable or entries, key=_version_of)
+    file = config.parent / newest.text.strip()
+    if not file.is_file():
+        raise DescriptionError(newest.where, f"'{file}' does not exist", "name a file of the model's folder")
+    return file
+
+
+def _version_of(entry: XmlNode) -> tuple[int, ...]:
+    return version_numbers(entry.attributes.get("version", "0"))
+
+
+def version_numbers(text: str) -> tuple[int, ...]:
+    """Returns "1.6" as (1, 6); what is no number counts as 0."""
+    return tuple(int(part) if part.isdigit() else 0 for part in text.strip().split("."))
+
+
+def folders_of(environment: Mapping[str, str], variable: str) -> tuple[Path, ...]:
+    """Returns the folders an environment variable lists."""
+    return tuple(Path(entry).expanduser() for entry in environment.get(variable, "").split(os.pathsep) if entry)
+
+
+def model_folders(first: Iterable[Path], environment: Mapping[str, str]) -> tuple[Path, ...]:
+    """Returns where models are looked for: given folders, those of GAZEBO_MODEL_PATH, and ~/.gazebo/models.
+
+    Args:
+        first: Folders that come before.
+        environment: Of the process.
+    """
+    home = Path(environment.get("HOME", "/")) / ".gazebo" / "models"
+    return (*first, *folders_of(environment, MODEL_PATH), *([home] if home.is_dir() else []))
