@@ -81,10 +81,12 @@ class Material:
     Attributes:
         colour: Diffuse colour.
         texture: Image file; None for a plain colour.
+        missing_texture: Name of an image file that is not there; empty where none is missing.
     """
 
     colour: Colour = GREY
     texture: Path | None = None
+    missing_texture: str = ""
 
 
 def gazebo_material(name: str) -> Material | None:
@@ -136,7 +138,8 @@ def _in_scripts(folder: Path, name: str, folders: list[Path]) -> Material | None
             continue
         if name in entries:
             colour, picture = entries[name]
-            return Material(colour, _find_picture(picture, [*folders, file.parent, file.parent.parent / "textures"]))
+            texture = _find_picture(picture, [*folders, file.parent, file.parent.parent / "textures"])
+            return Material(colour, texture, picture if texture is None else "")
     return None
 
 

@@ -55,6 +55,11 @@ class ConvexParts:
     def __init__(self, cache_folder: Path) -> None:
         self._cache_folder = cache_folder
 
+    @property
+    def cache_folder(self) -> Path:
+        """Where the parts are kept."""
+        return self._cache_folder
+
     def hull(self, mesh: Mesh) -> Path:
         """Returns an .obj file with the convex hull of a mesh.
 
@@ -84,7 +89,8 @@ class ConvexParts:
         key.update(f"{mesh.scale}|{mesh.submesh}|{mesh.center}|{kind}|{_CACHE_VERSION}|{_CONCAVITY_THRESHOLD}".encode())
         folder = self._cache_folder / f"{mesh.path.stem}-{kind}-{key.hexdigest()[:20]}"
         if not folder.is_dir():
-            self._write_atomically(folder, self._make(mesh, kind))
+            parts = enumerate(self._make(mesh, kind))
+            write_folder(folder, {f"part_{index:03d}.obj": _obj_text(part).encode("ascii") for index, part in parts})
         return tuple(sorted(folder.glob("*.obj")))
 
     @staticmethod
@@ -104,23 +110,33 @@ class ConvexParts:
             return [TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))]
         return _decompose(loaded)
 
-    def _write_atomically(self, folder: Path, parts: list[TriangleMesh]) -> None:
-        self._cache_folder.mkdir(parents=True, exist_ok=True)
-        scratch = Path(tempfile.mkdtemp(dir=self._cache_folder))
-        try:
-            for index, part in enumerate(parts):
-                (scratch / f"part_{index:03d}.obj").write_text(_obj_text(part), encoding="ascii")
-            scratch.chmod(0o755)
-            scratch.rename(folder)
-        except OSError as error:
-            if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
-                raise DescriptionError(
-                    str(folder),
-                    f"cannot be written ({error.strerror})",
-                    "free space, or set ROS_HOME to a folder that has some",
-                ) from error
-        finally:
-            shutil.rmtree(scratch, ignore_errors=True)  # it is gone when all went well
+
+def write_folder(folder: Path, files: dict[str, bytes]) -> None:
+    """Makes a folder of the cache, whole or not at all.
+
+    Args:
+        folder: Its path; what is above it is made too.
+        files: Contents by name.
+
+    Raises:
+        DescriptionError: There is no room or no permission for it.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(dir=folder.parent))
+    try:
+        for name, content in files.items():
+            (scratch / name).write_bytes(content)
+        scratch.chmod(0o755)
+        scratch.rename(folder)
+    except OSError as error:
+        if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
+            raise DescriptionError(
+                str(folder),
+                f"cannot be written ({error.strerror})",
+                "free space, or set ROS_HOME to a folder that has some",
+            ) from error
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)  # it is gone when all went well
 
 
 def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:

@@ -15,6 +15,8 @@ from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 Version = tuple[int, ...]
 
+_WITHOUT_AXIS = (specs.JointType.FIXED, specs.JointType.BALL)
+
 _AXIS_IN_MODEL_FRAME_UNTIL: Version = (1, 4)
 """Until this version an axis is given in the frame of the model, later in that of the joint."""
 _AXIS_EXPRESSED_IN_FROM: Version = (1, 7)
@@ -42,11 +44,9 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
         return specs.Joint(node.name(), kind, specs.WORLD, parent, Pose(), (0.0, 0.0, 1.0), -math.inf, math.inf)
     joint_in_model = frames.joint_pose_in_model(node)
     pose = frames.pose_in_model(child).inverse() @ joint_in_model
-    axis_node = node.find("axis")
-    if kind is not specs.JointType.FIXED:
-        axis_node = node.require("axis")
-    if axis_node is None or kind is specs.JointType.FIXED:
+    if kind in _WITHOUT_AXIS:
         return specs.Joint(node.name(), kind, parent, child, pose, (0.0, 0.0, 1.0), -math.inf, math.inf)
+    axis_node = node.require("axis")
     axis = _axis_in_joint(axis_node, joint_in_model, frames, version)
     lower, upper = joint_bound(axis_node, "lower", -math.inf), joint_bound(axis_node, "upper", math.inf)
     if kind is specs.JointType.CONTINUOUS:

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import unquote
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
@@ -43,7 +44,7 @@ class Resources:
 
         Args:
             node: Element the URI was read from; relative paths start at its file.
-            uri: model://, package://, file:// or a path.
+            uri: model://, package://, file:// or a path; of a model of Gazebo Fuel the name counts.
 
         Raises:
             DescriptionError: The URI has another scheme or leads nowhere.
@@ -58,6 +59,8 @@ class Resources:
             candidates = [folder / rest for folder in self.model_folders]
         elif scheme == "package":
             candidates = [self._in_package(node, rest)]
+        elif scheme in ("http", "https") and "/models/" in rest:
+            candidates = self._downloaded(rest)
         else:
             raise DescriptionError(
                 node.where, f"got URI '{uri}'", "allowed: model://, package://, file:// or a path relative to the file"
@@ -68,6 +71,12 @@ class Resources:
         looked_in = ", ".join(str(candidate) for candidate in candidates) or "nowhere: no model folder is known"
         ways = f"set gazebo_model_path or {MODEL_PATH}"
         raise DescriptionError(node.where, f"'{uri}' does not exist", f"looked for {looked_in}; {ways}")
+
+    def _downloaded(self, address: str) -> list[Path]:
+        """Returns where a model of Gazebo Fuel may be: nothing is fetched, a model of its name has to be there."""
+        name = unquote(address.partition("/models/")[2]).split("/")[0]
+        names = dict.fromkeys((name, name.lower().replace(" ", "_")))
+        return [folder / each for folder in self.model_folders for each in names]
 
     def _relative(self, node: XmlNode, path: str) -> list[Path]:
         if Path(path).is_absolute():
@@ -90,18 +99,31 @@ class Resources:
         path = self.resolve(node, uri)
         if path.is_file():
             return path
-        config = next((path / name for name in ("model.config", "manifest.xml") if (path / name).is_file()), None)
-        if config is None:
-            fallback = path / "model.sdf"
-            if fallback.is_file():
-                return fallback
+        if not (path / "model.config").is_file() and not (path / "model.sdf").is_file():
             raise DescriptionError(node.where, f"'{path}' holds no model", "a model folder needs a model.config")
-        return _newest_file(config)
+        return model_file(path)
 
 
-def _newest_file(config: Path) -> Path:
+def model_file(folder: Path) -> Path:
+    """Returns the SDF file of a model's folder: what its model.config names, or model.sdf without one.
+
+    Raises:
+        DescriptionError: The model.config names no file that exists.
+    """
+    config, usual = folder / "model.config", folder / "model.sdf"
+    if not config.is_file():
+        return usual
+    try:
+        root = read_xml(config)
+    except DescriptionError:
+        if usual.is_file():  # an author's address in brackets is the usual fault, and of no account
+            return usual
+        raise
+    return _newest_file(config, root)
+
+
+def _newest_file(config: Path, root: XmlNode) -> Path:
     """Returns the file of the newest version of SDF that is read here, of those a model.config names."""
-    root = read_xml(config)
     entries = root.find_all("sdf")
     if not entries:
         raise DescriptionError(root.where, "names no <sdf> file", "add <sdf version='1.6'>model.sdf</sdf>")

@@ -97,6 +97,8 @@ def _read_material(visual: XmlNode, reading: Reading) -> Material | None:
         except DescriptionError as error:
             reading.notes.add(script, f"{error.problem}: drawn grey ({error.allowed})")
             named = Material()
+        if named.missing_texture:
+            reading.notes.add(script, f"the picture '{named.missing_texture}' is not there: drawn in a plain colour")
     if colour_node is None:
         return named
     red, green, blue, *alpha = colour_node.number_list(3, 4)

@@ -64,6 +64,7 @@ class JointType(Enum):
     REVOLUTE = "revolute"
     CONTINUOUS = "continuous"
     PRISMATIC = "prismatic"
+    BALL = "ball"
 
 
 Geometry = Box | Cylinder | Sphere | Plane | Mesh

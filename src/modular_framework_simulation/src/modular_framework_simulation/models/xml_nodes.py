@@ -15,6 +15,7 @@ from modular_framework_urdf import xml_text
 
 Choice = TypeVar("Choice", bound=Enum)
 
+_LATE_DECLARATION = re.compile(r"(?:\s|<!--(?:(?!-->).)*-->)+(<\?xml\b[^>]*\?>)", re.DOTALL)
 _ENCODING = re.compile(rb"""^\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 
 
@@ -172,16 +173,15 @@ def parse_xml(text: str, source: str) -> XmlNode:
 
 
 def _begun_properly(text: str) -> str:
-    """Returns a document without a byte order mark, and without a declaration that stands behind empty lines.
+    """Returns a document without a byte order mark, and without a declaration behind empty lines or comments.
 
     Gazebo reads both; the numbers of the lines stay as they are.
     """
     text = text.removeprefix("\ufeff")
-    bare = text.lstrip()
-    if bare is not text and bare.startswith("<?xml"):
-        declaration, _, rest = bare.partition("?>")
-        text = text[: len(text) - len(bare)] + "\n" * declaration.count("\n") + rest
-    return text
+    late = _LATE_DECLARATION.match(text)
+    if late is None:
+        return text
+    return text[: late.start(1)] + "\n" * late.group(1).count("\n") + text[late.end(1) :]
 
 
 def _node(element: xml_text.Element, source: str) -> XmlNode:

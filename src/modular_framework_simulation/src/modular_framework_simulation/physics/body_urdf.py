@@ -17,6 +17,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.joint_trees import JointTree, joint_trees
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_urdf.rotations import rpy_from_quaternion
 
 _FARTHEST = 1e3
@@ -85,6 +86,7 @@ def _tree_to_urdf(model: specs.Model, tree: JointTree, writer: _Writer) -> BodyU
 class _Writer:
     def __init__(self, convex_parts: ConvexParts, with_visuals: bool) -> None:
         self._convex_parts = convex_parts
+        self._visual_meshes = VisualMeshes(convex_parts.cache_folder)
         self._with_visuals = with_visuals
 
     def shapes(self, link: specs.Link, shift: Pose, exact: bool) -> str:
@@ -95,10 +97,16 @@ class _Writer:
                 text += f"<collision{attributes}>{_origin(shift @ collision.pose)}{geometry}</collision>"
         if self._with_visuals:
             for number, visual in enumerate(link.visuals):
-                colour = " ".join(f"{value:g}" for value in visual.colour)
-                material = f'<material name={quoteattr(f"{link.name}_{number}")}><color rgba="{colour}"/></material>'
-                text += f"<visual>{_origin(shift @ visual.pose)}{_geometry(visual.geometry)}{material}</visual>"
+                for part, (geometry, colour) in enumerate(self._visual_geometries(visual)):
+                    rgba = " ".join(f"{value:g}" for value in colour)
+                    material = f'<material name={quoteattr(f"{link.name}_{number}_{part}")}><color rgba="{rgba}"/>'
+                    text += f"<visual>{_origin(shift @ visual.pose)}{geometry}{material}</material></visual>"
         return text
+
+    def _visual_geometries(self, visual: specs.Visual) -> Iterable[tuple[str, specs.Colour]]:
+        if visual.texture is not None or isinstance(visual.geometry, specs.Mesh | specs.Plane):
+            return [(_mesh_file(str(part.file)), part.colour) for part in self._visual_meshes.parts(visual)]
+        return [(_geometry(visual.geometry), visual.colour)]
 
     def inertial(self, link: specs.Link, shift: Pose) -> str:
         """Writes the mass properties of a link."""
@@ -123,7 +131,7 @@ def _robot(name: str, parts: list[str]) -> str:
 
 
 def _joint(joint: specs.Joint, pose_in_parent: Pose) -> str:
-    kind, limit = joint.kind.value, ""
+    kind, limit = "spherical" if joint.kind is specs.JointType.BALL else joint.kind.value, ""
     if joint.kind in (specs.JointType.REVOLUTE, specs.JointType.PRISMATIC):
         lower, upper = joint.lower, joint.upper
         if kind == "revolute" and not (math.isfinite(lower) or math.isfinite(upper)):

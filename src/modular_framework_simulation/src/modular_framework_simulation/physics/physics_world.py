@@ -293,8 +293,19 @@ class PhysicsWorld:
                 collisionMargin=0.0,
                 physicsClientId=self.engine.client,
             )
+        # Joints of models are free: the engine would otherwise brake them with a motor of its own.
+        for index in body.ball_joint_indices:
+            self.engine.api.setJointMotorControlMultiDof(
+                body.number,
+                index,
+                self.engine.api.POSITION_CONTROL,
+                targetPosition=[0.0, 0.0, 0.0, 1.0],
+                positionGain=0.0,
+                velocityGain=0.0,
+                force=[0.0, 0.0, 0.0],
+                physicsClientId=self.engine.client,
+            )
         for index in body.joint_indices.values():
-            # Joints of models are free: the engine would otherwise brake them with a motor of its own.
             self.engine.api.setJointMotorControl2(
                 body.number, index, self.engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=self.engine.client
             )

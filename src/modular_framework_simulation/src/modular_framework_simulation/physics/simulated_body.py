@@ -79,6 +79,7 @@ class SimulatedBody:
         self.joint_indices: dict[str, int] = {
             info[1].decode(): info[0] for info in infos if info[2] in (api.JOINT_REVOLUTE, api.JOINT_PRISMATIC)
         }
+        self.ball_joint_indices = tuple(info[0] for info in infos if info[2] == api.JOINT_SPHERICAL)
         dynamics = api.getDynamicsInfo(number, BASE_INDEX, physicsClientId=client)
         self._centre_in_root = Pose(tuple(dynamics[3]), tuple(dynamics[4]))
         self._root_in_centre = self._centre_in_root.inverse()
@@ -176,6 +177,11 @@ class SimulatedBody:
     def reset_joints(self, positions: dict[str, float]) -> None:
         """Puts joints at positions [rad or m], at rest; joints that are not named go to 0."""
         self.set_joints({name: positions.get(name, 0.0) for part in self.parts for name in part.joint_indices})
+        for part in self.parts:
+            for index in part.ball_joint_indices:
+                self._engine.api.resetJointStateMultiDof(
+                    part.number, index, [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0], physicsClientId=self._engine.client
+                )
 
     def _centre_state(self) -> tuple[Pose, Twist]:
         """Returns pose and velocity of the root link's centre of mass, in the world frame."""
