@@ -173,7 +173,8 @@ def parse_material_script(text: str) -> dict[str, tuple[Colour, str]]:
             case ["material", *named] if depth == 0:
                 own, _, parent = " ".join(named).partition(":")
                 name = own.strip().strip('"')
-                found[name] = found.get(parent.strip().strip('"'), (None, ""))
+                if name:
+                    found[name] = found.get(parent.strip().strip('"'), (None, ""))
             case ["diffuse", *numbers] if name and depth > 0:
                 found[name] = (_colour(numbers) or found[name][0], found[name][1])
             case ["ambient", *numbers] if name and depth > 0 and found[name][0] is None:

@@ -63,6 +63,8 @@ class PhysicsWorld:
         self.gravity = gravity
         self.engine = PhysicsEngine(settings, gravity, gui, log)
         self._convex_parts = convex_parts
+        self._log = log
+        self._noted: set[tuple[str, ...]] = set()
         self._bodies: dict[str, SimulatedBody] = {}
         self._names_by_number: dict[int, str] = {}
         self._initial_poses: dict[str, Pose] = {}
@@ -127,6 +129,9 @@ class PhysicsWorld:
             raise DuplicateModelError(model.name)
         api = self.engine.api
         written = prepared if prepared is not None else self.prepare(model)
+        if model.notes and model.notes not in self._noted:
+            self._noted.add(model.notes)
+            self._log(f"model '{model.name}': {'; '.join(model.notes)}")
         parts = []
         for tree in (written, *written.further):
             number = self.engine.load_urdf(tree.text, model.name, tree.fixed, api.URDF_USE_INERTIA_FROM_FILE)
