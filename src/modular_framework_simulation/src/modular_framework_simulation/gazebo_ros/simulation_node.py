@@ -86,7 +86,7 @@ class SimulationNode:
     def __init__(self, parameters: SimulationParameters) -> None:
         self._resources = _resources(parameters.model_path)
         self._settings = PhysicsSettings()
-        self._parts = ConvexParts(default_cache_folder())
+        self._parts = ConvexParts(default_cache_folder(), rospy.loginfo)
         self._world = self._build_world(parameters)
         self._controllers: RosControllerManager | None = None
         actors = self._build_robot(parameters)

@@ -11,6 +11,7 @@ import hashlib
 import os
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -45,15 +46,21 @@ def default_cache_folder() -> Path:
     return Path(home) / "modular_framework" / "convex_parts"
 
 
+def _silent(_text: str) -> None:
+    """Takes a line and drops it."""
+
+
 class ConvexParts:
     """Gives the convex parts of meshes as .obj files, from the cache when they are there.
 
     Args:
         cache_folder: Made when first needed.
+        log: Takes a line of text when something begins that may take minutes.
     """
 
-    def __init__(self, cache_folder: Path) -> None:
+    def __init__(self, cache_folder: Path, log: Callable[[str], None] = _silent) -> None:
         self._cache_folder = cache_folder
+        self._log = log
 
     @property
     def cache_folder(self) -> Path:
@@ -93,8 +100,7 @@ class ConvexParts:
             write_folder(folder, {f"part_{index:03d}.obj": _obj_text(part).encode("ascii") for index, part in parts})
         return tuple(sorted(folder.glob("*.obj")))
 
-    @staticmethod
-    def _make(mesh: Mesh, kind: str) -> list[TriangleMesh]:
+    def _make(self, mesh: Mesh, kind: str) -> list[TriangleMesh]:
         import trimesh
 
         loaded = load_mesh(mesh)
@@ -108,6 +114,10 @@ class ConvexParts:
         filled = abs(solid.volume) / hull.volume if hull.volume > 0 else 1.0
         if kind == "hull" or filled > _CONVEX_VOLUME_SHARE:
             return [TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))]
+        self._log(
+            f"cutting {mesh.path} with {len(loaded.triangles):,} triangles into convex parts, which may take minutes; "
+            f"they are kept in {self._cache_folder}"
+        )
         return _decompose(loaded)
 
 

@@ -16,6 +16,9 @@ from modular_framework_urdf.mesh_paths import PackageFinder
 MODEL_PATH, RESOURCE_PATH = "GAZEBO_MODEL_PATH", "GAZEBO_RESOURCE_PATH"
 """Environment variables with folders, separated by colons, as Gazebo reads them."""
 
+_MOST_NAMED = 4
+"""Folders that a message names."""
+
 NEWEST_VERSION = (1, 11)
 OLDEST_VERSION = (1, 2)
 
@@ -68,7 +71,10 @@ class Resources:
         for candidate in candidates:
             if (rest if separator else uri) and candidate.exists():
                 return candidate
-        looked_in = ", ".join(str(candidate) for candidate in candidates) or "nowhere: no model folder is known"
+        looked_in = ", ".join(str(candidate) for candidate in candidates[:_MOST_NAMED])
+        if len(candidates) > _MOST_NAMED:
+            looked_in += f" and in {len(candidates) - _MOST_NAMED} more folders"
+        looked_in = looked_in or "nowhere: no model folder is known"
         ways = f"set gazebo_model_path or {MODEL_PATH}"
         raise DescriptionError(node.where, f"'{uri}' does not exist", f"looked for {looked_in}; {ways}")
 
