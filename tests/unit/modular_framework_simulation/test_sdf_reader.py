@@ -124,14 +124,8 @@ def test_a_joint_without_limits_turns_without_end() -> None:
         ("<link name='l'><collision name='c'>\n<geometry><cone/></geometry></collision></link>", 3, ["<cone>", "box"]),
         ("<link name='l'>\n<collision><geometry/></collision></link>", 3, ["<collision>", "no name"]),
         ("<link name='l'><inertial>\n<mass>-1</mass></inertial></link>", 3, ["<mass>", "-1", "greater than 0"]),
-        (
-            "<link name='l'><inertial>\n<inertia><ixx>9</ixx></inertia></inertial></link>",
-            3,
-            ["<inertia>", "ixx=9", "sum of the other two"],
-        ),
-        ("<link name='a'/>\n<link name='a'/>", 2, ["only link of that name"]),
-        ("\n<model name='inner'/>", 3, ["<model name='inner'>", "model inside a model"]),
-        ("<link name='a'/><link name='b'/>", 1, ["2 links without a parent (a, b)", "one tree"]),
+        ("<link name='a'/>\n<link name='a'/>", 3, ["only link of that name"]),
+        ("\n<model name='inner'/>", 3, ["<model name='inner'>", "no <link>"]),
         ("", 1, ["no <link>"]),
         (
             "<link name='a'/><link name='b'/>\n<joint name='j' type='screw'><parent>a</parent><child>b</child></joint>",
@@ -141,7 +135,7 @@ def test_a_joint_without_limits_turns_without_end() -> None:
         (
             "<link name='a'/>\n<joint name='j' type='fixed'><parent>a</parent><child>c</child></joint>",
             3,
-            ["child 'c' is no link", "allowed: a"],
+            ["<child>", "'c' is no link", "allowed: a"],
         ),
         ("<link name='a'><pose relative_to='nowhere'>0 0 0 0 0 0</pose></link>", 1, ["'nowhere'", "allowed"]),
         (
@@ -187,7 +181,7 @@ def test_a_static_model_may_have_loose_links() -> None:
 def test_broken_documents_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"text:1: .*well-formed"):
         read_model_text("<sdf version='1.6'><model>", "text", Resources())
-    with pytest.raises(DescriptionError, match=r"allowed: 1\.4, 1\.5, 1\.6, 1\.7"):
+    with pytest.raises(DescriptionError, match=r"'2\.0'; allowed: 1\.2 to 1\.11"):
         read_model_text("<sdf version='2.0'/>", "text", Resources())
     with pytest.raises(DescriptionError, match="holds no <model>"):
         read_model_text("<sdf version='1.6'/>", "text", Resources())
@@ -199,7 +193,7 @@ def test_broken_documents_are_refused(tmp_path: Path) -> None:
 
 def test_a_world_with_two_models_of_one_name_or_a_missing_model_is_refused(tmp_path: Path, model_folder: Path) -> None:
     twice = "<include><uri>model://block</uri></include>" * 2
-    with pytest.raises(DescriptionError, match="2 models 'block'"):
+    with pytest.raises(DescriptionError, match="test.world:3: <include>: is a second model 'block'"):
         world(tmp_path, twice, model_folder)
     with pytest.raises(DescriptionError, match="'model://nothing' does not exist"):
         world(tmp_path, "<include><uri>model://nothing</uri></include>", model_folder)

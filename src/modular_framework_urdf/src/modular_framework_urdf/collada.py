@@ -35,18 +35,25 @@ def unit(root: Element) -> float:
 
 def without_materials(root: Element) -> bytes:
     """Returns the file without materials, because a reader drops a part whose texture is missing."""
-    root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")
     for parent in list(root.iter()):
         for child in [one for one in parent if one.tag == "bind_material" or one.tag in _MATERIAL_LIBRARIES]:
             parent.remove(child)
+    return to_bytes(root)
+
+
+def to_bytes(root: Element) -> bytes:
+    """Returns a parsed file as COLLADA again."""
+    root.set("xmlns", "http://www.collada.org/2005/11/COLLADASchema")
     return xml_text.to_text(root).encode()
 
 
 def triangles(root: Element) -> int:
     """Counts the triangles of every instance that the scene shows."""
     known = {element.get("id"): element for element in root.iter() if element.get("id")}
+    # Some exporters call the scene and a node in it by the same id.
+    scenes = {element.get("id"): element for element in root.iter("visual_scene")}
     shown = root.find("scene/instance_visual_scene")
-    nodes = [] if shown is None else list(known[shown.get("url", "")[1:]].findall("node"))
+    nodes = [] if shown is None else list(scenes[shown.get("url", "")[1:]].findall("node"))
     geometries: dict[str, int] = {}
     triangles = visited = 0
     while nodes:
@@ -87,3 +94,21 @@ def _geometry(geometry: Element) -> int:
             else:
                 triangles += sum(one - 2 for one in corners)
     return triangles
+
+
+def keep_part(root: Element, name: str) -> list[str]:
+    """Takes out what does not belong to the node of a name; returns the names of all nodes that have a body.
+
+    A body belongs to the nearest node around it that has a name.
+    """
+    names: dict[str, None] = {}
+    for node in list(root.iter("node")):
+        bodies = [*node.findall("instance_geometry"), *node.findall("instance_controller")]
+        if not bodies:
+            continue
+        named = [each for each in (node, *node.iterancestors("node")) if each.get("name")]
+        own = named[0].get("name") if named else ""
+        names[own] = None
+        for body in bodies if own != name else ():
+            node.remove(body)
+    return [each for each in names if each]

@@ -143,3 +143,20 @@ def _ply_binary(content: bytes, offset: int, elements: list[tuple[str, int, list
     if offset > len(content):
         raise ValueError(f"{len(content)} bytes where the header declares {offset}")
     return triangles
+
+
+def keep_obj_part(content: bytes, name: str) -> tuple[bytes, list[str]]:
+    """Returns an OBJ file without the faces of other objects and groups, and the names of all that have faces."""
+    names: dict[str, None] = {}
+    kept: list[bytes] = []
+    here = ""
+    for line in content.splitlines():
+        words = line.split(maxsplit=1)
+        if words and words[0] in (b"o", b"g"):
+            here = words[1].decode(errors="replace").strip() if len(words) > 1 else ""
+        if words and words[0] == b"f":
+            names[here] = None
+            if here != name:
+                continue
+        kept.append(line)
+    return b"\n".join(kept) + b"\n", list(names)

@@ -17,6 +17,7 @@ from modular_framework_urdf.declared_triangles import (
     STL_HEADER,
     declared_triangles,
     is_binary_stl,
+    keep_obj_part,
     with_absolute_indices,
 )
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
@@ -53,12 +54,14 @@ class TriangleMesh:
     triangles: NDArray[np.int64]
 
 
-def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0)) -> TriangleMesh:
-    """Reads every triangle of a mesh file.
+def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0), part: str = "", centred: bool = False) -> TriangleMesh:
+    """Reads every triangle of a mesh file, or of a part of it.
 
     Args:
         path: an STL, OBJ, PLY or COLLADA file.
         scale: of the description that names the file, along x, y and z; a negative one mirrors.
+        part: name of the COLLADA node or OBJ group to read; empty for the whole file.
+        centred: whether the middle of its bounding box is moved to the origin.
 
     Raises:
         MeshError: the file cannot be read, holds no triangle, or lost triangles while it was read.
@@ -67,7 +70,7 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0)) -> TriangleMesh:
     factors = np.array(scale, dtype=float)
     if factors.shape != (3,) or not np.isfinite(factors).all() or not factors.all():
         raise MeshError(path, f"scale is {list(scale)}", "allowed: three finite numbers, none of them 0")
-    declared, unit, vertices, triangles = _read(path)
+    declared, unit, vertices, triangles = _read(path, part)
     if len(triangles) != declared:
         raise MeshError(
             path,
@@ -78,6 +81,8 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0)) -> TriangleMesh:
         raise MeshError(path, "holds no triangle", "at least one is needed; give a triangle mesh")
     if not np.isfinite(vertices).all():
         raise MeshError(path, "a vertex is not finite", "every coordinate must be a finite number; mend the file")
+    if centred:
+        vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     vertices, triangles = _merged(vertices * (unit * factors), triangles)
     if np.abs(vertices).max() > LARGEST_LENGTH_M:
         raise MeshError(
@@ -88,7 +93,7 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0)) -> TriangleMesh:
     return TriangleMesh(vertices, triangles if np.prod(factors) > 0.0 else np.ascontiguousarray(triangles[:, ::-1]))
 
 
-def _read(path: Path) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64]]:
+def _read(path: Path, part: str) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64]]:
     """Returns the number of triangles a file declares, its unit [m], its vertices and triangles."""
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ALLOWED:
@@ -97,11 +102,20 @@ def _read(path: Path) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64
         content = path.read_bytes()
         if kind == "dae":
             root = collada.parse(content, path.name)
+            if part:
+                _require_part(path, part, collada.keep_part(root, part))
             return collada.triangles(root), collada.unit(root), *_load("dae", collada.without_materials(root))
+        if part:
+            if kind != "obj":
+                raise MeshError(path, f"has no part '{part}'", "allowed: parts of dae and obj files")
+            content, names = keep_obj_part(content, part)
+            _require_part(path, part, names)
         declared = declared_triangles(kind, content)
         if kind == "stl" and is_binary_stl(content):  # what most robots have: without trimesh, which loads for 0.6 s
             return declared, 1.0, *_corners(np.frombuffer(content, BINARY_STL, offset=STL_HEADER)["corners"])
         return declared, 1.0, *_load(kind, with_absolute_indices(content) if kind == "obj" else content)
+    except MeshError:
+        raise
     except OSError as error:
         raise MeshError(path, f"cannot be read ({error})", "give a mesh file that is there and readable") from error
     except Exception as error:  # noqa: BLE001 - the readers behind trimesh raise what they like on a broken file
@@ -110,6 +124,11 @@ def _read(path: Path) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64
             f"is no whole {kind.upper()} file ({type(error).__name__}: {error})",
             f"allowed: well-formed {', '.join(ALLOWED)}; export the mesh again",
         ) from error
+
+
+def _require_part(path: Path, part: str, names: list[str]) -> None:
+    if part not in names:
+        raise MeshError(path, f"has no part '{part}'", f"allowed: {', '.join(names) or 'none, it has no names'}")
 
 
 def _load(kind: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -18,7 +18,7 @@ class SimulationParameters:
 
     Attributes:
         robot_description: `robot_description`: URDF; empty for a world without a robot.
-        model_path: `gazebo_model_path`: folder with one folder a model.
+        model_path: `gazebo_model_path`: folders with one folder a model, separated by colons.
         world_file: `~world_file`: path of a .world file; empty for an empty world.
         starting_positions: `~starting_pose`: "-J joint value ..." [rad or m].
         robot_name: `~robot_name`: instance name; empty for the name in the description.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 from pathlib import Path
@@ -29,10 +30,11 @@ from modular_framework_simulation.loop.time_holds import TimeHolds
 from modular_framework_simulation.loop.world_digest import WorldDigest
 from modular_framework_simulation.models import sdf_specs
 from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.models.package_exports import MEDIA_EXPORT, MODEL_EXPORT, exported_folders
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, read_world
-from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.sdf_resources import RESOURCE_PATH, Resources, folders_of, model_folders
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
@@ -54,6 +56,18 @@ def _pacer(parameters: SimulationParameters) -> Pacer:
     return Pacer(factor, idle_factor=idle_factor)
 
 
+def _resources(model_path: str) -> Resources:
+    """Returns where models are looked for: the parameter, Gazebo's environment variables, and exports of packages."""
+    ros_packages = rospkg.RosPack()
+    packages = [Path(ros_packages.get_path(name)) for name in ros_packages.list()]
+    first = [Path(entry) for entry in model_path.split(os.pathsep) if entry]
+    return Resources(
+        (*model_folders(first, os.environ), *exported_folders(packages, MODEL_EXPORT)),
+        ros_packages.get_path,
+        (*folders_of(os.environ, RESOURCE_PATH), *exported_folders(packages, MEDIA_EXPORT)),
+    )
+
+
 class SimulationNode:
     """Builds the world from parameters and runs it.
 
@@ -70,10 +84,9 @@ class SimulationNode:
     """
 
     def __init__(self, parameters: SimulationParameters) -> None:
-        folders = (Path(parameters.model_path),) if parameters.model_path else ()
-        self._resources = Resources(folders, rospkg.RosPack().get_path)
+        self._resources = _resources(parameters.model_path)
         self._settings = PhysicsSettings()
-        self._parts = ConvexParts(default_cache_folder())
+        self._parts = ConvexParts(default_cache_folder(), rospy.loginfo)
         self._world = self._build_world(parameters)
         self._controllers: RosControllerManager | None = None
         actors = self._build_robot(parameters)
@@ -102,7 +115,8 @@ class SimulationNode:
         spec = sdf_specs.World("empty", STANDARD_GRAVITY, (), ())
         if parameters.world_file:
             spec = read_world(Path(parameters.world_file), self._resources)
-            rospy.logdebug("world elements without meaning here: %s", ", ".join(spec.ignored))
+            if spec.ignored:
+                rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))
         world = PhysicsWorld(self._settings, self._parts, spec.gravity, parameters.gui, rospy.logwarn)
         for model in spec.models:
             world.spawn(model, keep=True)

@@ -11,6 +11,7 @@ import hashlib
 import os
 import shutil
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ def load_mesh(mesh: Mesh) -> TriangleMesh:
         DescriptionError: The file cannot be read whole or holds no triangles.
     """
     try:
-        return read_mesh(mesh.path, mesh.scale)
+        return read_mesh(mesh.path, mesh.scale, mesh.submesh, mesh.center)
     except MeshError as error:
         raise DescriptionError(f"mesh file {error.path}", error.found, error.allowed) from error
 
@@ -45,15 +46,26 @@ def default_cache_folder() -> Path:
     return Path(home) / "modular_framework" / "convex_parts"
 
 
+def _silent(_text: str) -> None:
+    """Takes a line and drops it."""
+
+
 class ConvexParts:
     """Gives the convex parts of meshes as .obj files, from the cache when they are there.
 
     Args:
         cache_folder: Made when first needed.
+        log: Takes a line of text when something begins that may take minutes.
     """
 
-    def __init__(self, cache_folder: Path) -> None:
+    def __init__(self, cache_folder: Path, log: Callable[[str], None] = _silent) -> None:
         self._cache_folder = cache_folder
+        self._log = log
+
+    @property
+    def cache_folder(self) -> Path:
+        """Where the parts are kept."""
+        return self._cache_folder
 
     def hull(self, mesh: Mesh) -> Path:
         """Returns an .obj file with the convex hull of a mesh.
@@ -81,14 +93,14 @@ class ConvexParts:
         except OSError as error:
             raise DescriptionError(str(mesh.path), f"cannot be read ({error})", "give a readable mesh file") from error
         key = hashlib.sha256(content)
-        key.update(f"{mesh.scale}|{kind}|{_CACHE_VERSION}|{_CONCAVITY_THRESHOLD}".encode())
+        key.update(f"{mesh.scale}|{mesh.submesh}|{mesh.center}|{kind}|{_CACHE_VERSION}|{_CONCAVITY_THRESHOLD}".encode())
         folder = self._cache_folder / f"{mesh.path.stem}-{kind}-{key.hexdigest()[:20]}"
         if not folder.is_dir():
-            self._write_atomically(folder, self._make(mesh, kind))
+            parts = enumerate(self._make(mesh, kind))
+            write_folder(folder, {f"part_{index:03d}.obj": _obj_text(part).encode("ascii") for index, part in parts})
         return tuple(sorted(folder.glob("*.obj")))
 
-    @staticmethod
-    def _make(mesh: Mesh, kind: str) -> list[TriangleMesh]:
+    def _make(self, mesh: Mesh, kind: str) -> list[TriangleMesh]:
         import trimesh
 
         loaded = load_mesh(mesh)
@@ -102,25 +114,39 @@ class ConvexParts:
         filled = abs(solid.volume) / hull.volume if hull.volume > 0 else 1.0
         if kind == "hull" or filled > _CONVEX_VOLUME_SHARE:
             return [TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))]
+        self._log(
+            f"cutting {mesh.path} with {len(loaded.triangles):,} triangles into convex parts, which may take minutes; "
+            f"they are kept in {self._cache_folder}"
+        )
         return _decompose(loaded)
 
-    def _write_atomically(self, folder: Path, parts: list[TriangleMesh]) -> None:
-        self._cache_folder.mkdir(parents=True, exist_ok=True)
-        scratch = Path(tempfile.mkdtemp(dir=self._cache_folder))
-        try:
-            for index, part in enumerate(parts):
-                (scratch / f"part_{index:03d}.obj").write_text(_obj_text(part), encoding="ascii")
-            scratch.chmod(0o755)
-            scratch.rename(folder)
-        except OSError as error:
-            if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
-                raise DescriptionError(
-                    str(folder),
-                    f"cannot be written ({error.strerror})",
-                    "free space, or set ROS_HOME to a folder that has some",
-                ) from error
-        finally:
-            shutil.rmtree(scratch, ignore_errors=True)  # it is gone when all went well
+
+def write_folder(folder: Path, files: dict[str, bytes]) -> None:
+    """Makes a folder of the cache, whole or not at all.
+
+    Args:
+        folder: Its path; what is above it is made too.
+        files: Contents by name.
+
+    Raises:
+        DescriptionError: There is no room or no permission for it.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(dir=folder.parent))
+    try:
+        for name, content in files.items():
+            (scratch / name).write_bytes(content)
+        scratch.chmod(0o755)
+        scratch.rename(folder)
+    except OSError as error:
+        if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
+            raise DescriptionError(
+                str(folder),
+                f"cannot be written ({error.strerror})",
+                "free space, or set ROS_HOME to a folder that has some",
+            ) from error
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)  # it is gone when all went well
 
 
 def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:

@@ -1,102 +1,145 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the parts of an SDF link: shapes, friction and inertia."""
+"""Reads the shapes of an SDF link: what it touches with, and what of it is seen."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.materials import Material, script_material
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.sdf_frames import pose_of
+from modular_framework_simulation.models.sdf_frames import FrameTree
+from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.sdf_surface import read_bounce, read_friction, read_surface_contact
 from modular_framework_simulation.models.xml_nodes import XmlNode
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
 
-SUPPORTED_VERSIONS = ("1.4", "1.5", "1.6", "1.7")
-_GEOMETRIES = ("box", "cylinder", "sphere", "plane", "mesh")
+_GEOMETRIES = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
 _MESH_SUFFIXES = tuple(f".{kind}" for kind in MESH_FORMATS)
-_GREY = (0.7, 0.7, 0.7, 1.0)
 
 
-def read_collision(node: XmlNode, resources: Resources) -> specs.Collision:
-    """Reads a <collision>.
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What one model is read with.
+
+    Attributes:
+        resources: Where included models and meshes are found.
+        version: Of SDF, of the file.
+        notes: Takes what has no effect or is replaced.
+    """
+
+    resources: Resources
+    version: tuple[int, ...]
+    notes: Notes = field(default_factory=Notes)
+
+
+def read_collisions(node: XmlNode, link: str, frames: FrameTree, reading: Reading) -> list[specs.Collision]:
+    """Reads a <collision>: mostly one shape, none where it is empty, three for a capsule.
 
     Raises:
-        DescriptionError: Its shape, pose or friction cannot be used.
+        DescriptionError: Its shape, pose or surface cannot be used.
     """
-    return specs.Collision(
-        node.name(), _optional_pose(node), _read_geometry(node.require("geometry"), resources), _read_friction(node)
-    )
+    name = node.name()
+    friction, bounce, contact = read_friction(node), read_bounce(node), read_surface_contact(node)
+    pose = frames.pose_in_link(link, node.find("pose"))
+    return [
+        specs.Collision(name if not number else f"{name}_{number}", pose @ offset, shape, friction, bounce, contact)
+        for number, (offset, shape) in enumerate(_read_geometry(node.require("geometry"), reading.resources))
+    ]
 
 
-def read_visual(node: XmlNode, resources: Resources) -> specs.Visual:
-    """Reads a <visual>; material scripts of other programs are read over.
+def read_visuals(node: XmlNode, link: str, frames: FrameTree, reading: Reading) -> list[specs.Visual]:
+    """Reads a <visual>; one whose mesh or material is not there is left out, or grey, with a note.
 
     Raises:
         DescriptionError: Its shape, pose or colour cannot be used.
     """
-    colour_node = node.find_path("material", "diffuse") or node.find_path("material", "ambient")
-    colour = _GREY
-    if colour_node is not None:
-        red, green, blue, alpha = colour_node.numbers(4)
-        colour = (red, green, blue, alpha)
-    geometry = _read_geometry(node.require("geometry"), resources)
-    return specs.Visual(node.name(), _optional_pose(node), geometry, colour)
-
-
-def read_inertial(node: XmlNode) -> specs.Inertial:
-    """Reads an <inertial>; an inertia that is not given is that of a unit matrix, as SDF defines.
-
-    Raises:
-        DescriptionError: The mass is not positive, or no rigid body has such moments of inertia.
-    """
-    mass_node, inertia_node = node.find("mass"), node.find("inertia")
-    mass = mass_node.number() if mass_node is not None else 1.0
-    if mass <= 0:
-        raise DescriptionError((mass_node or node).where, f"got mass {mass:g} kg", "allowed: greater than 0")
-
-    def moment(tag: str, default: float) -> float:
-        child = inertia_node.find(tag) if inertia_node is not None else None
-        return child.number() if child is not None else default
-
-    ixx, iyy, izz = moment("ixx", 1.0), moment("iyy", 1.0), moment("izz", 1.0)
-    largest = max(ixx, iyy, izz)
-    if min(ixx, iyy, izz) <= 0 or 2 * largest > (ixx + iyy + izz) * (1 + 1e-6):
-        raise DescriptionError(
-            (inertia_node or node).where,
-            f"got moments ixx={ixx:g} iyy={iyy:g} izz={izz:g}",
-            "allowed: positive, and none greater than the sum of the other two",
+    name = node.name()
+    try:
+        shapes = _read_geometry(node.require("geometry"), reading.resources)
+    except MissingMeshError as error:
+        reading.notes.add(node, f"is not drawn: {error}")
+        return []
+    material = _read_material(node, reading)
+    transparency = node.find("transparency")
+    look = material or Material()
+    red, green, blue, alpha = look.colour
+    if transparency is not None:
+        alpha *= 1 - min(max(transparency.number(), 0.0), 1.0)
+    pose = frames.pose_in_link(link, node.find("pose"))
+    return [
+        specs.Visual(
+            name if not number else f"{name}_{number}",
+            pose @ offset,
+            shape,
+            (red, green, blue, alpha),
+            look.texture,
+            material is None and isinstance(shape, specs.Mesh),
         )
-    inertia = (ixx, moment("ixy", 0.0), moment("ixz", 0.0), iyy, moment("iyz", 0.0), izz)
-    return specs.Inertial(_optional_pose(node), mass, inertia)
+        for number, (offset, shape) in enumerate(shapes)
+    ]
 
 
-def _optional_pose(node: XmlNode) -> Pose:
-    pose = node.find("pose")
-    return pose_of(pose) if pose is not None else Pose()
+def _read_material(visual: XmlNode, reading: Reading) -> Material | None:
+    """Returns the material of a visual, None where it has none of its own."""
+    node = visual.find("material")
+    if node is None:
+        return None
+    script, colour_node = node.find("script"), node.find("diffuse") or node.find("ambient")
+    named: Material | None = None
+    if script is not None:
+        try:
+            named = script_material(script, reading.resources)
+        except DescriptionError as error:
+            reading.notes.add(script, f"{error.problem}: drawn grey ({error.allowed})")
+            named = Material()
+        if named.missing_texture:
+            reading.notes.add(script, f"the picture '{named.missing_texture}' is not there: drawn in a plain colour")
+    if colour_node is None:
+        return named
+    red, green, blue, *alpha = colour_node.number_list(3, 4)
+    colour = (red, green, blue, alpha[0] if alpha else 1.0)
+    return Material(colour, named.texture if named is not None else None)
 
 
-def _read_geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
-    shapes = [child for child in node.children if child.tag != "empty"]
-    if len(shapes) != 1 or shapes[0].tag not in _GEOMETRIES:
-        got = ", ".join(f"<{child.tag}>" for child in shapes) or "nothing"
+class MissingMeshError(DescriptionError):
+    """The file of a mesh is not there."""
+
+
+def _read_geometry(node: XmlNode, resources: Resources) -> list[tuple[Pose, specs.Geometry]]:
+    """Returns the shapes of a <geometry> with their poses in it."""
+    if node.find("empty") is not None and len(node.children) == 1:
+        return []
+    if len(node.children) != 1 or node.children[0].tag not in _GEOMETRIES:
+        got = ", ".join(f"<{child.tag}>" for child in node.children) or "nothing"
         raise DescriptionError(node.where, f"holds {got}", f"allowed: exactly one of {', '.join(_GEOMETRIES)}")
-    shape = shapes[0]
+    shape = node.children[0]
     match shape.tag:
         case "box":
             x, y, z = _sizes(shape.require("size"), 3)
-            return specs.Box((x, y, z))
+            return [(Pose(), specs.Box((x, y, z)))]
         case "cylinder":
-            return specs.Cylinder(_sizes(shape.require("radius"), 1)[0], _sizes(shape.require("length"), 1)[0])
+            radius, length = _sizes(shape.require("radius"), 1)[0], _sizes(shape.require("length"), 1)[0]
+            return [(Pose(), specs.Cylinder(radius, length))]
         case "sphere":
-            return specs.Sphere(_sizes(shape.require("radius"), 1)[0])
+            return [(Pose(), specs.Sphere(_sizes(shape.require("radius"), 1)[0]))]
+        case "capsule":
+            return _capsule(_sizes(shape.require("radius"), 1)[0], _sizes(shape.require("length"), 1)[0])
         case "plane":
-            return _read_plane(shape)
+            return [(Pose(), _read_plane(shape))]
         case "mesh":
-            return _read_mesh(shape, resources)
+            return [(Pose(), _read_mesh(shape, resources))]
     raise DescriptionError(shape.where, "is no known shape", f"allowed: {', '.join(_GEOMETRIES)}")
+
+
+def _capsule(radius: float, length: float) -> list[tuple[Pose, specs.Geometry]]:
+    """Returns a cylinder with a ball at both ends, which together are the capsule."""
+    ends = (Pose((0.0, 0.0, length / 2)), Pose((0.0, 0.0, -length / 2)))
+    return [(Pose(), specs.Cylinder(radius, length)), *((end, specs.Sphere(radius)) for end in ends)]
 
 
 def _read_plane(node: XmlNode) -> specs.Plane:
@@ -111,36 +154,22 @@ def _read_plane(node: XmlNode) -> specs.Plane:
 
 def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
     uri = node.require("uri")
-    path = resources.resolve(uri, uri.text.strip())
+    try:
+        path = resources.resolve(uri, uri.text.strip())
+    except DescriptionError as error:
+        raise MissingMeshError(error.where, error.problem, error.allowed) from error
     if path.suffix.lower() not in _MESH_SUFFIXES:
         raise DescriptionError(uri.where, f"got '{path.name}'", f"allowed: {', '.join(_MESH_SUFFIXES)}")
-    if node.find("submesh") is not None:
-        raise DescriptionError(node.where, "asks for a <submesh>", "allowed: whole meshes; split the file")
     scale = node.find("scale")
-    x, y, z = _positive(scale, 3) if scale is not None else (1.0, 1.0, 1.0)
-    return specs.Mesh(path, (x, y, z))
-
-
-def _read_friction(node: XmlNode) -> specs.Friction:
-    friction = node.find_path("surface", "friction")
-
-    def coefficient(*path: str) -> float | None:
-        child = friction.find_path(*path) if friction is not None else None
-        if child is None:
-            return None
-        value = child.number()
-        if value < 0:
-            raise DescriptionError(child.where, f"got {value:g}", "allowed: 0 or greater")
-        return value
-
-    lateral = coefficient("ode", "mu")
-    if lateral is None:
-        lateral = coefficient("bullet", "friction")
-    return specs.Friction(
-        1.0 if lateral is None else lateral,
-        coefficient("torsional", "coefficient"),
-        coefficient("bullet", "rolling_friction"),
-    )
+    x, y, z = scale.numbers(3) if scale is not None else (1.0, 1.0, 1.0)
+    if scale is not None and not all((x, y, z)):
+        raise DescriptionError(scale.where, f"got '{scale.text.strip()}'", "allowed: numbers other than 0")
+    submesh = node.find("submesh")
+    if submesh is None:
+        return specs.Mesh(path, (x, y, z))
+    center = submesh.find("center")
+    name = submesh.require("name").text.strip()
+    return specs.Mesh(path, (x, y, z), name, center.flag() if center is not None else False)
 
 
 def _positive(node: XmlNode, count: int) -> tuple[float, ...]:

@@ -4,15 +4,40 @@
 from __future__ import annotations
 
 import math
+from enum import Enum
+from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.materials import Material
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_inertial import usable
+from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.sdf_shapes import MissingMeshError
+from modular_framework_simulation.models.urdf_extensions import UrdfExtensions
 from modular_framework_simulation.models.xml_nodes import XmlNode, parse_numbers, parse_xml
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.rotations import Vector3
 
 _GEOMETRIES = ("box", "cylinder", "sphere", "mesh")
+_READ = ("link", "joint", "gazebo", "material")
+_WEIGHTLESS = specs.Inertial(Pose(), 1e-5, (1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9))
+"""Of a link without mass properties: small enough to be of no account, and not 0, which the engine cannot take."""
+
+
+class _Type(Enum):
+    """The joints of URDF that are simulated."""
+
+    FIXED = "fixed"
+    REVOLUTE = "revolute"
+    CONTINUOUS = "continuous"
+    PRISMATIC = "prismatic"
+
+    @property
+    def spec(self) -> specs.JointType:
+        """The same in our words."""
+        return specs.JointType(self.value)
 
 
 def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model:
@@ -36,26 +61,49 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     nodes = [link for link in root.find_all("link") if link.name() != "world"]
     if not nodes:
         raise DescriptionError(root.where, "has no <link>", "an object needs at least one besides 'world'")
-    frictions = _frictions(root)
-    links = tuple(_read_link(node, parents, frictions, resources) for node in nodes)
-    known = [link.name for link in links] + ["world"]
-    joints = tuple(_read_joint(joint, known) for joint in joint_nodes)
+    notes = Notes()
+    extensions = UrdfExtensions(root, notes)
+    for child in root.children:
+        if child.tag not in _READ:
+            notes.add(child, "has no effect here", child.tag)
+    colours = _named_colours(root)
+    links = tuple(_read_link(node, parents, extensions, resources, colours, notes) for node in nodes)
+    known = [link.name for link in links] + [specs.WORLD]
+    joints = tuple(_read_joint(joint, known, extensions, notes) for joint in joint_nodes)
+    _refuse_two_parents(joint_nodes)
     fastened = all(each.kind is specs.JointType.FIXED for each in joints) and any(j.parent == "world" for j in joints)
-    static = fastened or any(child.text.strip() == "true" for child in _gazebo_tags(root, "static"))
-    return specs.Model(root.name(), Pose(), static, links, joints, source)
+    static = fastened or extensions.flag("", "static") is True
+    self_collide = extensions.flag("", "self_collide", "selfCollide") is True
+    return specs.Model(root.name(), Pose(), static, links, joints, source, self_collide, notes.lines)
 
 
-def _gazebo_tags(root: XmlNode, tag: str) -> list[XmlNode]:
-    return [child for extension in root.find_all("gazebo") for child in extension.find_all(tag)]
+def _refuse_two_parents(joints: list[XmlNode]) -> None:
+    seen: set[str] = set()
+    for joint in joints:
+        child = _role(joint, "child")
+        if child in seen:
+            raise DescriptionError(joint.where, f"gives link '{child}' a second parent", "allowed: trees")
+        seen.add(child)
 
 
-def _frictions(root: XmlNode) -> dict[str, specs.Friction]:
-    frictions = {}
-    for extension in root.find_all("gazebo"):
-        mu = extension.find("mu1")
-        if mu is not None and "reference" in extension.attributes:
-            frictions[extension.attributes["reference"]] = specs.Friction(max(0.0, mu.number()))
-    return frictions
+def _named_colours(root: XmlNode) -> dict[str, specs.Colour]:
+    """Returns the colours of the materials that stand in the description, by name."""
+    every = root.find_all("material") + [
+        material
+        for link in root.find_all("link")
+        for visual in link.find_all("visual")
+        for material in visual.find_all("material")
+    ]
+    return {
+        material.attributes["name"]: _colour(colour)
+        for material in every
+        if material.attributes.get("name") and (colour := material.find("color")) is not None
+    }
+
+
+def _colour(node: XmlNode) -> specs.Colour:
+    red, green, blue, alpha = parse_numbers(node.where, node.attributes.get("rgba", ""), 4)
+    return (red, green, blue, alpha)
 
 
 def _role(joint: XmlNode, role: str) -> str:
@@ -81,31 +129,74 @@ def _origin(node: XmlNode) -> Pose:
 
 
 def _read_link(
-    node: XmlNode, parents: dict[str, XmlNode], frictions: dict[str, specs.Friction], resources: Resources
+    node: XmlNode,
+    parents: dict[str, XmlNode],
+    extensions: UrdfExtensions,
+    resources: Resources,
+    colours: dict[str, specs.Colour],
+    notes: Notes,
 ) -> specs.Link:
-    friction = frictions.get(node.name(), specs.Friction())
+    name = node.name()
+    friction, contact = extensions.friction(name), extensions.contact(name)
     collisions = tuple(
         specs.Collision(
-            child.attributes.get("name", f"{node.name()}_collision_{number}"),
+            child.attributes.get("name", f"{name}_collision_{number}"),
             _origin(child),
             _geometry(child.require("geometry"), resources),
             friction,
+            contact=contact,
         )
         for number, child in enumerate(node.find_all("collision"))
     )
+    visuals = []
+    for number, child in enumerate(node.find_all("visual")):
+        try:
+            shape = _geometry(child.require("geometry"), resources)
+        except MissingMeshError as error:
+            notes.add(child, f"is not drawn: {error}")
+            continue
+        visuals.append(_visual(child, f"{name}_visual_{number}", shape, extensions.material(name), colours))
     inertial = node.find("inertial")
-    spec = _inertial(inertial) if inertial is not None else None
-    return specs.Link(node.name(), _pose_in_root(node.name(), parents), spec, collisions, ())
+    if inertial is None:
+        notes.add(node, "has no <inertial>: it is a frame that weighs next to nothing")
+    return specs.Link(
+        name,
+        _pose_in_root(name, parents),
+        _inertial(inertial, collisions, notes) if inertial is not None else _WEIGHTLESS,
+        collisions,
+        tuple(visuals),
+        extensions.velocity_decay(name),
+        extensions.gravity(name),
+        extensions.flag(name, "kinematic") is True,
+        extensions.flag(name, "selfCollide"),
+    )
 
 
-def _inertial(node: XmlNode) -> specs.Inertial:
+def _visual(
+    node: XmlNode, name: str, shape: specs.Geometry, replaced: Material | None, colours: dict[str, specs.Colour]
+) -> specs.Visual:
+    """Reads a <visual>; a material of Gazebo replaces its own."""
+    material = node.find("material")
+    colour: specs.Colour | None = None
+    if replaced is not None:
+        colour = replaced.colour
+    elif material is not None:
+        own = material.find("color")
+        colour = _colour(own) if own is not None else colours.get(material.attributes.get("name", ""))
+    drawn_by_file = colour is None and isinstance(shape, specs.Mesh)
+    return specs.Visual(
+        node.attributes.get("name", name), _origin(node), shape, colour or specs.GREY, own_materials=drawn_by_file
+    )
+
+
+def _inertial(node: XmlNode, collisions: tuple[specs.Collision, ...], notes: Notes) -> specs.Inertial:
     mass_node, inertia = node.require("mass"), node.require("inertia")
     mass = parse_numbers(mass_node.where, mass_node.attributes.get("value", ""), 1)[0]
     if mass <= 0:
         raise DescriptionError(mass_node.where, f"got mass {mass:g} kg", "allowed: greater than 0")
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     xx, xy, xz, yy, yz, zz = (parse_numbers(inertia.where, inertia.attributes.get(each, "0"), 1)[0] for each in names)
-    return specs.Inertial(_origin(node), mass, (xx, xy, xz, yy, yz, zz))
+    return usable(specs.Inertial(_origin(node), mass, (xx, xy, xz, yy, yz, zz)), collisions, inertia, notes)
 
 
 def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
@@ -113,9 +204,11 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
 
     def lengths(attribute: str, count: int, default: str = "") -> tuple[float, ...]:
         values = parse_numbers(shape.where, shape.attributes.get(attribute, default), count)
+        if attribute == "scale" and all(values):
+            return values
         if min(values) <= 0:
             raise DescriptionError(shape.where, f"got {attribute}='{values}'", "allowed: greater than 0")
-        if attribute != "scale" and max(values) > LARGEST_LENGTH_M:
+        if max(values) > LARGEST_LENGTH_M:
             problem = f"got {attribute}='{shape.attributes.get(attribute)}'"
             raise DescriptionError(shape.where, problem, f"allowed: at most {LARGEST_LENGTH_M:g} m")
         return values
@@ -130,21 +223,55 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
             return specs.Sphere(lengths("radius", 1)[0])
         case "mesh":
             x, y, z = lengths("scale", 3, "1 1 1")
-            return specs.Mesh(resources.resolve(shape, shape.attributes.get("filename", "")), (x, y, z))
+            return specs.Mesh(_mesh_file(shape, resources), (x, y, z))
     raise DescriptionError(node.where, f"holds <{shape.tag}>", f"allowed: one of {', '.join(_GEOMETRIES)}")
 
 
-def _read_joint(node: XmlNode, links: list[str]) -> specs.Joint:
-    kind = node.choice("type", specs.JointType, "joint type")
+def _mesh_file(shape: XmlNode, resources: Resources) -> Path:
+    try:
+        return resources.resolve(shape, shape.attributes.get("filename", ""))
+    except DescriptionError as error:
+        raise MissingMeshError(error.where, error.problem, error.allowed) from error
+
+
+def _read_joint(node: XmlNode, links: list[str], extensions: UrdfExtensions, notes: Notes) -> specs.Joint:
+    kind = node.choice("type", _Type, "joint type").spec
     for role in ("parent", "child"):
         if _role(node, role) not in links:
             raise DescriptionError(node.where, f"{role} '{_role(node, role)}' is no link", f"allowed: {links}")
-    axis, limit = node.find("axis"), node.find("limit")
-    x, y, z = parse_numbers(node.where, axis.attributes.get("xyz", "1 0 0"), 3) if axis is not None else (1.0, 0.0, 0.0)
+    if (mimic := node.find("mimic")) is not None:
+        notes.add(mimic, "has no effect here, as in Gazebo: the joint moves by itself")
+    limit, dynamics = node.find("limit"), node.find("dynamics")
     bounds = (-math.inf, math.inf)
-    if limit is not None:
-        lower, upper = (parse_numbers(limit.where, limit.attributes.get(key, "0"), 1)[0] for key in ("lower", "upper"))
-        bounds = (lower, upper)
+    if limit is not None and kind in (specs.JointType.REVOLUTE, specs.JointType.PRISMATIC):
+        bounds = (_number(limit, "lower", 0.0), _number(limit, "upper", 0.0))
+        if bounds[0] > bounds[1]:
+            problem = f"got lower {bounds[0]:g} and upper {bounds[1]:g}"
+            raise DescriptionError(limit.where, problem, "allowed: a lower one below the upper")
     return specs.Joint(
-        node.name(), kind, _role(node, "parent"), _role(node, "child"), Pose(), (x, y, z), bounds[0], bounds[1]
+        node.name(),
+        kind,
+        _role(node, "parent"),
+        _role(node, "child"),
+        Pose(),
+        _axis(node),
+        *bounds,
+        _number(limit, "effort", math.inf),
+        _number(limit, "velocity", math.inf),
+        extensions.dynamics(node.name(), _number(dynamics, "damping", 0.0), _number(dynamics, "friction", 0.0)),
     )
+
+
+def _axis(node: XmlNode) -> Vector3:
+    axis = node.find("axis")
+    x, y, z = parse_numbers(axis.where, axis.attributes.get("xyz", "1 0 0"), 3) if axis is not None else (1.0, 0.0, 0.0)
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < 1e-9:
+        raise DescriptionError((axis or node).where, "got an axis of length 0", "expected a direction")
+    return (x / length, y / length, z / length)
+
+
+def _number(node: XmlNode | None, attribute: str, default: float) -> float:
+    if node is None or attribute not in node.attributes:
+        return default
+    return parse_numbers(node.where, node.attributes[attribute], 1)[0]

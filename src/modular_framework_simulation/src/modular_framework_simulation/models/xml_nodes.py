@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -13,6 +14,9 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_urdf import xml_text
 
 Choice = TypeVar("Choice", bound=Enum)
+
+_LATE_DECLARATION = re.compile(r"(?:\s|<!--(?:(?!-->).)*-->)+(<\?xml\b[^>]*\?>)", re.DOTALL)
+_ENCODING = re.compile(rb"""^\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 
 
 @dataclass(slots=True)
@@ -88,6 +92,15 @@ class XmlNode:
         """
         return parse_numbers(self.where, self.text, count)
 
+    def number_list(self, least: int, most: int) -> tuple[float, ...]:
+        """Returns the text as finite numbers, as many as there are within two bounds.
+
+        Raises:
+            DescriptionError: Another count, or something that is not a finite number.
+        """
+        count = min(max(len(self.text.split()), least), most)
+        return parse_numbers(self.where, self.text, count)
+
     def number(self) -> float:
         """Returns the text as one finite number."""
         return self.numbers(1)[0]
@@ -154,9 +167,21 @@ def parse_xml(text: str, source: str) -> XmlNode:
         DescriptionError: The text is not well-formed XML, or has a DOCTYPE.
     """
     try:
-        return _node(xml_text.parse(text, source), source)
+        return _node(xml_text.parse(_begun_properly(text), source), source)
     except xml_text.XmlError as error:
         raise DescriptionError(error.where, error.found, error.allowed) from error
+
+
+def _begun_properly(text: str) -> str:
+    """Returns a document without a byte order mark, and without a declaration behind empty lines or comments.
+
+    Gazebo reads both; the numbers of the lines stay as they are.
+    """
+    text = text.removeprefix("\ufeff")
+    late = _LATE_DECLARATION.match(text)
+    if late is None:
+        return text
+    return text[: late.start(1)] + "\n" * late.group(1).count("\n") + text[late.end(1) :]
 
 
 def _node(element: xml_text.Element, source: str) -> XmlNode:
@@ -172,7 +197,15 @@ def read_xml(path: Path) -> XmlNode:
         DescriptionError: It cannot be read or is not well-formed XML.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DescriptionError(str(path), f"cannot be read ({error})", "give a readable UTF-8 XML file") from error
+        text = _decoded(path.read_bytes())
+    except (OSError, UnicodeDecodeError, LookupError) as error:
+        raise DescriptionError(str(path), f"cannot be read ({error})", "give a readable XML file") from error
     return parse_xml(text, str(path))
+
+
+def _decoded(content: bytes) -> str:
+    """Returns the text of a file, in the encoding that its first bytes or its declaration name; UTF-8 without."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16")
+    declared = _ENCODING.match(content)
+    return content.decode(declared.group(1).decode("ascii") if declared is not None else "utf-8")

@@ -7,15 +7,21 @@ function interface does not. A static model becomes one link that carries the sh
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
 from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.joint_trees import JointTree, joint_trees
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_urdf.rotations import rpy_from_quaternion
+
+_FARTHEST = 1e3
+"""Stands for no limit on one side of a joint, and for a slide without limits [rad or m]."""
 
 STATIC_LINK = "static"
 """Name of the one link of a static model in the written URDF."""
@@ -28,12 +34,16 @@ class BodyUrdf:
     Attributes:
         text: The URDF.
         root_in_model: Pose of the URDF's root link in the model frame.
-        inertia_from_file: Whether the description gives inertias; otherwise the engine computes them from the shapes.
+        fixed: Whether the root link is fastened to the world.
+        frame_in_link: Pose of the URDF's frame of each link in the link's own frame.
+        further: The other trees of a model whose joints do not connect all its links.
     """
 
     text: str
     root_in_model: Pose
-    inertia_from_file: bool
+    fixed: bool
+    frame_in_link: dict[str, Pose]
+    further: tuple[BodyUrdf, ...] = ()
 
 
 def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: bool) -> BodyUrdf:
@@ -51,29 +61,32 @@ def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: b
     if model.static:
         shapes = [writer.shapes(link, link.pose, exact=True) for link in model.links]
         body = f'<link name="{STATIC_LINK}">{"".join(shapes)}</link>'
-        return BodyUrdf(_robot(model.name, [body]), Pose(), True)
+        return BodyUrdf(_robot(model.name, [body]), Pose(), True, {})
+    first, *further = [_tree_to_urdf(model, tree, writer) for tree in joint_trees(model)]
+    return dataclasses.replace(first, further=tuple(further))
+
+
+def _tree_to_urdf(model: specs.Model, tree: JointTree, writer: _Writer) -> BodyUrdf:
     # URDF puts a link's frame at the joint above it, SDF anywhere; `frame_in_link` is the transform between the two.
-    joints = [joint for joint in model.joints if joint.parent != "world"]
-    frame_in_link = {link.name: Pose() for link in model.links}
-    frame_in_link.update({joint.child: joint.pose for joint in joints})
-    poses = {link.name: link.pose for link in model.links}
-    parts = [
-        f"<link name={quoteattr(link.name)}>{writer.inertial(link, frame_in_link[link.name].inverse())}"
-        f"{writer.shapes(link, frame_in_link[link.name].inverse(), exact=False)}</link>"
-        for link in model.links
-    ]
-    for joint in joints:
+    frame_in_link = {name: Pose() for name in (specs.WORLD, *tree.links)}
+    frame_in_link.update({joint.child: joint.pose for joint in tree.joints})
+    poses = {link.name: link.pose for link in model.links} | {specs.WORLD: Pose()}
+    links = {link.name: link for link in model.links}
+    parts = [f"<link name={quoteattr(specs.WORLD)}/>"] if tree.root == specs.WORLD else []
+    for name in tree.links:
+        shift = frame_in_link[name].inverse()
+        inertial, shapes = writer.inertial(links[name], shift), writer.shapes(links[name], shift, exact=False)
+        parts.append(f"<link name={quoteattr(name)}>{inertial}{shapes}</link>")
+    for joint in tree.joints:
         parent_frame = poses[joint.parent] @ frame_in_link[joint.parent]
         parts.append(_joint(joint, parent_frame.inverse() @ poses[joint.child] @ joint.pose))
-    children = {joint.child for joint in joints}
-    root = next(link for link in model.links if link.name not in children)
-    has_inertia = all(link.inertial is not None for link in model.links)
-    return BodyUrdf(_robot(model.name, parts), root.pose, has_inertia)
+    return BodyUrdf(_robot(model.name, parts), poses[tree.root], tree.root == specs.WORLD, frame_in_link)
 
 
 class _Writer:
     def __init__(self, convex_parts: ConvexParts, with_visuals: bool) -> None:
         self._convex_parts = convex_parts
+        self._visual_meshes = VisualMeshes(convex_parts.cache_folder)
         self._with_visuals = with_visuals
 
     def shapes(self, link: specs.Link, shift: Pose, exact: bool) -> str:
@@ -84,14 +97,20 @@ class _Writer:
                 text += f"<collision{attributes}>{_origin(shift @ collision.pose)}{geometry}</collision>"
         if self._with_visuals:
             for number, visual in enumerate(link.visuals):
-                colour = " ".join(f"{value:g}" for value in visual.colour)
-                material = f'<material name={quoteattr(f"{link.name}_{number}")}><color rgba="{colour}"/></material>'
-                text += f"<visual>{_origin(shift @ visual.pose)}{_geometry(visual.geometry)}{material}</visual>"
+                for part, (geometry, colour) in enumerate(self._visual_geometries(visual)):
+                    rgba = " ".join(f"{value:g}" for value in colour)
+                    material = f'<material name={quoteattr(f"{link.name}_{number}_{part}")}><color rgba="{rgba}"/>'
+                    text += f"<visual>{_origin(shift @ visual.pose)}{geometry}{material}</material></visual>"
         return text
+
+    def _visual_geometries(self, visual: specs.Visual) -> Iterable[tuple[str, specs.Colour]]:
+        if visual.texture is not None or isinstance(visual.geometry, specs.Mesh | specs.Plane):
+            return [(_mesh_file(str(part.file)), part.colour) for part in self._visual_meshes.parts(visual)]
+        return [(_geometry(visual.geometry), visual.colour)]
 
     def inertial(self, link: specs.Link, shift: Pose) -> str:
         """Writes the mass properties of a link."""
-        inertial = link.inertial or specs.Inertial(Pose(), 1.0, (1e-3, 0, 0, 1e-3, 0, 1e-3))
+        inertial = link.inertial or specs.Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
         names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         moments = " ".join(f'{name}="{value!r}"' for name, value in zip(names, inertial.inertia, strict=True))
         return (
@@ -112,13 +131,13 @@ def _robot(name: str, parts: list[str]) -> str:
 
 
 def _joint(joint: specs.Joint, pose_in_parent: Pose) -> str:
-    kind, limit = joint.kind.value, ""
+    kind, limit = "spherical" if joint.kind is specs.JointType.BALL else joint.kind.value, ""
     if joint.kind in (specs.JointType.REVOLUTE, specs.JointType.PRISMATIC):
         lower, upper = joint.lower, joint.upper
-        if kind == "revolute" and not (math.isfinite(lower) and math.isfinite(upper)):
+        if kind == "revolute" and not (math.isfinite(lower) or math.isfinite(upper)):
             kind = "continuous"
         else:
-            bounds = (max(lower, -1e3), min(upper, 1e3))
+            bounds = (max(lower, -_FARTHEST), min(upper, _FARTHEST))
             limit = f'<limit lower="{bounds[0]!r}" upper="{bounds[1]!r}" effort="0" velocity="100"/>'
     axis = " ".join(repr(value) for value in joint.axis)
     return (

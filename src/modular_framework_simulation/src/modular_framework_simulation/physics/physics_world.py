@@ -63,6 +63,8 @@ class PhysicsWorld:
         self.gravity = gravity
         self.engine = PhysicsEngine(settings, gravity, gui, log)
         self._convex_parts = convex_parts
+        self._log = log
+        self._noted: set[tuple[str, ...]] = set()
         self._bodies: dict[str, SimulatedBody] = {}
         self._names_by_number: dict[int, str] = {}
         self._initial_poses: dict[str, Pose] = {}
@@ -127,11 +129,16 @@ class PhysicsWorld:
             raise DuplicateModelError(model.name)
         api = self.engine.api
         written = prepared if prepared is not None else self.prepare(model)
-        flags = api.URDF_USE_INERTIA_FROM_FILE if written.inertia_from_file else 0
-        fixed = model.static or any(joint.parent == "world" for joint in model.joints)
-        number = self.engine.load_urdf(written.text, model.name, fixed, flags)
-        body = SimulatedBody(self.engine, number, model.name, written.root_in_model, model.static, model)
-        self._set_surfaces(body, model)
+        if model.notes and model.notes not in self._noted:
+            self._noted.add(model.notes)
+            self._log(f"model '{model.name}': {'; '.join(model.notes)}")
+        parts = []
+        for tree in (written, *written.further):
+            number = self.engine.load_urdf(tree.text, model.name, tree.fixed, api.URDF_USE_INERTIA_FROM_FILE)
+            parts.append(SimulatedBody(self.engine, number, model.name, tree, model.static, model))
+            self._set_surfaces(parts[-1], model)
+        body = parts[0]
+        body.further = tuple(parts[1:])
         self.add(body, model.pose)
         if keep:
             self._initial.append((model, written))
@@ -141,11 +148,11 @@ class PhysicsWorld:
         """Adds a body that is already in the engine, at a pose in the world frame."""
         if body.name in self._bodies:
             raise DuplicateModelError(body.name)
-        body.set_state(BodyState(pose_in_world, Twist()))
+        body.put_together(pose_in_world)
         self._bodies[body.name] = body
         self._last_instance += 1
         self._instances[body.name] = self._last_instance
-        self._names_by_number[body.number] = body.name
+        self._names_by_number.update({part.number: body.name for part in body.parts})
         self._initial_poses[body.name] = pose_in_world
         self.revision += 1
 
@@ -156,8 +163,10 @@ class PhysicsWorld:
             UnknownEntityError: There is no such model.
         """
         body = self.body(name)
-        self.engine.api.removeBody(body.number, physicsClientId=self.engine.client)
-        del self._bodies[name], self._names_by_number[body.number], self._initial_poses[name]
+        for part in body.parts:
+            self.engine.api.removeBody(part.number, physicsClientId=self.engine.client)
+            del self._names_by_number[part.number]
+        del self._bodies[name], self._initial_poses[name]
         self.revision += 1
 
     def entity_state(self, entity: str) -> BodyState:
@@ -170,9 +179,12 @@ class PhysicsWorld:
             return BodyState(Pose(), Twist())
         if entity in self._bodies:
             return self._bodies[entity].state()
-        model, separator, link = entity.rpartition(SCOPE)
-        if separator:
-            return self.body(model).link_state(link)
+        model, separator, link = entity.partition(SCOPE)
+        while separator:  # a link of an inner model has the separator in its name, and so may the name of a model
+            if model in self._bodies:
+                return self._bodies[model].link_state(link)
+            following, separator, link = link.partition(SCOPE)
+            model += SCOPE + following
         raise UnknownEntityError("model", entity, self.names())
 
     def state_relative_to(self, entity: str, reference: str) -> BodyState:
@@ -234,7 +246,7 @@ class PhysicsWorld:
         for name, body in self._bodies.items():
             if body.spec is not None:
                 body.reset_joints({})
-                body.set_state(BodyState(self._initial_poses[name], Twist()))
+                body.put_together(self._initial_poses[name])
         self.revision += 1
 
     def instance(self, name: str) -> int:
@@ -286,8 +298,19 @@ class PhysicsWorld:
                 collisionMargin=0.0,
                 physicsClientId=self.engine.client,
             )
+        # Joints of models are free: the engine would otherwise brake them with a motor of its own.
+        for index in body.ball_joint_indices:
+            self.engine.api.setJointMotorControlMultiDof(
+                body.number,
+                index,
+                self.engine.api.POSITION_CONTROL,
+                targetPosition=[0.0, 0.0, 0.0, 1.0],
+                positionGain=0.0,
+                velocityGain=0.0,
+                force=[0.0, 0.0, 0.0],
+                physicsClientId=self.engine.client,
+            )
         for index in body.joint_indices.values():
-            # Joints of models are free: the engine would otherwise brake them with a motor of its own.
             self.engine.api.setJointMotorControl2(
                 body.number, index, self.engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=self.engine.client
             )

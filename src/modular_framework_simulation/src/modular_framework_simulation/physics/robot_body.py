@@ -126,7 +126,7 @@ class RobotBody:
         api = self.world.engine.api
         flags = api.URDF_USE_INERTIA_FROM_FILE | api.URDF_USE_SELF_COLLISION
         number = self.world.engine.load_urdf(self.description.engine_urdf, self._name, True, flags)
-        self.body = SimulatedBody(self.world.engine, number, self._name, Pose(), True, None)
+        self.body = SimulatedBody(self.world.engine, number, self._name, None, True, None)
 
     def _set_up(self) -> None:
         self._limit_self_collisions()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from modular_framework_simulation.errors import UnknownEntityError
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import Model
+from modular_framework_simulation.physics.body_urdf import BodyUrdf
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX, PhysicsEngine
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
@@ -45,9 +46,12 @@ class SimulatedBody:
         engine: Where it lives.
         number: The engine's number of the body.
         name: Instance name.
-        root_in_model: Pose of the engine's root link in the model frame.
+        tree: How the engine has its links; None for a robot.
         static: Whether it never moves.
         spec: The model's description; None for a robot.
+
+    Attributes:
+        further: The other trees of a model whose joints do not connect all its links.
     """
 
     def __init__(
@@ -55,15 +59,18 @@ class SimulatedBody:
         engine: PhysicsEngine,
         number: int,
         name: str,
-        root_in_model: Pose,
+        tree: BodyUrdf | None,
         static: bool,
         spec: Model | None,
     ) -> None:
         self.number, self.name = number, name
         self.static, self.spec = static, spec
         self._engine = engine
-        self._root_in_model = root_in_model
-        self._model_in_root = root_in_model.inverse()
+        self.further: tuple[SimulatedBody, ...] = ()
+        self._root_in_model = tree.root_in_model if tree is not None else Pose()
+        self._model_in_root = self._root_in_model.inverse()
+        frames = tree.frame_in_link if tree is not None else {}
+        self._link_in_frame = {link: frame.inverse() for link, frame in frames.items()}
         api, client = engine.api, engine.client
         root_name = api.getBodyInfo(number, physicsClientId=client)[0].decode()
         infos = engine.joint_infos(number)
@@ -72,9 +79,19 @@ class SimulatedBody:
         self.joint_indices: dict[str, int] = {
             info[1].decode(): info[0] for info in infos if info[2] in (api.JOINT_REVOLUTE, api.JOINT_PRISMATIC)
         }
+        self.ball_joint_indices = tuple(info[0] for info in infos if info[2] == api.JOINT_SPHERICAL)
         dynamics = api.getDynamicsInfo(number, BASE_INDEX, physicsClientId=client)
         self._centre_in_root = Pose(tuple(dynamics[3]), tuple(dynamics[4]))
         self._root_in_centre = self._centre_in_root.inverse()
+
+    @property
+    def parts(self) -> tuple[SimulatedBody, ...]:
+        """All trees of the model, this one first."""
+        return (self, *self.further)
+
+    def part_of(self, link: str) -> SimulatedBody:
+        """Returns the tree that a link of the model belongs to; this one where there is no such link."""
+        return next((part for part in self.parts if link in part.link_indices), self)
 
     def link_names(self) -> list[str]:
         """Returns the names of the links as its description has them."""
@@ -99,6 +116,8 @@ class SimulatedBody:
                 if each.name == link:
                     return BodyState(self.state().pose @ each.pose, Twist())
         index = self.link_indices.get(link)
+        if index is None and (part := self.part_of(link)) is not self:
+            return part.link_state(link)
         if index is None:
             raise UnknownEntityError("link", f"{self.name}::{link}", [f"{self.name}::{n}" for n in self.link_names()])
         if index == BASE_INDEX:
@@ -108,15 +127,19 @@ class SimulatedBody:
         api, client = self._engine.api, self._engine.client
         record = api.getLinkState(self.number, index, 1, 1, physicsClientId=client)
         centre_in_world, twist = Pose(record[0], record[1]), Twist(record[6], record[7])
-        link_in_world = Pose(record[4], record[5]) @ self._sdf_frame_in_urdf_frame(link)
+        link_in_world = Pose(record[4], record[5]) @ self._link_in_frame.get(link, Pose())
         return BodyState(link_in_world, _twist_at(twist, centre_in_world, link_in_world))
 
     def set_state(self, state: BodyState) -> None:
-        """Puts the model somewhere; its joints keep their positions.
+        """Puts the model somewhere as one rigid body; its joints keep their positions.
 
         Args:
             state: Of the model frame, in the world frame.
         """
+        model_in_world = self.state().pose if self.further else Pose()
+        for part in self.further:
+            part_in_world = state.pose @ model_in_world.inverse() @ part.state().pose
+            part.set_state(BodyState(part_in_world, _twist_at(state.twist, state.pose, part_in_world)))
         api, client = self._engine.api, self._engine.client
         centre_in_world = state.pose @ self._root_in_model @ self._centre_in_root
         api.resetBasePositionAndOrientation(
@@ -126,6 +149,16 @@ class SimulatedBody:
             twist = _twist_at(state.twist, state.pose, centre_in_world)
             api.resetBaseVelocity(self.number, twist.linear, twist.angular, physicsClientId=client)
 
+    def put_together(self, pose: Pose) -> None:
+        """Puts the model somewhere at rest, with its trees where its description has them.
+
+        Args:
+            pose: Of the model frame, in the world frame.
+        """
+        for part in self.further:
+            part.set_state(BodyState(self.state().pose, Twist()))
+        self.set_state(BodyState(pose, Twist()))
+
     def set_joints(self, positions: dict[str, float]) -> None:
         """Puts joints at positions [rad or m], at rest; joints that are not named stay.
 
@@ -133,15 +166,22 @@ class SimulatedBody:
             UnknownEntityError: The model has no such movable joint.
         """
         api, client = self._engine.api, self._engine.client
-        unknown = sorted(set(positions) - set(self.joint_indices))
+        owners = {name: part for part in self.parts for name in part.joint_indices}
+        unknown = sorted(set(positions) - set(owners))
         if unknown:
-            raise UnknownEntityError("joint", f"{self.name}::{unknown[0]}", list(self.joint_indices))
+            raise UnknownEntityError("joint", f"{self.name}::{unknown[0]}", list(owners))
         for name, position in positions.items():
-            api.resetJointState(self.number, self.joint_indices[name], position, 0.0, physicsClientId=client)
+            index = owners[name].joint_indices[name]
+            api.resetJointState(owners[name].number, index, position, 0.0, physicsClientId=client)
 
     def reset_joints(self, positions: dict[str, float]) -> None:
         """Puts joints at positions [rad or m], at rest; joints that are not named go to 0."""
-        self.set_joints({name: positions.get(name, 0.0) for name in self.joint_indices})
+        self.set_joints({name: positions.get(name, 0.0) for part in self.parts for name in part.joint_indices})
+        for part in self.parts:
+            for index in part.ball_joint_indices:
+                self._engine.api.resetJointStateMultiDof(
+                    part.number, index, [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0], physicsClientId=self._engine.client
+                )
 
     def _centre_state(self) -> tuple[Pose, Twist]:
         """Returns pose and velocity of the root link's centre of mass, in the world frame."""
@@ -151,13 +191,6 @@ class SimulatedBody:
             return Pose(position, quaternion), Twist()
         linear, angular = api.getBaseVelocity(self.number, physicsClientId=client)
         return Pose(position, quaternion), Twist(linear, angular)
-
-    def _sdf_frame_in_urdf_frame(self, link: str) -> Pose:
-        if self.spec is not None:
-            for joint in self.spec.joints:
-                if joint.child == link and joint.parent != "world":
-                    return joint.pose.inverse()
-        return Pose()
 
 
 def _twist_at(twist: Twist, from_in_world: Pose, to_in_world: Pose) -> Twist:

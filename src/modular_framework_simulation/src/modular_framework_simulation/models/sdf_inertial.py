@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the mass properties of an SDF link."""
+
+from __future__ import annotations
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_frames import FrameTree
+from modular_framework_simulation.models.sdf_notes import Notes
+from modular_framework_simulation.models.sdf_surface import non_negative
+from modular_framework_simulation.models.solid_inertia import inertial_of_shapes, principal_moments, with_mass
+from modular_framework_simulation.models.xml_nodes import XmlNode
+
+WATER_KG_PER_M3 = 1000.0
+"""SDF's default density of shapes whose inertia is computed."""
+
+_DEFAULT_MASS_KG, _DEFAULT_MOMENT = 1.0, 1.0
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_ROUNDING = 1e-3
+"""Share by which moments that were rounded when written may break the triangle inequality."""
+
+
+def read_inertial(
+    link: XmlNode, frames: FrameTree, collisions: tuple[specs.Collision, ...], notes: Notes
+) -> specs.Inertial:
+    """Reads the <inertial> of a link that can move; what is not given has SDF's defaults.
+
+    Args:
+        link: The <link>.
+        frames: Of its model.
+        collisions: Its shapes, from which moments that are zero are computed.
+        notes: Takes what was replaced.
+
+    Raises:
+        DescriptionError: The mass is not positive.
+    """
+    node = link.find("inertial")
+    if node is None:
+        notes.add(link, f"has no <inertial>: {_DEFAULT_MASS_KG:g} kg and {_DEFAULT_MOMENT:g} kg m^2, as SDF defines")
+        return specs.Inertial(frames.pose_in_link(link.name(), None), _DEFAULT_MASS_KG, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
+    if node.attributes.get("auto", "false").strip().lower() in ("true", "1"):
+        return _computed(node, link, collisions)
+    mass_node, inertia_node = node.find("mass"), node.find("inertia")
+    mass = mass_node.number() if mass_node is not None else _DEFAULT_MASS_KG
+    if mass <= 0:
+        raise DescriptionError((mass_node or node).where, f"got mass {mass:g} kg", "allowed: greater than 0")
+
+    def moment(tag: str) -> float:
+        child = inertia_node.find(tag) if inertia_node is not None else None
+        return child.number() if child is not None else (_DEFAULT_MOMENT if tag[1] == tag[2] else 0.0)
+
+    xx, xy, xz, yy, yz, zz = (moment(tag) for tag in _MOMENTS)
+    pose = frames.pose_in_link(link.name(), node.find("pose"))
+    read = specs.Inertial(pose, mass, (xx, xy, xz, yy, yz, zz))
+    return usable(read, collisions, inertia_node or node, notes)
+
+
+def usable(
+    inertial: specs.Inertial, collisions: tuple[specs.Collision, ...], node: XmlNode, notes: Notes
+) -> specs.Inertial:
+    """Returns mass properties that a body can move with, and notes what was wrong with the given ones.
+
+    Args:
+        inertial: As given.
+        collisions: Shapes of the link.
+        node: The element the moments stand in.
+        notes: Takes what was replaced.
+    """
+    least, middle, largest = principal_moments(inertial.inertia)
+    given = f"its principal moments are {least:g}, {middle:g}, {largest:g} kg m^2"
+    if least > 0:
+        if largest > (least + middle) * (1 + _ROUNDING):
+            notes.add(node, f"{given}: no rigid body has such moments, they are used as they are")
+        return inertial
+    solid = inertial_of_shapes([(shape, WATER_KG_PER_M3) for shape in collisions])
+    if solid is None:
+        notes.add(node, f"{given}: {_DEFAULT_MOMENT:g} kg m^2 are used instead, as there is no shape to compute them")
+        return specs.Inertial(inertial.pose, inertial.mass, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
+    filled = with_mass(solid, inertial.mass)
+    notes.add(node, f"{given}: those of its collision shapes, filled with {inertial.mass:g} kg, are used instead")
+    return specs.Inertial(Pose(inertial.pose.position), inertial.mass, filled.inertia)
+
+
+def _computed(node: XmlNode, link: XmlNode, collisions: tuple[specs.Collision, ...]) -> specs.Inertial:
+    """Returns the mass properties of the shapes of a link, which SDF 1.11 lets a file ask for."""
+    default = non_negative(node, "density") or WATER_KG_PER_M3
+    densities = {child.name(): non_negative(child, "density") or default for child in link.find_all("collision")}
+    solid = inertial_of_shapes([(shape, _density_of(shape.name, densities, default)) for shape in collisions])
+    if solid is None:
+        raise DescriptionError(node.where, "is to be computed", "needs a <collision> that has a volume")
+    return solid
+
+
+def _density_of(shape: str, densities: dict[str, float], default: float) -> float:
+    return densities.get(shape, densities.get(shape.rpartition("_")[0], default))

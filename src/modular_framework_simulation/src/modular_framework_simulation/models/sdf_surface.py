@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads how surfaces, links and joints resist: friction, bounce, contact, damping."""
+
+from __future__ import annotations
+
+import math
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.xml_nodes import XmlNode
+
+
+def non_negative(node: XmlNode | None, *path: str) -> float | None:
+    """Returns the number at a path below an element, None if there is none.
+
+    Raises:
+        DescriptionError: It is negative.
+    """
+    child = node.find_path(*path) if node is not None else None
+    if child is None:
+        return None
+    value = child.number()
+    if value < 0:
+        raise DescriptionError(child.where, f"got {value:g}", "allowed: 0 or greater")
+    return value
+
+
+def friction_coefficient(value: float | None) -> float | None:
+    """Returns a coefficient of friction; a negative one means in Gazebo that surfaces never slide."""
+    return specs.UNLIMITED_FRICTION if value is not None and value < 0 else value
+
+
+def read_friction(collision: XmlNode) -> specs.Friction:
+    """Reads the friction of a <collision>.
+
+    Raises:
+        DescriptionError: A coefficient is no number, or negative where that means nothing.
+    """
+    friction = collision.find_path("surface", "friction")
+
+    def coefficient(*path: str) -> float | None:
+        child = friction.find_path(*path) if friction is not None else None
+        return friction_coefficient(child.number()) if child is not None else None
+
+    lateral = coefficient("ode", "mu")
+    if lateral is None:
+        lateral = coefficient("bullet", "friction")
+    torsional = non_negative(friction, "torsional", "coefficient")
+    return specs.Friction(
+        1.0 if lateral is None else lateral,
+        torsional,
+        non_negative(friction, "bullet", "rolling_friction"),
+        coefficient("ode", "mu2"),
+    )
+
+
+def read_bounce(collision: XmlNode) -> specs.Bounce:
+    """Reads the bounce of a <collision>.
+
+    Raises:
+        DescriptionError: The coefficient is not from 0 to 1, or the threshold is negative.
+    """
+    bounce = collision.find_path("surface", "bounce")
+    default = specs.Bounce()
+    restitution = non_negative(bounce, "restitution_coefficient")
+    threshold = non_negative(bounce, "threshold")
+    if restitution is not None and restitution > 1 and bounce is not None:
+        where = bounce.require("restitution_coefficient").where
+        raise DescriptionError(where, f"got {restitution:g}", "allowed: 0 to 1")
+    return specs.Bounce(
+        default.restitution_coefficient if restitution is None else restitution,
+        default.threshold if threshold is None else threshold,
+    )
+
+
+def read_surface_contact(collision: XmlNode) -> specs.SurfaceContact:
+    """Reads the contact of a <collision>; what only one engine has is that of the Open Dynamics Engine.
+
+    Raises:
+        DescriptionError: A value is negative, or no number.
+    """
+    contact = collision.find_path("surface", "contact")
+    without = contact.find("collide_without_contact") if contact is not None else None
+    mask = contact.find("collide_bitmask") if contact is not None else None
+    return specs.SurfaceContact(
+        non_negative(contact, "ode", "kp"),
+        non_negative(contact, "ode", "kd"),
+        non_negative(contact, "ode", "max_vel"),
+        non_negative(contact, "ode", "min_depth"),
+        without.flag() if without is not None else False,
+        specs.SurfaceContact().collide_bitmask if mask is None else _bitmask(mask),
+    )
+
+
+def _bitmask(node: XmlNode) -> int:
+    text = node.text.strip()
+    try:
+        value = int(text, 0)
+    except ValueError:
+        value = -1
+    if not 0 <= value <= 0xFFFFFFFF:
+        raise DescriptionError(node.where, f"got '{text}'", "allowed: a whole number from 0 to 0xFFFFFFFF")
+    return value
+
+
+def read_velocity_decay(link: XmlNode) -> specs.VelocityDecay:
+    """Reads the damping of a <link>.
+
+    Raises:
+        DescriptionError: A value is negative, or no number.
+    """
+    decay = link.find("velocity_decay")
+    return specs.VelocityDecay(non_negative(decay, "linear") or 0.0, non_negative(decay, "angular") or 0.0)
+
+
+def read_joint_dynamics(axis: XmlNode) -> specs.JointDynamics:
+    """Reads damping, friction and spring of the <axis> of a joint.
+
+    Raises:
+        DescriptionError: A value is negative that must not be, or no number.
+    """
+    dynamics = axis.find("dynamics")
+    reference = dynamics.find("spring_reference") if dynamics is not None else None
+    return specs.JointDynamics(
+        non_negative(dynamics, "damping") or 0.0,
+        non_negative(dynamics, "friction") or 0.0,
+        reference.number() if reference is not None else 0.0,
+        non_negative(dynamics, "spring_stiffness") or 0.0,
+    )
+
+
+def joint_bound(axis: XmlNode, name: str, unlimited: float) -> float:
+    """Returns a number of the <limit> of an axis; from 1e16 on, and where there is none, it is `unlimited`.
+
+    Raises:
+        DescriptionError: It is no number.
+    """
+    node = axis.find_path("limit", name)
+    if node is None:
+        return unlimited
+    text = node.text.strip().lower().lstrip("+-")
+    if text in ("inf", "infinity"):
+        return unlimited
+    value = node.number()
+    no_limit = value <= -_NO_LIMIT if unlimited < 0 else value >= _NO_LIMIT
+    return unlimited if no_limit else value
+
+
+def drive_bound(axis: XmlNode, name: str) -> float:
+    """Returns the <effort> or <velocity> of the limits of an axis; a negative one means none.
+
+    Raises:
+        DescriptionError: It is no number.
+    """
+    value = joint_bound(axis, name, math.inf)
+    return math.inf if value < 0 else value
+
+
+_NO_LIMIT = 1e16
+"""SDF's default of the limits of a joint."""

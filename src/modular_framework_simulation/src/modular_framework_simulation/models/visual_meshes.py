@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Converts what is seen of a model into files the physics engine draws: one .obj file for each material.
+
+The engine's own reader of COLLADA files knows neither their unit nor their pictures. Converted files are kept in a
+cache folder under a name made of the content of the mesh and of its pictures.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.mesh_files import load_mesh, write_folder
+from modular_framework_simulation.models.sdf_specs import Box, Colour, Cylinder, Mesh, Plane, Sphere, Visual
+from modular_framework_urdf import collada
+
+_CACHE_VERSION = "2"
+_LIST = "parts.json"
+_PICTURE = re.compile(rb"<init_from>\s*([^<]+?)\s*</init_from>|^\s*(?:map_Kd|mtllib)\s+(.+?)\s*$", re.MULTILINE)
+_WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
+_LEAST_ALPHA = 0.05
+"""Exporters disagree about what is transparent: a part that would not be seen at all is drawn opaque."""
+_LARGEST_PICTURE_PX = 2048
+_ROUND = 32
+"""Sides of what is drawn for a round shape with a picture."""
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnPart:
+    """A part of a shape with one material.
+
+    Attributes:
+        file: The .obj file, in metres; its picture stands beside it.
+        colour: What the picture is multiplied with, or the plain colour.
+    """
+
+    file: Path
+    colour: Colour
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    vertices: Array
+    triangles: NDArray[np.int64]
+    normals: Array | None
+    uv: Array | None
+    colour: Colour
+    picture: Any
+
+
+class VisualMeshes:
+    """Gives the parts of visual shapes as files, from the cache when they are there.
+
+    Args:
+        cache_folder: Made when first needed.
+    """
+
+    def __init__(self, cache_folder: Path) -> None:
+        self._cache_folder = cache_folder
+
+    def parts(self, visual: Visual) -> tuple[DrawnPart, ...]:
+        """Returns the parts of a visual.
+
+        Raises:
+            DescriptionError: Its mesh cannot be read.
+        """
+        folder = self._cache_folder / f"drawn-{self._key(visual)}"
+        if not (folder / _LIST).is_file():
+            files: dict[str, bytes] = {}
+            colours = []
+            for number, part in enumerate(_make(visual)):
+                name = f"part_{number:03d}"
+                files |= _obj_files(name, part)
+                colours.append(part.colour)
+            files[_LIST] = json.dumps(colours).encode()
+            write_folder(folder, files)
+        colours = json.loads((folder / _LIST).read_text(encoding="ascii"))
+        red_green_blue_alpha = [(float(r), float(g), float(b), float(a)) for r, g, b, a in colours]
+        return tuple(
+            DrawnPart(folder / f"part_{number:03d}.obj", colour) for number, colour in enumerate(red_green_blue_alpha)
+        )
+
+    @staticmethod
+    def _key(visual: Visual) -> str:
+        key = hashlib.sha256(f"{_CACHE_VERSION}|{visual.geometry}|{visual.colour}|{visual.own_materials}".encode())
+        files = [visual.texture] if visual.texture is not None else []
+        if isinstance(visual.geometry, Mesh):
+            files += [visual.geometry.path, *_pictures_of(visual.geometry.path)]
+        for file in files:
+            try:
+                key.update(file.read_bytes())
+            except OSError as error:
+                raise DescriptionError(str(file), f"cannot be read ({error})", "give a readable file") from error
+        return key.hexdigest()[:24]
+
+
+def _pictures_of(mesh: Path) -> list[Path]:
+    """Returns the files that the text of a mesh refers to and that are there."""
+    if mesh.suffix.lower() not in (".dae", ".obj"):
+        return []
+    try:
+        names = [(first or second).decode(errors="replace") for first, second in _PICTURE.findall(mesh.read_bytes())]
+    except OSError:
+        return []
+    found = [picture for name in dict.fromkeys(names) if (picture := find_picture(mesh, name)) is not None]
+    return found + [other for file in found if file.suffix == ".mtl" for other in _pictures_of_library(mesh, file)]
+
+
+def _pictures_of_library(mesh: Path, library: Path) -> list[Path]:
+    names = [second.decode(errors="replace") for _, second in _PICTURE.findall(library.read_bytes()) if second]
+    return [picture for name in names if (picture := find_picture(mesh, name)) is not None]
+
+
+def find_picture(mesh: Path, name: str) -> Path | None:
+    """Returns a file that a mesh refers to: beside it, or among the textures of its model; None if there is none."""
+    plain = unquote(name.removeprefix("file://")).replace("\\", "/").strip()
+    base = plain.rpartition("/")[2]
+    textures = mesh.parent.parent / "materials" / "textures"
+    for candidate in (mesh.parent / plain, mesh.parent / base, textures / base, mesh.parent.parent / "textures" / base):
+        if base and candidate.is_file():
+            return candidate
+    return None
+
+
+class _Pictures:
+    """Opens the files a mesh refers to for its reader."""
+
+    def __init__(self, mesh: Path) -> None:
+        self._mesh = mesh
+
+    def get(self, name: str) -> bytes:
+        """Returns the content of a file."""
+        picture = find_picture(self._mesh, name)
+        if picture is None:
+            raise FileNotFoundError(name)
+        return picture.read_bytes()
+
+
+def _make(visual: Visual) -> list[_Part]:
+    picture = _open(visual.texture) if visual.texture is not None else None
+    match visual.geometry:
+        case Plane(normal=normal, size=size):
+            return [_plane(np.array(normal), size, visual.colour, picture)]
+        case Box(size=size):
+            return [_box(np.array(size), visual.colour, picture)]
+        case Cylinder(radius=radius, length=length):
+            return [_turned(_cylinder_outline(radius, length), visual.colour, picture)]
+        case Sphere(radius=radius):
+            return [_turned(_sphere_outline(radius), visual.colour, picture)]
+        case Mesh() as mesh:
+            if not visual.own_materials and picture is None:
+                whole = load_mesh(mesh)
+                return [_Part(whole.vertices, whole.triangles, None, None, visual.colour, None)]
+            parts = _own_parts(mesh)
+            if visual.own_materials:
+                return parts
+            return [_Part(p.vertices, p.triangles, p.normals, p.uv, visual.colour, picture) for p in parts]
+    raise TypeError(f"{type(visual.geometry).__name__} is no geometry")
+
+
+def _open(path: Path) -> Any:
+    from PIL import Image
+
+    try:
+        with Image.open(path) as picture:
+            return picture.convert("RGB")
+    except (OSError, ValueError):
+        return None
+
+
+def _own_parts(mesh: Mesh) -> list[_Part]:
+    """Returns the parts of a mesh file with the materials it names itself."""
+    import trimesh
+
+    load_mesh(mesh)  # says what is wrong with a file, in our words
+    kind = mesh.path.suffix.lower().removeprefix(".")
+    content, unit = mesh.path.read_bytes(), 1.0
+    if kind == "dae":
+        root = collada.parse(content, mesh.path.name)
+        unit = collada.unit(root)
+        if mesh.submesh:
+            collada.keep_part(root, mesh.submesh)
+        content = collada.to_bytes(root)
+    elif mesh.submesh or kind != "obj":
+        whole = load_mesh(mesh)
+        return [_Part(whole.vertices, whole.triangles, None, None, (0.7, 0.7, 0.7, 1.0), None)]
+    loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, resolver=_Pictures(mesh.path))
+    bodies = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
+    bodies = [body for body in bodies if isinstance(body, trimesh.Trimesh) and len(body.faces)]
+    shift = np.zeros(3)
+    if mesh.center:
+        every = np.concatenate([body.vertices for body in bodies])
+        shift = (every.min(axis=0) + every.max(axis=0)) / 2
+    scale = np.array(mesh.scale)
+    return [_part_of(body, unit, scale, shift) for body in bodies]
+
+
+def _part_of(body: Any, unit: float, scale: Array, shift: Array) -> _Part:
+    colour, picture = _look_of(body.visual)
+    uv = getattr(body.visual, "uv", None)
+    if uv is not None and len(uv) != len(body.vertices):
+        uv = None
+    triangles = np.asarray(body.faces, dtype=np.int64)
+    normals = np.asarray(body.vertex_normals, dtype=np.float64) / scale
+    if np.prod(scale) < 0:
+        triangles = triangles[:, ::-1]
+    vertices = (np.asarray(body.vertices, dtype=np.float64) - shift) * unit * scale
+    return _Part(vertices, triangles, normals, None if uv is None else np.asarray(uv), colour, picture)
+
+
+def _look_of(look: Any) -> tuple[Colour, Any]:
+    """Returns the colour and the picture of a part as trimesh has them."""
+    material = getattr(look, "material", None)
+    if material is None:
+        return ((0.7, 0.7, 0.7, 1.0), None)
+    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    values = np.asarray(getattr(material, "main_color", (255, 255, 255, 255)), dtype=float) / 255.0
+    red, green, blue, alpha = (float(value) for value in values[:4])
+    if picture is not None:
+        return (_WHITE, picture.convert("RGB"))
+    return ((red, green, blue, alpha if alpha >= _LEAST_ALPHA else 1.0), None)
+
+
+def _plane(normal: Array, size: tuple[float, float], colour: Colour, picture: Any) -> _Part:
+    """Returns a rectangle across a normal, as large as it is to be drawn."""
+    helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    across = np.cross(normal, np.cross(helper, normal))
+    across /= np.linalg.norm(across)
+    up = np.cross(normal, across)
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
+    vertices = corners[:, :1] * size[0] * across + corners[:, 1:] * size[1] * up
+    triangles = np.array([(0, 1, 2), (0, 2, 3)])
+    return _Part(vertices, triangles, np.tile(normal, (4, 1)), corners + 0.5, colour, picture)
+
+
+def _box(size: Array, colour: Colour, picture: Any) -> _Part:
+    """Returns a box whose six sides all show the picture."""
+    vertices, triangles, normals, uv = [], [], [], []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            normal = np.zeros(3)
+            normal[axis] = side
+            extent = (float(size[(axis + 1) % 3]), float(size[(axis + 2) % 3]))
+            face = np.zeros((4, 3))
+            corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
+            face[:, axis] = side * size[axis] / 2
+            face[:, (axis + 1) % 3] = corners[:, 0] * extent[0]
+            face[:, (axis + 2) % 3] = corners[:, 1] * extent[1]
+            order = np.array([(0, 1, 2), (0, 2, 3)]) + 4 * len(vertices)
+            vertices.append(face)
+            triangles.append(order if side > 0 else order[:, ::-1])
+            normals.append(np.tile(normal, (4, 1)))
+            uv.append(corners + 0.5)
+    return _Part(
+        np.concatenate(vertices),
+        np.concatenate(triangles),
+        np.concatenate(normals),
+        np.concatenate(uv),
+        colour,
+        picture,
+    )
+
+
+def _cylinder_outline(radius: float, length: float) -> Array:
+    """Returns radius and height along the outline of a cylinder, the edges twice, for they are sharp."""
+    half = length / 2
+    return np.array([(0.0, -half), (radius, -half), (radius, -half), (radius, half), (radius, half), (0.0, half)])
+
+
+def _sphere_outline(radius: float) -> Array:
+    """Returns radius and height along the outline of a sphere."""
+    angles = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius
+
+
+def _turned(outline: Array, colour: Colour, picture: Any) -> _Part:
+    """Returns the surface an outline makes that turns about z, with the picture wrapped around it once."""
+    turns = np.linspace(0, 2 * np.pi, _ROUND + 1)
+    low, high = outline[:, 1].min(), outline[:, 1].max()
+    vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for r, z in outline for a in turns])
+    # Pictures for round shapes stand on their head, as Gazebo wraps them.
+    uv = np.array([(1 - a / (2 * np.pi), 1 - (z - low) / (high - low)) for _, z in outline for a in turns])
+    row = len(turns)
+    corners = [(i * row + j, i * row + j + 1) for i in range(len(outline) - 1) for j in range(_ROUND)]
+    triangles = np.array([t for a, b in corners for t in ((a, b, b + row), (a, b + row, a + row))])
+    return _Part(vertices, triangles, None, uv, colour, picture)
+
+
+def _obj_files(name: str, part: _Part) -> dict[str, bytes]:
+    """Returns the files of a part by name: .obj, and with a picture .mtl and .png."""
+    files: dict[str, bytes] = {}
+    lines: list[str] = []
+    textured = part.picture is not None and part.uv is not None
+    if textured:
+        picture = part.picture.copy()
+        picture.thumbnail((_LARGEST_PICTURE_PX, _LARGEST_PICTURE_PX))
+        stream = io.BytesIO()
+        picture.save(stream, "PNG")
+        files[f"{name}.png"] = stream.getvalue()
+        files[f"{name}.mtl"] = f"newmtl {name}\nKd 1 1 1\nmap_Kd {name}.png\n".encode()
+        lines += [f"mtllib {name}.mtl", f"usemtl {name}"]
+    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in part.vertices]
+    if textured and part.uv is not None:
+        lines += [f"vt {u:.6g} {v:.6g}" for u, v in part.uv[:, :2]]
+    if part.normals is not None:
+        lengths = np.linalg.norm(part.normals, axis=1, keepdims=True)
+        lines += [f"vn {x:.6g} {y:.6g} {z:.6g}" for x, y, z in part.normals / np.where(lengths > 0, lengths, 1.0)]
+    form = {(True, True): "{0}/{0}/{0}", (True, False): "{0}/{0}", (False, True): "{0}//{0}", (False, False): "{0}"}
+    corner = form[textured, part.normals is not None]
+    lines += ["f " + " ".join(corner.format(index + 1) for index in triangle) for triangle in part.triangles]
+    files[f"{name}.obj"] = ("\n".join(lines) + "\n").encode("ascii")
+    return files

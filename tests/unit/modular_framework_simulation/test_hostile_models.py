@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Broken and hostile worlds, models and meshes are refused with file, line and reason, none ends anything."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.sdf_reader import read_model_text, read_world
+from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.models.urdf_model import read_urdf_model
+
+BOMB = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 30}">' for n in range(1, 12))
+LINK = "<link name='a'/><link name='b'/>"
+
+
+def geometry(text: str) -> str:
+    return f"<link name='a'><collision name='c'>\n<geometry>{text}</geometry></collision></link>"
+
+
+def joint(text: str, kind: str = "revolute", parent: str = "a", child: str = "b") -> str:
+    ends = f"<parent>{parent}</parent><child>{child}</child>"
+    return f"{LINK}\n<joint name='j' type='{kind}'>{ends}{text}</joint>"
+
+
+IN_A_MODEL = {
+    "text that is no XML": ("<link name='a'", 3, "not well-formed"),
+    "an attribute without quotes": ("\n<link name=a/>", 3, "not well-formed"),
+    "no links at all": ("<plugin name='p'/>", 1, "has no <link>"),
+    "a link without a name": ("\n<link/>", 3, "has no name"),
+    "two links of one name": ("<link name='a'/>\n<link name='a'/>", 3, "only link of that name"),
+    "two joints of one name": (joint("", "ball") + "\n<joint name='j' type='ball'><parent>a</parent>"
+        "<child>b</child></joint>", 4, "only joint of that name"),
+    "a pose of five numbers": ("<link name='a'>\n<pose>1 2 3 4 5</pose></link>", 3, "expected 6 finite"),
+    "a pose that is not a number": ("<link name='a'>\n<pose>0 0 nan 0 0 0</pose></link>", 3, "expected 6 finite"),
+    "a pose without end": ("<link name='a'>\n<pose>0 0 1e999 0 0 0</pose></link>", 3, "expected 6 finite"),
+    "a quaternion of length 0.1": (
+        "<link name='a'>\n<pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0.1</pose></link>", 3, "expected 1"),
+    "a pose relative to nothing": ("<link name='a'><pose relative_to='x'>0 0 0 0 0 0</pose></link>", 1, "'x'"),
+    "frames in a circle": (
+        "\n<link name='a'><pose relative_to='b'>0 0 0 0 0 0</pose></link>"
+        "<link name='b'><pose relative_to='a'>0 0 0 0 0 0</pose></link>", 3, "depends on itself"),
+    "frames attached in a circle": (
+        f"{LINK}<frame name='f' attached_to='g'/><frame name='g' attached_to='f'/>"
+        "<joint name='j' type='fixed'><parent>a</parent><child>f</child></joint>", 1, "attached to itself"),
+    "a mass of 0": ("<link name='a'><inertial>\n<mass>0</mass></inertial></link>", 3, "greater than 0"),
+    "a box of length 0": (geometry("<box><size>1 0 1</size></box>"), 3, "greater than 0"),
+    "a box as large as the sea": (geometry("<box><size>1 1e9 1</size></box>"), 3, "at most 10000 m"),
+    "a sphere of negative radius": (geometry("<sphere><radius>-1</radius></sphere>"), 3, "greater than 0"),
+    "two shapes in one": (geometry("<box><size>1 1 1</size></box><sphere><radius>1</radius></sphere>"), 3, "exactly"),
+    "a heightmap": (geometry("<heightmap><uri>a.png</uri></heightmap>"), 3, "<heightmap>"),
+    "a plane without a direction": (geometry("<plane><normal>0 0 0</normal></plane>"), 3, "length 0"),
+    "a mesh from the network": (geometry("<mesh><uri>ftp://x/a.stl</uri></mesh>"), 3, "allowed: model://"),
+    "a mesh that is no mesh": (geometry("<mesh><uri>/etc/hostname</uri></mesh>"), 3, "allowed: .stl"),
+    "a mesh without a size": (geometry(f"<mesh><uri>{__file__}</uri><scale>1 1 1</scale></mesh>"), 3, "allowed: .stl"),
+    "a friction that is a word": (
+        geometry("<box><size>1 1 1</size></box>").replace("</collision>", "<surface><friction><ode><mu>slippery</mu>"
+        "</ode></friction></surface></collision>"), 3, "expected 1 finite"),
+    "a bounce of 2": (
+        geometry("<box><size>1 1 1</size></box>").replace("</collision>", "<surface><bounce><restitution_coefficient>2"
+        "</restitution_coefficient></bounce></surface></collision>"), 3, "allowed: 0 to 1"),
+    "a screw": (joint("", "screw"), 3, "'screw'; allowed: fixed, revolute"),
+    "a universal joint": (joint("", "universal"), 3, "'universal'"),
+    "a revolute2": (joint("", "revolute2"), 3, "'revolute2'"),
+    "a gearbox": (joint("", "gearbox"), 3, "'gearbox'"),
+    "a hinge without an axis": (joint(""), 3, "has no <axis>"),
+    "an axis of length 0": (joint("<axis><xyz>0 0 0</xyz></axis>"), 3, "length 0"),
+    "limits the wrong way round": (
+        joint("<axis><xyz>0 0 1</xyz><limit><lower>1</lower><upper>0</upper></limit></axis>"), 3, "lower 1"),
+    "a negative damping": (
+        joint("<axis><xyz>0 0 1</xyz><dynamics><damping>-1</damping></dynamics></axis>"), 3, "0 or greater"),
+    "a joint to nowhere": (joint("", "fixed", child="x"), 3, "'x' is no link"),
+    "a hinge that carries the world": (joint("<axis/>", child="world"), 3, "is the world"),
+    "a model merged into another": ("<include merge='true'><uri>model://x</uri></include>", 2, "merge='true'"),
+    "static of maybe": ("\n<static>maybe</static><link name='a'/>", 3, "allowed: true, false"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", IN_A_MODEL)
+def test_a_broken_model_is_refused_with_its_line(name: str) -> None:
+    body, line, said = IN_A_MODEL[name]
+    with pytest.raises(DescriptionError) as caught:
+        read_model_text(f"<sdf version='1.9'><model name='m'>\n{body}\n</model></sdf>", "text", Resources())
+    message = str(caught.value)
+    assert message.startswith(f"text:{line}: ")
+    assert said in message
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            f"<?xml version='1.0'?>\n<!DOCTYPE sdf [<!ENTITY e0 'x'>{BOMB}]>\n<sdf version='1.6'>&e11;</sdf>",
+            ":2: got a D",
+        ),
+        ("", ":1: not an XML document"),
+        ("\x00\x01", ":1: not an XML document"),
+        ("<sdf/>", ":1: <sdf>: got version ''"),
+        ("<sdf version='9.9'/>", ":1: <sdf>: got version '9.9'; allowed: 1.2 to 1.11"),
+        ("<html/>", ":1: <html>: the root element is <html>"),
+        ("<sdf version='1.6'>" + "<model name='m'>" * 40 + "</model>" * 40 + "</sdf>", "break the circle"),
+        ("<sdf version='1.6'>" + "<a>" * 5000 + "</a>" * 5000 + "</sdf>", "not an XML document"),
+    ],
+)
+def test_a_broken_document_is_refused(text: str, said: str) -> None:
+    with pytest.raises(DescriptionError) as caught:
+        read_model_text(text, "text", Resources())
+    assert str(caught.value).startswith("text:")
+    assert said in str(caught.value)
+
+
+def test_files_that_include_each_other_many_times_over_are_refused(tmp_path: Path) -> None:
+    for number in range(7):
+        inner = "".join(f"<include><name>n{n}</name><uri>model://m{number + 1}</uri></include>" for n in range(10))
+        body = inner if number < 6 else "<link name='l'/>"
+        (tmp_path / f"m{number}").mkdir()
+        (tmp_path / f"m{number}" / "model.sdf").write_text(f"<sdf version='1.6'><model name='m'>{body}</model></sdf>")
+    path = tmp_path / "bomb.world"
+    path.write_text("<sdf version='1.6'><world name='w'><include><uri>model://m0</uri></include></world></sdf>")
+    with pytest.raises(DescriptionError, match=r"is the model number 10,001; allowed: 10,000"):
+        read_world(path, Resources((tmp_path,)))
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("<population name='p'/>", ":2: <population name='p'>: is not simulated"),
+        ("<joint name='j'/>", ":2: <joint name='j'>: is not simulated"),
+        ("<gravity>0 0 down</gravity>", ":2: <gravity>: got '0 0 down'"),
+        ("<include/>", ":2: <include>: has no <uri>"),
+        ("<include><uri></uri></include>", "does not exist"),
+    ],
+)
+def test_a_broken_world_is_refused(tmp_path: Path, body: str, said: str) -> None:
+    path = tmp_path / "test.world"
+    path.write_text(f"<sdf version='1.6'><world name='w'>\n{body}</world></sdf>")
+    with pytest.raises(DescriptionError) as caught:
+        read_world(path, Resources())
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (
+            "<link name='a'/><joint name='j' type='floating'><parent link='world'/><child link='a'/></joint>",
+            "'floating'; allowed: fixed, revolute, continuous",
+        ),
+        (
+            "<link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>"
+            "\n<joint name='k' type='fixed'><parent link='a'/><child link='b'/></joint>",
+            ":2: <joint name='k'>: gives link 'b' a second parent",
+        ),
+        (
+            "<link name='a'><inertial>\n<mass value='-1'/><inertia/></inertial></link>",
+            ":2: <mass>: got mass -1 kg",
+        ),
+        (
+            "<link name='a'/><link name='b'/>\n<joint name='j' type='revolute'><parent link='a'/><child link='b'/>"
+            "<axis xyz='0 0 0'/></joint>",
+            "length 0",
+        ),
+    ],
+)
+def test_a_broken_urdf_is_refused(body: str, said: str) -> None:
+    with pytest.raises(DescriptionError) as caught:
+        read_urdf_model(f"<robot name='r'>{body}</robot>", "text", Resources())
+    assert said in str(caught.value)
