@@ -165,6 +165,20 @@ def test_a_mesh_that_is_not_convex_is_cut_into_convex_parts_of_its_volume(tmp_pa
     assert trimesh.load(parts.hull(Mesh(file)), force="mesh").volume > 1.3 * ring.volume
 
 
+def test_convex_parts_of_an_open_mesh_are_no_larger_than_it(tmp_path: Path) -> None:
+    ring = trimesh.creation.annulus(r_min=0.3, r_max=0.5, height=0.2, sections=8)
+    ring.update_faces(np.arange(len(ring.faces)) > 1)
+    file = tmp_path / "ring.stl"
+    ring.export(file)
+    said: list[str] = []
+    files = ConvexParts(tmp_path / "cache", said.append).parts(Mesh(file))
+    corners = np.concatenate([trimesh.load(each, force="mesh").vertices for each in files])
+    assert np.ptp(corners, axis=0) == pytest.approx(np.ptp(ring.vertices, axis=0), abs=1e-3)
+    assert all(trimesh.load(each, force="mesh").is_convex for each in files)
+    assert len(files) >= 4
+    assert "ring.stl with 62 triangles into convex parts" in said[0]
+
+
 def test_convex_parts_come_from_the_cache_and_follow_content_and_scale(tmp_path: Path) -> None:
     file = tmp_path / "box.stl"
     trimesh.creation.box((0.1, 0.1, 0.1)).export(file)

@@ -291,3 +291,28 @@ def test_a_scale_without_extent_and_a_missing_file_are_refused(tmp_path: Path) -
         read_mesh(written(tmp_path, "binary.stl"), (1.0, 0.0, 1.0))
     with pytest.raises(MeshError, match="cannot be read"):
         read_mesh(tmp_path / "absent.stl")
+
+
+def test_one_group_of_an_obj_file_is_read_and_another_name_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "two.obj"
+    corners = "\n".join(f"v {x} {y} 0" for x in (0, 1) for y in (0, 1)) + "\nv 5 0 0\n"
+    file.write_text(f"{corners}g small\nf 1 2 3\ng large\nf 1 2 5\nf 2 3 5\n")
+    assert len(read_mesh(file, part="small").triangles) == 1
+    assert read_mesh(file, part="large").vertices.max() == 5
+    assert read_mesh(file, part="large", centred=True).vertices.max() == 2.5
+    with pytest.raises(MeshError, match=r"has no part 'medium'; allowed: small, large"):
+        read_mesh(file, part="medium")
+    file.rename(tmp_path / "two.stl")
+    with pytest.raises(MeshError, match="allowed: parts of dae and obj files"):
+        read_mesh(tmp_path / "two.stl", part="small")
+
+
+def test_a_scene_with_the_id_of_its_node_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "hand.dae"
+    trimesh.creation.box((1, 1, 1)).export(file)
+    text = file.read_text()
+    scene = re.search(r'<visual_scene[^>]* id="([^"]*)"', text) or re.search(r'<visual_scene id="([^"]*)"', text)
+    node = re.search(r'<node[^>]* id="([^"]*)"', text)
+    assert scene is not None and node is not None
+    file.write_text(text.replace(f'id="{node.group(1)}"', f'id="{scene.group(1)}"'))
+    assert len(read_mesh(file).triangles) == 12

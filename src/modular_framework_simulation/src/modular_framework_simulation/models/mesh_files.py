@@ -13,6 +13,7 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.sdf_specs import Mesh
 from modular_framework_urdf.mesh_reader import MeshError, TriangleMesh, read_mesh
 
-_CACHE_VERSION = "2"
+_CACHE_VERSION = "3"
 _CONCAVITY_THRESHOLD = 0.03
 """CoACD's measure of how much a part may differ from its hull, relative to the size of the mesh."""
 
@@ -118,7 +119,12 @@ class ConvexParts:
             f"cutting {mesh.path} with {len(loaded.triangles):,} triangles into convex parts, which may take minutes; "
             f"they are kept in {self._cache_folder}"
         )
-        return _decompose(loaded)
+        if not solid.is_volume:  # a hole would make a shell of it, which is cut into many more parts
+            trimesh.repair.fill_holes(solid)
+            trimesh.repair.fix_normals(solid)
+        if not solid.is_volume:
+            return _within(_decompose(loaded), hull)
+        return _decompose(TriangleMesh(np.asarray(solid.vertices), np.asarray(solid.faces)))
 
 
 def write_folder(folder: Path, files: dict[str, bytes]) -> None:
@@ -155,6 +161,23 @@ def _decompose(mesh: TriangleMesh) -> list[TriangleMesh]:
     coacd.set_log_level("error")
     pieces = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.triangles), threshold=_CONCAVITY_THRESHOLD, seed=1)
     return [TriangleMesh(np.asarray(vertices), np.asarray(faces)) for vertices, faces in pieces]
+
+
+def _within(parts: list[TriangleMesh], hull: Any) -> list[TriangleMesh]:
+    """Returns what of convex parts is inside the hull of their mesh.
+
+    CoACD closes an open mesh with a skin of voxels, which stands out by a hundredth of the mesh's size.
+    """
+    import trimesh
+
+    clipped = []
+    for part in parts:
+        solid = trimesh.Trimesh(part.vertices, part.triangles).convex_hull
+        inside = trimesh.boolean.intersection([solid, hull], engine="manifold", check_volume=False)
+        if len(inside.faces):
+            inside = inside.convex_hull  # which it is already, but for rounding
+            clipped.append(TriangleMesh(np.asarray(inside.vertices), np.asarray(inside.faces)))
+    return clipped
 
 
 def _obj_text(mesh: TriangleMesh) -> str:

@@ -17,9 +17,16 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.drawn_bodies import (
+    Array,
+    DrawnBody,
+    drawn_box,
+    drawn_cylinder,
+    drawn_plane,
+    drawn_sphere,
+)
 from modular_framework_simulation.models.mesh_files import load_mesh, write_folder
 from modular_framework_simulation.models.sdf_specs import Box, Colour, Cylinder, Mesh, Plane, Sphere, Visual
 from modular_framework_urdf import collada
@@ -31,10 +38,6 @@ _WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
 _LEAST_ALPHA = 0.05
 """Exporters disagree about what is transparent: a part that would not be seen at all is drawn opaque."""
 _LARGEST_PICTURE_PX = 2048
-_ROUND = 32
-"""Sides of what is drawn for a round shape with a picture."""
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +51,6 @@ class DrawnPart:
 
     file: Path
     colour: Colour
-
-
-@dataclass(frozen=True, slots=True)
-class _Part:
-    vertices: Array
-    triangles: NDArray[np.int64]
-    normals: Array | None
-    uv: Array | None
-    colour: Colour
-    picture: Any
 
 
 class VisualMeshes:
@@ -148,25 +141,25 @@ class _Pictures:
         return picture.read_bytes()
 
 
-def _make(visual: Visual) -> list[_Part]:
+def _make(visual: Visual) -> list[DrawnBody]:
     picture = _open(visual.texture) if visual.texture is not None else None
     match visual.geometry:
         case Plane(normal=normal, size=size):
-            return [_plane(np.array(normal), size, visual.colour, picture)]
+            return [drawn_plane(np.array(normal), size, visual.colour, picture)]
         case Box(size=size):
-            return [_box(np.array(size), visual.colour, picture)]
+            return [drawn_box(np.array(size), visual.colour, picture)]
         case Cylinder(radius=radius, length=length):
-            return [_turned(_cylinder_outline(radius, length), visual.colour, picture)]
+            return [drawn_cylinder(radius, length, visual.colour, picture)]
         case Sphere(radius=radius):
-            return [_turned(_sphere_outline(radius), visual.colour, picture)]
+            return [drawn_sphere(radius, visual.colour, picture)]
         case Mesh() as mesh:
             if not visual.own_materials and picture is None:
                 whole = load_mesh(mesh)
-                return [_Part(whole.vertices, whole.triangles, None, None, visual.colour, None)]
+                return [DrawnBody(whole.vertices, whole.triangles, None, None, visual.colour, None)]
             parts = _own_parts(mesh)
             if visual.own_materials:
                 return parts
-            return [_Part(p.vertices, p.triangles, p.normals, p.uv, visual.colour, picture) for p in parts]
+            return [DrawnBody(p.vertices, p.triangles, p.normals, p.uv, visual.colour, picture) for p in parts]
     raise TypeError(f"{type(visual.geometry).__name__} is no geometry")
 
 
@@ -180,7 +173,7 @@ def _open(path: Path) -> Any:
         return None
 
 
-def _own_parts(mesh: Mesh) -> list[_Part]:
+def _own_parts(mesh: Mesh) -> list[DrawnBody]:
     """Returns the parts of a mesh file with the materials it names itself."""
     import trimesh
 
@@ -195,9 +188,10 @@ def _own_parts(mesh: Mesh) -> list[_Part]:
         content = collada.to_bytes(root)
     elif mesh.submesh or kind != "obj":
         whole = load_mesh(mesh)
-        return [_Part(whole.vertices, whole.triangles, None, None, (0.7, 0.7, 0.7, 1.0), None)]
-    loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, resolver=_Pictures(mesh.path))
-    bodies = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
+        return [DrawnBody(whole.vertices, whole.triangles, None, None, (0.7, 0.7, 0.7, 1.0), None)]
+    pictures: Any = _Pictures(mesh.path)
+    loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, resolver=pictures)
+    bodies: list[Any] = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
     bodies = [body for body in bodies if isinstance(body, trimesh.Trimesh) and len(body.faces)]
     shift = np.zeros(3)
     if mesh.center:
@@ -207,7 +201,7 @@ def _own_parts(mesh: Mesh) -> list[_Part]:
     return [_part_of(body, unit, scale, shift) for body in bodies]
 
 
-def _part_of(body: Any, unit: float, scale: Array, shift: Array) -> _Part:
+def _part_of(body: Any, unit: float, scale: Array, shift: Array) -> DrawnBody:
     colour, picture = _look_of(body.visual)
     uv = getattr(body.visual, "uv", None)
     if uv is not None and len(uv) != len(body.vertices):
@@ -217,7 +211,7 @@ def _part_of(body: Any, unit: float, scale: Array, shift: Array) -> _Part:
     if np.prod(scale) < 0:
         triangles = triangles[:, ::-1]
     vertices = (np.asarray(body.vertices, dtype=np.float64) - shift) * unit * scale
-    return _Part(vertices, triangles, normals, None if uv is None else np.asarray(uv), colour, picture)
+    return DrawnBody(vertices, triangles, normals, None if uv is None else np.asarray(uv), colour, picture)
 
 
 def _look_of(look: Any) -> tuple[Colour, Any]:
@@ -233,72 +227,7 @@ def _look_of(look: Any) -> tuple[Colour, Any]:
     return ((red, green, blue, alpha if alpha >= _LEAST_ALPHA else 1.0), None)
 
 
-def _plane(normal: Array, size: tuple[float, float], colour: Colour, picture: Any) -> _Part:
-    """Returns a rectangle across a normal, as large as it is to be drawn."""
-    helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    across = np.cross(normal, np.cross(helper, normal))
-    across /= np.linalg.norm(across)
-    up = np.cross(normal, across)
-    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
-    vertices = corners[:, :1] * size[0] * across + corners[:, 1:] * size[1] * up
-    triangles = np.array([(0, 1, 2), (0, 2, 3)])
-    return _Part(vertices, triangles, np.tile(normal, (4, 1)), corners + 0.5, colour, picture)
-
-
-def _box(size: Array, colour: Colour, picture: Any) -> _Part:
-    """Returns a box whose six sides all show the picture."""
-    vertices, triangles, normals, uv = [], [], [], []
-    for axis in range(3):
-        for side in (-1.0, 1.0):
-            normal = np.zeros(3)
-            normal[axis] = side
-            extent = (float(size[(axis + 1) % 3]), float(size[(axis + 2) % 3]))
-            face = np.zeros((4, 3))
-            corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
-            face[:, axis] = side * size[axis] / 2
-            face[:, (axis + 1) % 3] = corners[:, 0] * extent[0]
-            face[:, (axis + 2) % 3] = corners[:, 1] * extent[1]
-            order = np.array([(0, 1, 2), (0, 2, 3)]) + 4 * len(vertices)
-            vertices.append(face)
-            triangles.append(order if side > 0 else order[:, ::-1])
-            normals.append(np.tile(normal, (4, 1)))
-            uv.append(corners + 0.5)
-    return _Part(
-        np.concatenate(vertices),
-        np.concatenate(triangles),
-        np.concatenate(normals),
-        np.concatenate(uv),
-        colour,
-        picture,
-    )
-
-
-def _cylinder_outline(radius: float, length: float) -> Array:
-    """Returns radius and height along the outline of a cylinder, the edges twice, for they are sharp."""
-    half = length / 2
-    return np.array([(0.0, -half), (radius, -half), (radius, -half), (radius, half), (radius, half), (0.0, half)])
-
-
-def _sphere_outline(radius: float) -> Array:
-    """Returns radius and height along the outline of a sphere."""
-    angles = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius
-
-
-def _turned(outline: Array, colour: Colour, picture: Any) -> _Part:
-    """Returns the surface an outline makes that turns about z, with the picture wrapped around it once."""
-    turns = np.linspace(0, 2 * np.pi, _ROUND + 1)
-    low, high = outline[:, 1].min(), outline[:, 1].max()
-    vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for r, z in outline for a in turns])
-    # Pictures for round shapes stand on their head, as Gazebo wraps them.
-    uv = np.array([(1 - a / (2 * np.pi), 1 - (z - low) / (high - low)) for _, z in outline for a in turns])
-    row = len(turns)
-    corners = [(i * row + j, i * row + j + 1) for i in range(len(outline) - 1) for j in range(_ROUND)]
-    triangles = np.array([t for a, b in corners for t in ((a, b, b + row), (a, b + row, a + row))])
-    return _Part(vertices, triangles, None, uv, colour, picture)
-
-
-def _obj_files(name: str, part: _Part) -> dict[str, bytes]:
+def _obj_files(name: str, part: DrawnBody) -> dict[str, bytes]:
     """Returns the files of a part by name: .obj, and with a picture .mtl and .png."""
     files: dict[str, bytes] = {}
     lines: list[str] = []
