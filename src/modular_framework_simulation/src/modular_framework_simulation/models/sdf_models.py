@@ -48,7 +48,8 @@ def sdf_version(root: XmlNode) -> tuple[int, ...]:
     text = root.attributes.get("version", "")
     version = version_numbers(text)
     if not OLDEST_VERSION <= version <= NEWEST_VERSION:
-        raise DescriptionError(root.where, f"got version '{text}'", f"allowed: {span}")
+        allowed = f"allowed: {span}; Gazebo's tool converts older files: gz sdf -p FILE"
+        raise DescriptionError(root.where, f"got version '{text}'", allowed)
     return version
 
 

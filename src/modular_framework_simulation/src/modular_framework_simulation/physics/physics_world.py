@@ -136,6 +136,7 @@ class PhysicsWorld:
         for tree in (written, *written.further):
             number = self.engine.load_urdf(tree.text, model.name, tree.fixed, api.URDF_USE_INERTIA_FROM_FILE)
             parts.append(SimulatedBody(self.engine, number, model.name, tree, model.static, model))
+            parts[-1].release_ball_joints()
             self._set_surfaces(parts[-1], model)
         body = parts[0]
         body.further = tuple(parts[1:])
@@ -298,19 +299,8 @@ class PhysicsWorld:
                 collisionMargin=0.0,
                 physicsClientId=self.engine.client,
             )
-        # Joints of models are free: the engine would otherwise brake them with a motor of its own.
-        for index in body.ball_joint_indices:
-            self.engine.api.setJointMotorControlMultiDof(
-                body.number,
-                index,
-                self.engine.api.POSITION_CONTROL,
-                targetPosition=[0.0, 0.0, 0.0, 1.0],
-                positionGain=0.0,
-                velocityGain=0.0,
-                force=[0.0, 0.0, 0.0],
-                physicsClientId=self.engine.client,
-            )
         for index in body.joint_indices.values():
+            # Joints of models are free: the engine would otherwise brake them with a motor of its own.
             self.engine.api.setJointMotorControl2(
                 body.number, index, self.engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=self.engine.client
             )

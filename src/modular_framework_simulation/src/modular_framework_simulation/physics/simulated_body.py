@@ -149,6 +149,21 @@ class SimulatedBody:
             twist = _twist_at(state.twist, state.pose, centre_in_world)
             api.resetBaseVelocity(self.number, twist.linear, twist.angular, physicsClientId=client)
 
+    def release_ball_joints(self) -> None:
+        """Lets ball joints turn freely: the engine would otherwise brake them with a motor of its own."""
+        api, client = self._engine.api, self._engine.client
+        for index in self.ball_joint_indices:
+            api.setJointMotorControlMultiDof(
+                self.number,
+                index,
+                api.POSITION_CONTROL,
+                targetPosition=[0.0, 0.0, 0.0, 1.0],
+                positionGain=0.0,
+                velocityGain=0.0,
+                force=[0.0, 0.0, 0.0],
+                physicsClientId=client,
+            )
+
     def put_together(self, pose: Pose) -> None:
         """Puts the model somewhere at rest, with its trees where its description has them.
 
