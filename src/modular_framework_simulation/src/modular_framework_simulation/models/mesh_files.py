@@ -120,8 +120,9 @@ class ConvexParts:
             f"they are kept in {self._cache_folder}"
         )
         if not solid.is_volume:  # a hole would make a shell of it, which is cut into many more parts
-            trimesh.repair.fill_holes(solid)
-            trimesh.repair.fix_normals(solid)
+            repair: Any = trimesh.repair
+            repair.fill_holes(solid)
+            repair.fix_normals(solid)
         if not solid.is_volume:
             return _within(_decompose(loaded), hull)
         return _decompose(TriangleMesh(np.asarray(solid.vertices), np.asarray(solid.faces)))
