@@ -56,6 +56,12 @@ def joint_trees(model: Model) -> tuple[JointTree, ...]:
     return tuple(sorted(trees, key=lambda tree: order[tree.links[0]]))
 
 
+def refuse_loops(model: Model) -> None:
+    """Raises DescriptionError where joints of a model that can move form a closed loop."""
+    if not model.static:
+        joint_trees(model)
+
+
 def _grown(model: Model, root: str, joints_at: dict[str, list[Joint]]) -> tuple[Joint, ...]:
     """Returns the joints of the tree that grows from a root."""
     grown: list[Joint] = []
@@ -69,8 +75,8 @@ def _grown(model: Model, root: str, joints_at: dict[str, list[Joint]]) -> tuple[
             away = joint if joint.parent == here else _turned_round(model, joint)
             if away.child in reached:
                 raise DescriptionError(
-                    f"{model.source}: model '{model.name}', joint '{joint.name}'",
-                    f"closes a loop of joints through '{away.child}'",
+                    joint.where or f"{model.source}: joint '{joint.name}'",
+                    f"closes a loop of joints of model '{model.name}' through '{away.child}'",
                     "allowed: joints that form trees; a model may be static instead",
                 )
             reached.add(away.child)

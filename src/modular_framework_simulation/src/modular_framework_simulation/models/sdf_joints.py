@@ -41,11 +41,11 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
         if kind is not specs.JointType.FIXED:
             allowed = "allowed: the world as the parent of a joint that moves; exchange <parent> and <child>"
             raise DescriptionError(child_node.where, "is the world", allowed)
-        return specs.Joint(node.name(), kind, specs.WORLD, parent, Pose(), (0.0, 0.0, 1.0), -math.inf, math.inf)
+        return _without_axis(node, kind, specs.WORLD, parent, Pose())
     joint_in_model = frames.joint_pose_in_model(node)
     pose = frames.pose_in_model(child).inverse() @ joint_in_model
     if kind in _WITHOUT_AXIS:
-        return specs.Joint(node.name(), kind, parent, child, pose, (0.0, 0.0, 1.0), -math.inf, math.inf)
+        return _without_axis(node, kind, parent, child, pose)
     axis_node = node.require("axis")
     axis = _axis_in_joint(axis_node, joint_in_model, frames, version)
     lower, upper = joint_bound(axis_node, "lower", -math.inf), joint_bound(axis_node, "upper", math.inf)
@@ -68,7 +68,13 @@ def read_joint(node: XmlNode, frames: FrameTree, version: Version) -> specs.Join
         drive_bound(axis_node, "effort"),
         drive_bound(axis_node, "velocity"),
         read_joint_dynamics(axis_node),
+        node.where,
     )
+
+
+def _without_axis(node: XmlNode, kind: specs.JointType, parent: str, child: str, pose: Pose) -> specs.Joint:
+    along_z = (0.0, 0.0, 1.0)
+    return specs.Joint(node.name(), kind, parent, child, pose, along_z, -math.inf, math.inf, where=node.where)
 
 
 def _axis_in_joint(node: XmlNode, joint_in_model: Pose, frames: FrameTree, version: Version) -> Vector3:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.joint_trees import refuse_loops
 from modular_framework_simulation.models.sdf_frames import FrameTree
 from modular_framework_simulation.models.sdf_models import LoadedModel, SdfModels, sdf_version
 from modular_framework_simulation.models.sdf_resources import Resources
@@ -49,6 +50,25 @@ def read_world(path: Path, resources: Resources) -> specs.World:
     root = read_xml(path)
     version = sdf_version(root)
     world = root.require("world")
+    loaded, ignored = _models_of(world, version, resources)
+    frames = FrameTree(world, {name: each.placed for name, each in loaded.items()})
+    models = [
+        dataclasses.replace(each.spec, name=name, pose=frames.pose_in_model(name)) for name, each in loaded.items()
+    ]
+    for model in models:
+        refuse_loops(model)
+    return specs.World(
+        world.attributes.get("name", path.stem),
+        _gravity(world, version),
+        tuple(with_saved_state(models, world.find("state"))),
+        tuple(ignored),
+    )
+
+
+def _models_of(
+    world: XmlNode, version: tuple[int, ...], resources: Resources
+) -> tuple[dict[str, LoadedModel], list[str]]:
+    """Returns the models of a world by name, and what else is in it that has no effect."""
     reader = SdfModels(resources)
     loaded: dict[str, LoadedModel] = {}
     ignored: list[str] = []
@@ -66,16 +86,7 @@ def read_world(path: Path, resources: Resources) -> specs.World:
             loaded[model.spec.name] = model
         elif child.tag not in ("gravity", "frame", "state"):
             ignored.append(f"{child.source}:{child.line}: <{child.tag}>")
-    frames = FrameTree(world, {name: each.placed for name, each in loaded.items()})
-    models = [
-        dataclasses.replace(each.spec, name=name, pose=frames.pose_in_model(name)) for name, each in loaded.items()
-    ]
-    return specs.World(
-        world.attributes.get("name", path.stem),
-        _gravity(world, version),
-        tuple(with_saved_state(models, world.find("state"))),
-        tuple(ignored),
-    )
+    return loaded, ignored
 
 
 def read_model_text(text: str, source: str, resources: Resources) -> specs.Model:
@@ -93,6 +104,7 @@ def read_model_text(text: str, source: str, resources: Resources) -> specs.Model
     loaded = SdfModels(resources).in_document(root)
     if loaded is None:
         raise DescriptionError(root.where, "holds a light or an actor only", "a <model> is needed: neither has a body")
+    refuse_loops(loaded.spec)
     placed = FrameTree(root.find("world") or root, {loaded.spec.name: loaded.placed})
     return dataclasses.replace(loaded.spec, pose=placed.pose_in_model(loaded.spec.name))
 

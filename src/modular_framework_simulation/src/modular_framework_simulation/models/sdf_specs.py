@@ -237,6 +237,7 @@ class Joint:
         effort: Largest effort of a drive [N m or N].
         velocity: Largest velocity [rad/s or m/s].
         dynamics: Passive forces.
+        where: File, line and element of its description.
     """
 
     name: str
@@ -250,6 +251,7 @@ class Joint:
     effort: float = math.inf
     velocity: float = math.inf
     dynamics: JointDynamics = JointDynamics()
+    where: str = ""
 
 
 @dataclass(frozen=True, slots=True)

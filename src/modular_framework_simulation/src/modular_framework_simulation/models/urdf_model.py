@@ -259,6 +259,7 @@ def _read_joint(node: XmlNode, links: list[str], extensions: UrdfExtensions, not
         _number(limit, "effort", math.inf),
         _number(limit, "velocity", math.inf),
         extensions.dynamics(node.name(), _number(dynamics, "damping", 0.0), _number(dynamics, "friction", 0.0)),
+        node.where,
     )
 
 
