@@ -134,6 +134,15 @@ def test_converted_files_follow_the_content_of_their_pictures(model_folder: Path
     assert meshes.parts(look)[0].file.parent != first[0].file.parent
 
 
+def test_a_picture_that_a_mesh_names_and_that_is_not_there_is_noted(model_folder: Path) -> None:
+    text = """<sdf version='1.6'><model name='m'><static>1</static><link name='l'><visual name='v'><geometry><mesh>
+        <uri>model://sign/meshes/sign.dae</uri></mesh></geometry></visual></link></model></sdf>"""
+    assert read_model_text(text, "text", Resources((model_folder.parent,))).notes == ()
+    (model_folder / "materials" / "textures" / "paint.png").unlink()
+    notes = read_model_text(text, "text", Resources((model_folder.parent,))).notes
+    assert notes == ("text:1: <visual name='v'>: the picture 'paint.png' of sign.dae is not there: drawn without",)
+
+
 def test_materials_are_found_by_name(model_folder: Path) -> None:
     def read(name: str) -> tuple[specs.Visual, tuple[str, ...]]:
         script = (

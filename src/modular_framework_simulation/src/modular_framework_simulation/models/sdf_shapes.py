@@ -14,6 +14,7 @@ from modular_framework_simulation.models.sdf_frames import FrameTree
 from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_surface import read_bounce, read_friction, read_surface_contact
+from modular_framework_simulation.models.visual_meshes import missing_pictures
 from modular_framework_simulation.models.xml_nodes import XmlNode
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
@@ -65,6 +66,11 @@ def read_visuals(node: XmlNode, link: str, frames: FrameTree, reading: Reading) 
         reading.notes.add(node, f"is not drawn: {error}")
         return []
     material = _read_material(node, reading)
+    for shape in (shape for _, shape in shapes if isinstance(shape, specs.Mesh) and material is None):
+        for picture in missing_pictures(shape.path):
+            reading.notes.add(
+                node, f"the picture '{picture}' of {shape.path.name} is not there: drawn without", picture
+            )
     transparency = node.find("transparency")
     look = material or Material()
     red, green, blue, alpha = look.colour

@@ -35,6 +35,7 @@ _CACHE_VERSION = "2"
 _LIST = "parts.json"
 _PICTURE = re.compile(rb"<init_from>\s*([^<]+?)\s*</init_from>|^\s*(?:map_Kd|mtllib)\s+(.+?)\s*$", re.MULTILINE)
 _WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
+_IMAGE = re.compile(rb"<image\b[^>]*>\s*<init_from>\s*([^<]+?)\s*</init_from>")
 _LEAST_ALPHA = 0.05
 """Exporters disagree about what is transparent: a part that would not be seen at all is drawn opaque."""
 _LARGEST_PICTURE_PX = 2048
@@ -125,6 +126,17 @@ def find_picture(mesh: Path, name: str) -> Path | None:
         if base and candidate.is_file():
             return candidate
     return None
+
+
+def missing_pictures(mesh: Path) -> list[str]:
+    """Returns the pictures that a COLLADA file names and that are not there."""
+    if mesh.suffix.lower() != ".dae":
+        return []
+    try:
+        names = [name.decode(errors="replace") for name in _IMAGE.findall(mesh.read_bytes())]
+    except OSError:
+        return []
+    return [name for name in dict.fromkeys(names) if find_picture(mesh, name) is None]
 
 
 class _Pictures:
