@@ -126,6 +126,15 @@ def test_a_part_of_a_mesh_is_touched_and_drawn_alone(model_folder: Path, tmp_pat
         load_mesh(specs.Mesh(mesh.path, submesh="roof"))
 
 
+def test_an_obj_file_is_drawn_with_the_pictures_of_its_materials(model_folder: Path, tmp_path: Path) -> None:
+    mesh = model_folder / "meshes" / "flag.obj"
+    mesh.write_text("mtllib flag.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl cloth\nf 1/1 2/2 3/3\n")
+    (model_folder / "meshes" / "flag.mtl").write_text("newmtl cloth\n\tKd 0.5 0.5 0.5\n\tmap_Kd paint.png\n")
+    (part,) = VisualMeshes(tmp_path / "cache").parts(visual(specs.Mesh(mesh)))
+    with Image.open(part.file.with_suffix(".png")) as picture:
+        assert picture.getpixel((0, 0)) == (0, 200, 0)
+
+
 def test_converted_files_follow_the_content_of_their_pictures(model_folder: Path, tmp_path: Path) -> None:
     meshes, look = VisualMeshes(tmp_path / "cache"), visual(specs.Mesh(model_folder / "meshes" / "sign.dae"))
     first = meshes.parts(look)

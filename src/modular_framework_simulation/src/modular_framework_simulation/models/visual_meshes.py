@@ -31,7 +31,7 @@ from modular_framework_simulation.models.mesh_files import load_mesh, write_fold
 from modular_framework_simulation.models.sdf_specs import Box, Colour, Cylinder, Mesh, Plane, Sphere, Visual
 from modular_framework_urdf import collada
 
-_CACHE_VERSION = "2"
+_CACHE_VERSION = "3"
 _LIST = "parts.json"
 _PICTURE = re.compile(rb"<init_from>\s*([^<]+?)\s*</init_from>|^\s*(?:map_Kd|mtllib)\s+(.+?)\s*$", re.MULTILINE)
 _WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
@@ -151,6 +151,10 @@ class _Pictures:
         if picture is None:
             raise FileNotFoundError(name)
         return picture.read_bytes()
+
+    def __getitem__(self, name: str) -> bytes:
+        """Returns the content of a file; so the reader asks for the materials of an .obj file."""
+        return self.get(name)
 
 
 def _make(visual: Visual) -> list[DrawnBody]:
