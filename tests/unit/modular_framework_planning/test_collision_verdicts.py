@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Verdicts of the compiled collision check against a second checker; 10,000 states: benchmarks/collision_verdicts."""
+"""Verdicts of the compiled collision check against a second checker; 10,000 of each: benchmarks/collision_verdicts."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from collision_worlds import Verdicts, compare_verdicts, world_with
+from collision_worlds import Comparison, Verdicts, compared_around, compared_in, world_with
 from independent_checker import IndependentChecker
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
@@ -13,7 +15,7 @@ from modular_framework_planning.planning_interface.motion_check import MotionChe
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
 
-WORLDS, STATES_PER_WORLD = 5, 120
+WORLDS = 5
 
 
 @pytest.fixture(scope="module")
@@ -21,14 +23,30 @@ def second(robot: object) -> IndependentChecker:
     return IndependentChecker(robot.urdf, robot.srdf, package_resolver)
 
 
-def test_no_touching_state_is_called_free_and_no_free_one_far_from_contact_is_refused(
-    model: RobotModel, second: IndependentChecker
+@pytest.mark.parametrize(("compare", "count", "seed"), [(Comparison.states, 120, 11), (Comparison.edges, 20, 13)])
+def test_nothing_that_touches_is_called_free_and_nothing_far_from_contact_is_refused(
+    model: RobotModel,
+    second: IndependentChecker,
+    compare: Callable[[Comparison, np.random.Generator, int], Verdicts],
+    count: int,
+    seed: int,
 ) -> None:
-    rng = np.random.default_rng(11)
-    total = sum((compare_verdicts(model, second, rng, STATES_PER_WORLD, held) for held in range(WORLDS)), Verdicts())
-    assert total.states == WORLDS * STATES_PER_WORLD
+    rng, total = np.random.default_rng(seed), Verdicts()
+    for held in range(WORLDS):
+        total += compare(compared_in(world_with(model, second, rng, held), second), rng, count)
+    assert total.asked == WORLDS * count
     assert total.touching_called_free == 0 and total.refused_though_apart == 0, total
-    assert 0.1 * total.states < total.free < 0.9 * total.states
+    assert 0.1 * total.asked < total.free < 0.9 * total.asked
+
+
+@pytest.mark.parametrize("compare", [Comparison.states, Comparison.edges])
+def test_joints_that_stay_move_no_pair_that_is_compared(
+    model: RobotModel, second: IndependentChecker, compare: Callable[[Comparison, np.random.Generator, int], Verdicts]
+) -> None:
+    rng = np.random.default_rng(14)
+    total = compare(compared_around(model, second, rng, model.group("arm_and_manipulator").indices[2:]), rng, 40)
+    assert total.touching_called_free == 0 and total.refused_though_apart == 0, total
+    assert total.free > 4
 
 
 def test_states_on_a_path_called_free_touch_nothing(model: RobotModel, second: IndependentChecker) -> None:
