@@ -15,6 +15,8 @@ import pinocchio as pin
 from numba.core.dispatcher import Dispatcher
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot, OrientationConstraint
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
@@ -26,7 +28,12 @@ from modular_framework_planning.planners.stomp.planner import StompPlanner
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings, PlanningRequest, PoseGoal
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_pipeline.plugins import make_adapters
-from modular_framework_planning.planning_scene.planning_scene import AttachedObject, CollisionObject, empty_scene
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    empty_scene,
+)
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -56,8 +63,21 @@ def held(name: str, link: str) -> AttachedObject:
     return AttachedObject(body, link, frozenset((link,)))
 
 
+def upright(scene: PlanningScene, link: str) -> KinematicConstraints:
+    """The link keeps its tilt."""
+    model = scene.model
+    frame, pose = model.pin_model.frames[model.frame_ids[link]], model.link_transforms(scene.positions)[link]
+    turn = OrientationConstraint(
+        FrameOnRobot(link, frame.parentJoint, frame.placement),
+        FrameOnRobot(model.planning_frame, 0, pin.SE3.Identity()),
+        pose.rotation,
+        np.array([0.2, 0.2, 7.0]),
+    )
+    return KinematicConstraints(model, orientations=[turn])
+
+
 def use(model: RobotModel) -> None:
-    """Maps, solves, plans in two ways and asks for contacts."""
+    """Maps, solves, plans in two ways, with and without path constraints, and asks for contacts."""
     far = np.array([[2.0, 0.3, 0.5], [2.0, 0.4, 0.5]])
     voxels = empty_map(0.05).with_point_cloud(np.array([0.0, 0.0, 1.0]), far, far[:0], far + 1.0)
     voxels = read_stream(write_full(voxels), 0.05, False).freed(voxels.keys[:1])
@@ -72,7 +92,11 @@ def use(model: RobotModel) -> None:
     settings = PipelineSettings(seed=1, parameters={"num_iterations": 5})
     for planner in (OmplPlanner(), StompPlanner.configure(model, settings)):
         pipeline = PlanningPipeline(model, kinematics, settings, planner, make_adapters())
-        pipeline.plan(PlanningRequest(scene, GROUP, (PoseGoal(group.tip_link, goal),), allowed_time_s=60.0))
+        for constraints in (None, upright(scene, group.tip_link)):
+            request = PlanningRequest(
+                scene, GROUP, (PoseGoal(group.tip_link, goal),), allowed_time_s=60.0, path_constraints=constraints
+            )
+            pipeline.plan(request)
     ExactCollisionChecker(scene).contacts(positions)
 
 

@@ -14,14 +14,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from modular_framework_planning.constraints.compiled_constraints import SLACK
 from modular_framework_planning.geometry.regions import Solid
 from modular_framework_planning.geometry.spatial import Array, Transform
-
-SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a region of no extent can be met
-INSIDE = 1.0e-5  # [m]; projections aim this far inside a region, not at its border
-INNER_SHARE = 0.9  # of a rotation's tolerance, which projections aim at: straight motions between two states bulge
-TIGHT = 0.005  # [m] or [rad]; within smaller tolerances projections aim at the middle, also where others are violated
-Row = tuple[Array, float]  # one linearised condition: (gradient over the joints, desired change)
 
 
 class Parameterization(Enum):
@@ -61,15 +56,6 @@ class FrameOnRobot:
         """Returns the pose in the planning frame; `data` holds the joint placements of the state."""
         return data.oMi[self.joint] * self.placement if self.joint else self.placement
 
-    def jacobian_at(self, model: Any, data: Any, point: Array) -> Array:
-        """Returns how joint velocities move this frame, linear at `point` above angular, shape (6, nv)."""
-        if not self.joint:
-            return np.zeros((6, model.nv))
-        jacobian = pin.getJointJacobian(model, data, self.joint, pin.LOCAL_WORLD_ALIGNED)
-        x, y, z = point - data.oMi[self.joint].translation
-        jacobian[:3] -= np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ jacobian[3:]
-        return jacobian
-
 
 @dataclass(frozen=True, slots=True)
 class JointConstraint:
@@ -107,10 +93,6 @@ class JointConstraint:
         )
         return ConstraintResult("joint", self.name, kept, self.weight * abs(value), text)
 
-    def conditions(self, *_: Any) -> tuple[bool, list[Row]]:
-        """Returns no condition: a projection keeps joints within their tolerance by clipping."""
-        return False, []
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionConstraint:
@@ -128,43 +110,24 @@ class PositionConstraint:
     regions: tuple[tuple[Solid, Transform], ...]
     weight: float = 1.0
 
-    def _gap(self, data: Any) -> tuple[float, Array, Array, Transform, Solid]:
-        """Returns distance to the closest region, the point there, the point in the region's frame, its pose, it."""
+    def _gap(self, data: Any) -> tuple[float, Array]:
+        """Returns the distance to the closest region, and the point in the frame of that one."""
         point = self.link.pose(data).act(self.offset)
         reference = self.reference.pose(data)
-        best = None
-        for solid, pose in self.regions:
-            region = reference * pose
-            inside = region.actInv(point)
-            nearest = solid.nearest(inside)
-            distance = float(np.linalg.norm(nearest - inside))
-            if best is None or distance < best[0]:
-                best = (distance, nearest, inside, region, solid)
-        assert best is not None, "a position constraint has at least one region"
-        return best
+        inside = [(reference * pose).actInv(point) for _, pose in self.regions]
+        gaps = [
+            float(np.linalg.norm(solid.nearest(at) - at)) for (solid, _), at in zip(self.regions, inside, strict=True)
+        ]
+        closest = int(np.argmin(gaps))
+        return gaps[closest], inside[closest]
 
     def evaluate(self, data: Any, _: Array) -> ConstraintResult:
         """Evaluates the state whose joint placements `data` holds."""
-        distance, _nearest, inside, _region, _solid = self._gap(data)
+        distance, inside = self._gap(data)
         text = f"link '{self.link.name}' is {distance:.4f} m outside its region"
         return ConstraintResult(
             "position", self.link.name, distance <= SLACK, self.weight * float(np.linalg.norm(inside)), text
         )
-
-    def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
-        """Returns whether the point is outside, and what brings or keeps it inside; `data` holds joint Jacobians."""
-        distance, nearest, inside, region, solid = self._gap(data)
-        violated, tight = distance > SLACK, solid.extent <= TIGHT
-        if not (violated or tight):
-            return False, []
-        point = region.act(inside)
-        speed = self.link.jacobian_at(model, data, point)[:3] - self.reference.jacobian_at(model, data, point)[:3]
-        if tight:
-            return violated, list(zip(speed, (region.translation - point).tolist(), strict=True))
-        depth = float(np.linalg.norm(nearest))
-        wanted = region.rotation @ (nearest * (1.0 - min(INSIDE / depth, 0.5)) - inside if depth > 0.0 else -inside)
-        size = float(np.linalg.norm(wanted))
-        return violated, [(wanted / size @ speed, size)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,31 +168,6 @@ class OrientationConstraint:
         )
         return ConstraintResult("orientation", self.link.name, excess <= SLACK, self.weight * float(angles.sum()), text)
 
-    def conditions(self, model: Any, data: Any) -> tuple[bool, list[Row]]:
-        """Returns whether the rotation is off, and a condition per axis that brings or keeps it within the tolerances.
-
-        Args:
-            model: Pinocchio's model of the robot.
-            data: holds the joint Jacobians of the state.
-        """
-        angles, turned = self.deviation(data)
-        tight = self.tolerances <= TIGHT
-        violated = float((np.abs(angles) - self.tolerances).max()) > SLACK
-        limits = np.where(tight, 0.0, INNER_SHARE * self.tolerances)
-        chosen = np.flatnonzero(tight | (violated & (np.abs(angles) > limits)))
-        if not len(chosen):
-            return violated, []
-        reference = self.reference.pose(data)
-        where = self.link.pose(data).translation
-        spin = (self.link.jacobian_at(model, data, where) - self.reference.jacobian_at(model, data, where))[3:]
-        in_target = (reference.rotation @ self.target).T @ spin
-        if self.parameterization is Parameterization.ROTATION_VECTOR:
-            rates = self.target @ pin.Jlog3(turned) @ turned.T @ in_target
-        else:
-            rates = _euler_rates(angles) @ in_target
-        aims = np.clip(angles, -limits, limits) - angles
-        return violated, [(rates[number], float(aims[number])) for number in chosen]
-
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random rotation within the tolerances, in the reference frame, shape (3, 3)."""
         angles = rng.uniform(-1.0, 1.0, 3) * np.minimum(self.tolerances, np.pi)
@@ -256,21 +194,6 @@ def euler_xyz(rotation: Array) -> tuple[Array, bool]:
         return np.array([np.arctan2(rotation[2, 1], rotation[1, 1]), pitch, 0.0]), False
     roll = np.arctan2(-rotation[1, 2], rotation[2, 2])
     return np.array([roll, pitch, np.arctan2(-rotation[0, 1], rotation[0, 0])]), True
-
-
-def _euler_rates(angles: Array) -> Array:
-    """Returns the matrix from angular velocity (in the frame the angles start in) to rates of XYZ Euler angles."""
-    sine, cosine = np.sin(angles[0]), np.cos(angles[0])
-    pitch_cosine, pitch_sine = np.cos(angles[1]), np.sin(angles[1])
-    pitch_cosine = float(np.copysign(max(abs(pitch_cosine), 1.0e-3), pitch_cosine))
-    tangent = pitch_sine / pitch_cosine
-    return np.array(
-        [
-            [1.0, sine * tangent, -cosine * tangent],
-            [0.0, cosine, sine],
-            [0.0, -sine / pitch_cosine, cosine / pitch_cosine],
-        ]
-    )
 
 
 Constraint = JointConstraint | PositionConstraint | OrientationConstraint

@@ -4,11 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from modular_framework_planning.constraints.compiled_constraints import (
+    Conditions,
+    Drive,
+    edges_hold,
+    first_violated,
+    project,
+)
+from modular_framework_planning.constraints.condition_arrays import arrays_of, drive_of, whole_drive
 from modular_framework_planning.constraints.constraint_kinds import (
     Constraint,
     ConstraintResult,
@@ -19,8 +28,6 @@ from modular_framework_planning.constraints.constraint_kinds import (
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-MAX_STEP = 0.3  # [rad or m]; of any joint in one step of a projection
-DAMPING = 1.0e-6
 LOOSE = 0.02  # [m] or [rad]; tolerances above this are worth sampling in
 Index = Sequence[int] | NDArray[np.int64]
 
@@ -28,7 +35,7 @@ Index = Sequence[int] | NDArray[np.int64]
 class KinematicConstraints:
     """Constraints that must all hold at once.
 
-    Not for use from two threads at a time: it holds the working memory of forward kinematics; `copy` gives another.
+    Not for use from two threads at a time: it holds the working memory of forward kinematics.
     Positions are those of the whole robot [rad or m].
     """
 
@@ -51,9 +58,14 @@ class KinematicConstraints:
         """Whether every state satisfies."""
         return not self._all
 
-    def copy(self) -> KinematicConstraints:
-        """Returns the same constraints with working memory of their own."""
-        return KinematicConstraints(self.model, self.joints, self.positions, self.orientations, self.name)
+    @cached_property
+    def arrays(self) -> tuple[Conditions, NDArray[np.int64]]:
+        """The constraints as compiled loops take them, and the indices in a position vector of their joints."""
+        return arrays_of(self.model, self.joints, self.positions, self.orientations)
+
+    @cached_property
+    def _whole(self) -> Drive:
+        return whole_drive(self.arrays[1])
 
     def evaluate(self, positions: Array) -> list[ConstraintResult]:
         """Returns one result a constraint: joints first, then positions, then orientations."""
@@ -62,10 +74,20 @@ class KinematicConstraints:
 
     def satisfied(self, positions: Array) -> bool:
         """Whether a state keeps every constraint."""
-        if not self._all:
-            return True
-        pin.forwardKinematics(self.model.pin_model, self._data, positions)
-        return all(item.evaluate(self._data, positions).satisfied for item in self._all)
+        return self.first_violated(np.asarray(positions, dtype=float)[None]) < 0
+
+    def first_violated(self, states: Array) -> int:
+        """Returns the number of the first of some states (n, joints) that violates a constraint; -1 for none."""
+        return int(first_violated(self.arrays[0], self._whole, np.ascontiguousarray(states, dtype=float)))
+
+    def edges_hold(self, vertices: Array, step: float) -> bool:
+        """Whether straight motions keep every constraint, their start left out.
+
+        Args:
+            vertices: positions of the whole robot, shape (n, joints).
+            step: most distance of the samples that are looked at, in any joint [rad or m].
+        """
+        return bool(edges_hold(self.arrays[0], self._whole, np.ascontiguousarray(vertices, dtype=float), step))
 
     def describe(self, positions: Array) -> str:
         """Says which constraints a state violates and by how much; empty where it keeps all."""
@@ -132,26 +154,13 @@ class KinematicConstraints:
             return None
         members = {int(number) for number in chosen}
         current = np.array(positions, dtype=float)
-        current[chosen] = np.clip(current[chosen], lower, upper)
-        for _ in range(steps):
-            current = self.model.with_mimics(current, members)
-            pin.computeJointJacobians(self.model.pin_model, self._data, current)
-            found = [item.conditions(self.model.pin_model, self._data) for item in self._all]
-            if not any(violated for violated, _ in found):
-                return current if self.satisfied(current) else None
-            rows = [row for _, conditions in found for row in conditions]
-            rates = self._group_rates(np.array([row[0] for row in rows]), chosen)
-            step = _bounded_step(rates, np.array([row[1] for row in rows]), current[chosen], lower, upper)
-            current[chosen] = np.clip(current[chosen] + step, lower, upper)
-        return None
-
-    def _group_rates(self, rates: Array, indices: NDArray[np.int64]) -> Array:
-        """Picks the columns of the moving joints; what mimic joints add goes to their leaders."""
-        if self.model.mimics:
-            rates = rates.copy()
-            for follower, leader, multiplier, _ in self.model.mimics:
-                rates[:, leader] += multiplier * rates[:, follower]
-        return rates[:, indices]
+        values = np.clip(current[chosen], lower, upper)
+        if not project(
+            self.arrays[0], drive_of(self.model, self.arrays[1], chosen, current), values, lower, upper, steps
+        ):
+            return None
+        current[chosen] = values
+        return self.model.with_mimics(current, members)
 
     def sample(self, rng: np.random.Generator, positions: Array, indices: Index, attempts: int = 20) -> Array | None:
         """Returns a random state that satisfies: random joint values, then `project`; None after the attempts.
@@ -175,19 +184,3 @@ class KinematicConstraints:
             if found is not None:
                 return found
         return None
-
-
-def _bounded_step(rates: Array, wanted: Array, values: Array, lower: Array, upper: Array) -> Array:
-    """Returns the damped least-squares step; joints it would push over a bound stay and the others take over."""
-    free = np.ones(len(values), dtype=bool)
-    step = np.zeros(len(values))
-    for _ in range(3):
-        active = rates * free
-        damped = active @ active.T + DAMPING * np.eye(len(wanted))
-        step = active.T @ np.linalg.solve(damped, wanted)
-        step *= min(1.0, MAX_STEP / max(float(np.abs(step).max()), 1.0e-12))
-        blocked = free & (((values <= lower) & (step < 0.0)) | ((values >= upper) & (step > 0.0)))
-        if not blocked.any():
-            break
-        free &= ~blocked
-    return step

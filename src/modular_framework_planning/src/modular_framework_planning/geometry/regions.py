@@ -178,6 +178,11 @@ class HullSolid:
         self._shares = volumes / volumes.sum()
 
     @property
+    def faces(self) -> Array:
+        """Outward unit normals and offsets [m], shape (n, 4): of a point inside, normal . point + offset is below 0."""
+        return np.column_stack([self._normals, self._offsets])
+
+    @property
     def extent(self) -> float:
         """Greatest distance of a point from the origin [m]."""
         return float(np.linalg.norm(self._vertices, axis=1).max())

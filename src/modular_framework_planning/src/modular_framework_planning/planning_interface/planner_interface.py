@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from modular_framework_planning.constraints.constrained_motion import ConstrainedMotion
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
@@ -181,16 +182,24 @@ class PlanningProblem:
         Constraints are checked no more finely than the solution validator does.
         """
         step = step or self.step
-        if not self.motion.edge_is_free(first, second, step):
-            return False
-        if self.constraints is None:
-            return True
-        step = max(step, self.settings.motion_step)
-        count = max(1, int(np.ceil(float(np.abs(second - first).max()) / step)))
-        return all(
-            self.constraints.satisfied(self.motion.full_positions(first + number / count * (second - first)))
-            for number in range(1, count + 1)
+        return self.keeps_constraints(np.array([first, second]), step) and self.motion.edge_is_free(first, second, step)
+
+    def keeps_constraints(self, polyline: Array, step: float) -> bool:
+        """Whether straight motions satisfy the path constraints (their start is not checked).
+
+        Args:
+            polyline: joint vectors, shape (n, joints).
+            step: distance of samples [rad or m]; it is never finer than the solution validator's.
+        """
+        return self.constraints is None or self.constraints.edges_hold(
+            self.motion.full_path(polyline), max(step, self.settings.motion_step)
         )
+
+    def constrained_motion(self, step: float) -> ConstrainedMotion:
+        """Returns motions of the group along the path constraints, which are looked at `step` apart [rad or m]."""
+        assert self.constraints is not None
+        finest = self.settings.motion_step
+        return ConstrainedMotion(self.constraints, self.group.indices, self.start, max(step, finest), finest)
 
     def cancelled(self) -> bool:
         """Whether a stop was requested."""
@@ -268,10 +277,15 @@ def no_path(problem: PlanningProblem, what: str, states: int | None = None) -> P
     if problem.cancelled():
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s{tried}")
     timed_out = time.monotonic() > problem.deadline_s
+    where = (
+        "start and goal are free, so the way between them is blocked or narrow: allow more time or choose another goal"
+        if problem.constraints is None
+        else "start and goal are free and satisfy the path constraints, but no or hardly a way "
+        "between them does: allow more time, choose another goal or widen the tolerances"
+    )
     return PlanningError(
         ErrorCode.TIMED_OUT if timed_out else ErrorCode.PLANNING_FAILED,
         f"{what} found no path in {spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s, the last "
         f"{problem.end_s - problem.deadline_s:.2f} s of them for the check of a motion)"
-        f"{': time ran out' if timed_out else ': nothing was left to try'}{tried}; start and goal are free, so the "
-        "way between them is blocked or narrow: allow more time or choose another goal",
+        f"{': time ran out' if timed_out else ': nothing was left to try'}{tried}; {where}",
     )

@@ -8,13 +8,15 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.phase_times import REPAIR, SEARCH, SHORTENING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
-from modular_framework_planning.trajectory_processing.path_shortening import drop_vertices, shorten
+from modular_framework_planning.trajectory_processing.constrained_shortening import cut_along
+from modular_framework_planning.trajectory_processing.path_shortening import EdgeTest, drop_vertices, shorten
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
@@ -51,6 +53,8 @@ class PathSearch:
         if self.repairs:
             with problem.phases.measured(REPAIR):
                 vertices = self._planner.repaired(problem, vertices)  # type: ignore[attr-defined]
+        if simplify and problem.constraints is not None:
+            vertices = _shortened(problem, vertices, partial(_cut_along_constraints, problem))
         if simplify:
             vertices = _shortened(problem, vertices, partial(shorten, rng=problem.rng))
         self._found = replace(path, vertices=vertices)
@@ -96,3 +100,15 @@ def _shortened(problem: PlanningProblem, path: Array, shorten_path: Callable[...
             lambda first, second: problem.edge_is_valid(first, second, fine),
             math.inf if problem.repeatable else limit,
         )
+
+
+def _cut_along_constraints(problem: PlanningProblem, path: Array, _: EdgeTest, deadline: float) -> Array:
+    """Shortens a path along its constraints; what it accepts was checked as finely as the solution validator does."""
+    fine = problem.settings.finest_step
+
+    def is_valid(polyline: Array) -> bool:
+        return problem.keeps_constraints(polyline, fine) and all(
+            problem.motion.edge_is_free(first, second, fine) for first, second in pairwise(polyline)
+        )
+
+    return cut_along(path, problem.constrained_motion(problem.step).way, is_valid, deadline, problem.rng)

@@ -53,7 +53,7 @@ class TrajectoryValidator:
                     ),
                     "",
                 )
-                text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
+                text = text or _violation(problem, path)
         if not text:
             self._passed[key] = problem.checker
         return text
@@ -97,11 +97,14 @@ def _require_time(problem: PlanningProblem) -> None:
         )
 
 
-def _violation(problem: PlanningProblem, samples: Array) -> str:
-    if problem.constraints is None:
+def _violation(problem: PlanningProblem, path: PlannedPath) -> str:
+    if problem.constraints is None or path.trajectory is None:
         return ""
-    for number, values in enumerate(samples):
-        full = problem.motion.full_positions(values)
-        if not problem.constraints.satisfied(full):
-            return f"sample {number} of {len(samples)} violates a path constraint: {problem.constraints.describe(full)}"
-    return ""
+    samples = path.trajectory.curve(problem.settings.motion_step)
+    states = problem.motion.full_path(samples[_sample_at(samples, path, path.unconstrained) :])
+    number = problem.constraints.first_violated(states)
+    if number < 0:
+        return ""
+    return (
+        f"sample {number} of {len(states)} violates a path constraint: {problem.constraints.describe(states[number])}"
+    )

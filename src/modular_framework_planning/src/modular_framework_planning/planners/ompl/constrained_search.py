@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A search under path constraints that random states rarely satisfy: each step is projected onto the constraints.
+"""A search under path constraints, also such that random states rarely satisfy: each step is projected onto them.
 
 Two trees grow from the start and from the goals as in CBiRRT (Berenson, Srinivasa, Ferguson, Kuffner: Manipulation
-planning on constraint manifolds, ICRA 2009): a tree steps towards a target, projects the step onto the constraints and
-keeps it while it comes nearer; then the other tree tries to reach what was added.
+planning on constraint manifolds, ICRA 2009): the smaller one walks towards a random state, projects each step onto the
+constraints and keeps it while it comes nearer; then the other one walks to what was reached. The walks are compiled.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from modular_framework_planning.constraints.compiled_constraints import nearest_state
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 
-STEP = 0.1  # [rad or m] of a tree, before projection
 TIGHT_SHARE = 0.1  # constraints that fewer of the random states satisfy are searched by projection
 SAMPLES = 100
+STATES_AT_ONCE = 4  # of a walk, between two checks for collisions
 NAME = "CBiRRT"
 
 
@@ -26,7 +27,7 @@ def constraints_are_tight(problem: PlanningProblem) -> bool:
         return False
     low, high = problem.search_bounds(problem.start_values[None])
     states = problem.rng.uniform(low, high, (SAMPLES, len(low)))
-    kept = sum(constraints.satisfied(problem.motion.full_positions(values)) for values in states)
+    kept = sum(constraints.satisfied(state) for state in problem.motion.full_path(states))
     return kept < TIGHT_SHARE * SAMPLES
 
 
@@ -54,7 +55,7 @@ class _Tree:
 
     def nearest(self, values: Array) -> int:
         """Returns the number of the vertex nearest to a joint vector."""
-        return int(np.argmin(((self.values - values) ** 2).sum(axis=1)))
+        return int(nearest_state(self.values, values))
 
     def branch(self, number: int) -> Array:
         """Returns the vertices from the root to a vertex."""
@@ -75,67 +76,44 @@ class ConstrainedSearch:
 
         Args:
             problem: with constraints.
-            step: distance of collision checks along an edge [rad or m].
+            step: distance of checks along an edge [rad or m].
             goals: others than the problem's.
             most_states: how many states to try.
         """
         self._problem, self._step, self._goals, self._most_states = problem, step, goals, most_states
         self._low, self._high = problem.search_bounds(problem.start_values[None])
+        self._motion = problem.constrained_motion(step)
         self._states = 0
 
     def run(self) -> PlannedPath:
         """Returns a path whose edges satisfy the constraints; raises PlanningError when time or states are used up."""
         problem = self._problem
-        grown, other = (
-            _Tree(problem.start_values[None, :]),
-            _Tree(problem.goal_states() if self._goals is None else self._goals),
-        )
-        forward = True
+        goals = problem.goal_states() if self._goals is None else self._goals
+        trees = _Tree(problem.start_values[None, :]), _Tree(goals)
         while not self._ends():
-            target = problem.rng.uniform(self._low, self._high)
-            reached = self._grow(grown, target)
+            forward = len(trees[0].values) <= len(trees[1].values)  # the tree in the narrower place keeps up
+            grown, other = trees if forward else trees[::-1]
+            reached = self._grow(grown, problem.rng.uniform(self._low, self._high))
             met = self._grow(other, grown.values[reached])
-            if np.abs(other.values[met] - grown.values[reached]).max() < 1e-9:
-                first, last = grown.branch(reached), other.branch(met)
-                if not forward:
-                    first, last = last, first
+            if np.array_equal(other.values[met], grown.values[reached]):
+                ends = (reached, met) if forward else (met, reached)
+                first, last = (tree.branch(end) for tree, end in zip(trees, ends, strict=True))
                 return PlannedPath(np.vstack([first, last[::-1][1:]]), planner_id=NAME)
-            grown, other, forward = other, grown, not forward
         raise no_path(problem, NAME, self._states)
 
     def _ends(self) -> bool:
         return self._states >= self._most_states or self._problem.interrupted()
 
     def _grow(self, tree: _Tree, target: Array) -> int:
-        """Steps from the nearest vertex to a target as far as that goes; returns the last vertex."""
+        """Walks from the nearest vertex to a target as far as that goes; returns the last vertex."""
         number = tree.nearest(target)
         while not self._ends():
-            here = tree.values[number].copy()
-            gap = target - here
-            distance = float(np.linalg.norm(gap))
-            if distance < 1e-9:
+            states = self._motion.steps_towards(tree.values[number].copy(), target, STATES_AT_ONCE)
+            for state in states:
+                self._states += 1
+                if not self._problem.motion.edge_is_free(tree.values[number], state, self._step):
+                    return number
+                number = tree.add(state, number)
+            if len(states) < STATES_AT_ONCE:
                 break
-            following = self._step_to(here, target if distance <= STEP else here + STEP / distance * gap)
-            if following is None or np.linalg.norm(target - following) >= distance - 1e-6:
-                break
-            number = tree.add(following, number)
         return number
-
-    def _step_to(self, here: Array, wanted: Array) -> Array | None:
-        """Returns the projected step, or None where it is not valid; halved where the edge leaves the constraints."""
-        problem = self._problem
-        assert problem.constraints is not None
-        for _ in range(4):
-            self._states += 1
-            full = problem.motion.full_positions(wanted)
-            if not problem.constraints.satisfied(full):
-                projected = problem.constraints.project(full, problem.group.indices)
-                if projected is None:
-                    return None
-                wanted = projected[problem.group.indices]
-            if np.linalg.norm(wanted - here) > 2.0 * STEP or not problem.motion.state_is_free(wanted):
-                return None
-            if problem.edge_is_valid(here, wanted, self._step):
-                return wanted
-            wanted = 0.5 * (here + wanted)
-        return None

@@ -64,7 +64,7 @@ class OmplPlanner:
         for goal in goals:
             if problem.edge_is_valid(start, goal, problem.settings.finest_step):
                 return PlannedPath(np.vstack([start, goal]))
-        if problem.constraints is not None and constraints_are_tight(problem):
+        if problem.constraints is not None and (problem.planner_id == "RRTConnect" or constraints_are_tight(problem)):
             most_states = problem.request.most_iterations
             return ConstrainedSearch(problem, step, most_states=math.inf if most_states is None else most_states).run()
         if problem.repeatable and problem.planner_id in THREADED:
@@ -128,7 +128,7 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
         deadline_s=problem.end_s,
     )
     fine = problem.settings.finest_step
-    if problem.constraints is not None and constraints_are_tight(problem):
+    if problem.constraints is not None:
         try:
             return ConstrainedSearch(near, fine, second[None], CONSTRAINED_CONNECTION_STATES).run().vertices
         except PlanningError:
