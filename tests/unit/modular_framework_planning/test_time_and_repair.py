@@ -15,6 +15,7 @@ import trimesh
 from independent_checker import IndependentChecker, box
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.constraints.constrained_motion import ConstrainedMotion
 from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot, OrientationConstraint
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -201,16 +202,16 @@ def test_every_edge_of_a_repaired_path_is_free(model: RobotModel, pool: Kinemati
 def test_the_search_round_an_edge_under_constraints_does_not_depend_on_the_clock(
     model: RobotModel, pool: KinematicsPool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    satisfied = KinematicConstraints.satisfied
+    steps_towards = ConstrainedMotion.steps_towards
     delay_s, looked = 0.0, 0
 
-    def watched(self: KinematicConstraints, *arguments: Any) -> Any:
+    def watched(self: ConstrainedMotion, *arguments: Any) -> Any:
         nonlocal looked
         looked += 1
         time.sleep(delay_s)  # as on a busy computer
-        return satisfied(self, *arguments)
+        return steps_towards(self, *arguments)
 
-    monkeypatch.setattr(KinematicConstraints, "satisfied", watched)
+    monkeypatch.setattr(ConstrainedMotion, "steps_towards", watched)
     planner = Coarse()
     PlanningPipeline(model, pool, PipelineSettings(seed=1), planner, make_adapters()).plan(request(model, board=False))
     problem = planner.asked[0]

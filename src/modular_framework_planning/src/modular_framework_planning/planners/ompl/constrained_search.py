@@ -109,8 +109,8 @@ class ConstrainedSearch:
         number = tree.nearest(target)
         while not self._ends():
             states = self._motion.steps_towards(tree.values[number].copy(), target, STATES_AT_ONCE)
+            self._states += max(1, len(states))  # a walk that ends at once counts, too: the count may end the search
             for state in states:
-                self._states += 1
                 if not self._problem.motion.edge_is_free(tree.values[number], state, self._step):
                     return number
                 number = tree.add(state, number)
