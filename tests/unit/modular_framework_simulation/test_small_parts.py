@@ -70,7 +70,7 @@ def test_a_factor_of_two_runs_twice_as_fast_and_zero_never_sleeps() -> None:
 
 def test_time_that_nobody_waits_for_may_pass_at_another_pace() -> None:
     time = FakeTime()
-    pacer = Pacer(0.0, time.clock, time.sleep, idle_factor=1.0)
+    pacer = Pacer(0.0, time.clock, time.sleep, idle_limit=1.0)
     pacer.keep(1.0, idle=True)
     pacer.keep(1.2, idle=True)
     assert time.now == pytest.approx(50.2)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,8 @@ class SimulationParameters:
         real_time_factor: `~real_time_factor`: simulated over real time (1.0; 0 = as fast as possible).
         wait_for_planning: `/wait_for_planning`: whether nodes may hold time while they compute (false).
         state_digest: `~state_digest`: whether to hash the state of every physics step, for comparisons (false).
+        clock_rate_hz: `~pub_clock_frequency`: of /clock, in simulated time; 0 is every step [Hz] (100).
+        ros_network: `~enable_ros_network`: whether there are the topics and services of Gazebo (true).
     """
 
     robot_description: str
@@ -39,6 +42,8 @@ class SimulationParameters:
     real_time_factor: float
     wait_for_planning: bool = False
     state_digest: bool = False
+    clock_rate_hz: float = 100.0
+    ros_network: bool = True
 
 
 def read_parameters() -> SimulationParameters:
@@ -51,6 +56,9 @@ def read_parameters() -> SimulationParameters:
     factor = _read("~real_time_factor", 1.0, (int, float))
     if factor < 0:
         raise ParameterError(f"parameter ~real_time_factor: got {factor}; allowed: 0 (as fast as possible) or greater")
+    clock_rate_hz = _read("~pub_clock_frequency", 100, (int, float))
+    if not 0 <= clock_rate_hz < math.inf:
+        raise ParameterError(f"parameter ~pub_clock_frequency: got {clock_rate_hz}; allowed: 0 (every step) or greater")
     return SimulationParameters(
         robot_description=_read("/robot_description", "", (str,)),
         model_path=_read("/gazebo_model_path", "", (str,)),
@@ -62,6 +70,8 @@ def read_parameters() -> SimulationParameters:
         real_time_factor=float(factor),
         wait_for_planning=_read("/wait_for_planning", False, (bool,)),
         state_digest=_read("~state_digest", False, (bool,)),
+        clock_rate_hz=float(clock_rate_hz),
+        ros_network=_read("~enable_ros_network", True, (bool,)),
     )
 
 

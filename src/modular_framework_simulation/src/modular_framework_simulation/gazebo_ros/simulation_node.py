@@ -40,9 +40,9 @@ from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
 
-_CLOCK_RATE_HZ = 100
 _STATES_RATE_HZ = 50
 _GRASP_RATE_HZ = 50
+_PERFORMANCE_RATE_HZ = 5
 _SNAPSHOT_RATE_HZ = 20
 _PACE_REPORT_S = 30
 _SWITCH_INTERVAL_S = 0.0005
@@ -52,8 +52,7 @@ _STOP_TIMEOUT_S = 5.0
 def _pacer(parameters: SimulationParameters) -> Pacer:
     """Returns the pacer; between episodes simulated time leaves the processor to nodes that start or compute."""
     factor = parameters.real_time_factor
-    idle_factor = min(factor or 1.0, 1.0) if parameters.wait_for_planning else None
-    return Pacer(factor, idle_factor=idle_factor)
+    return Pacer(factor, idle_limit=1.0 if parameters.wait_for_planning else None)
 
 
 def _resources(model_path: str) -> Resources:
@@ -105,9 +104,9 @@ class SimulationNode:
         self._scene = PlanningScenePublisher()
         digest = WorldDigest(self._world, actors.robot if actors else None) if parameters.state_digest else None
         self._time_services = TimeServices(
-            self._loop, self._scene, self._snapshot, parameters.wait_for_planning, digest
+            self._loop, self._scene, self._snapshot, parameters.wait_for_planning, digest, self._services.refresh
         )
-        self._add_hooks()
+        self._add_hooks(parameters.clock_rate_hz)
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
         self._failed = False
 
@@ -139,15 +138,14 @@ class SimulationNode:
         self._controllers = RosControllerManager(hardware)
         return Actors(robot, hardware, self._controllers)
 
-    def _add_hooks(self) -> None:
-        step_ns = self._settings.time_step_ns
-
+    def _add_hooks(self, clock_rate_hz: float) -> None:
         def every(rate_hz: float) -> int:
-            return max(1, round(1e9 / rate_hz / step_ns))
+            return round(1e9 / rate_hz) if rate_hz else 0
 
-        self._loop.add_hook(Hook(every(_CLOCK_RATE_HZ), self._topics.publish_clock))
+        self._loop.add_hook(Hook(every(clock_rate_hz), self._topics.publish_clock))
         self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
         self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
+        self._loop.add_hook(Hook(every(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
         self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
         self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
         self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))

@@ -36,6 +36,7 @@ class TimeServices:
         take_snapshot: Copies the state of the world; called by the loop's thread.
         may_hold: Whether time may be held: the parameter /wait_for_planning.
         digest: Hashes every step; None where nobody asks for that.
+        after_restart: Called, beside the loop, once the world has begun again.
     """
 
     def __init__(
@@ -45,11 +46,12 @@ class TimeServices:
         take_snapshot: Callable[[], WorldSnapshot],
         may_hold: bool,
         digest: WorldDigest | None = None,
+        after_restart: Callable[[], None] = lambda: None,
     ) -> None:
         self._loop, self._scene, self._take_snapshot, self._may_hold = loop, scene, take_snapshot, may_hold
-        self._digest = digest
+        self._digest, self._after_restart = digest, after_restart
         if digest is not None:
-            loop.add_hook(Hook(1, digest.add))
+            loop.add_hook(Hook(0, digest.add))
         self._services: list[rospy.Service] = []
 
     def connect(self) -> None:
@@ -130,6 +132,7 @@ class TimeServices:
     def _on_restart(self, _request: Any) -> TriggerResponse:
         try:
             self._in_loop(ros_names.RESTART, self._loop.restart)
+            self._after_restart()
         except SimulationError as error:
             rospy.logerr("%s: %s", ros_names.RESTART, error)
             return TriggerResponse(success=False, message=str(error))
