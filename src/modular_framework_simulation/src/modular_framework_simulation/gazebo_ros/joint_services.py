@@ -12,7 +12,6 @@ from gazebo_msgs import srv
 from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.endpoints import Endpoints
 from modular_framework_simulation.gazebo_ros.link_services import describe
-from modular_framework_simulation.models.sdf_specs import JointType
 from modular_framework_simulation.physics.applied_forces import Interval, JointEffort
 from modular_framework_simulation.physics.joint_dynamics import JointMeasurement, joint_index, measured_joint
 from modular_framework_simulation.physics.model_changes import JointChange, set_joint
@@ -22,13 +21,6 @@ from modular_framework_simulation.physics.simulated_body import JointSettings
 
 _WITHOUT_COUNTERPART = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor")
 """Fields of ODEJointProperties that the physics engine has nothing like."""
-
-_KINDS = {
-    JointType.REVOLUTE: srv.GetJointPropertiesResponse.REVOLUTE,
-    JointType.CONTINUOUS: srv.GetJointPropertiesResponse.CONTINUOUS,
-    JointType.PRISMATIC: srv.GetJointPropertiesResponse.PRISMATIC,
-    JointType.FIXED: srv.GetJointPropertiesResponse.FIXED,
-}
 
 
 class JointServices:
@@ -55,21 +47,16 @@ class JointServices:
         joint = self._joint(request.joint_name)
         body = self._world.body(joint.model)
         answer = srv.GetJointPropertiesResponse(success=True, status_message="read the properties of the joint")
+        if body.spec is not None:
+            kind = next(each.kind for each in body.spec.joints if each.name == joint.part)
+            answer.type = getattr(answer, kind.name)
         if joint.part not in body.joint_indices:
-            answer.type = answer.FIXED
             return answer
         measured = measured_joint(self._world.engine, body, joint.part)
-        answer.type = self._kind(joint, measured)
+        if body.spec is None:
+            answer.type = _kind_of_robot_joint(measured)
         answer.damping, answer.position, answer.rate = [measured.damping], [measured.position], [measured.velocity]
         return answer
-
-    def _kind(self, joint: PartName, measured: JointMeasurement) -> int:
-        spec = self._world.body(joint.model).spec
-        if spec is not None:
-            return _KINDS[next(each.kind for each in spec.joints if each.name == joint.part)]
-        if measured.prismatic:
-            return _KINDS[JointType.PRISMATIC]
-        return _KINDS[JointType.CONTINUOUS if math.isinf(measured.upper) else JointType.REVOLUTE]
 
     def _set_properties(self, request: Any) -> Any:
         joint, given = self._joint(request.joint_name), request.ode_joint_config
@@ -105,6 +92,13 @@ class JointServices:
 
     def _clear_forces(self, request: Any) -> None:
         self._world.forces.clear_joint(self._joint(request.joint_name))
+
+
+def _kind_of_robot_joint(measured: JointMeasurement) -> int:
+    kinds = srv.GetJointPropertiesResponse
+    if measured.prismatic:
+        return int(kinds.PRISMATIC)
+    return int(kinds.CONTINUOUS if math.isinf(measured.upper) else kinds.REVOLUTE)
 
 
 def _one(values: Sequence[float], what: str, least: float) -> float | None:

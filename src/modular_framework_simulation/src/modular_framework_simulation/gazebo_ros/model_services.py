@@ -14,13 +14,14 @@ from gazebo_msgs import msg, srv
 from modular_framework_simulation.errors import ModelChangeError
 from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.endpoints import Endpoints
+from modular_framework_simulation.gazebo_ros.world_topics import stamp_of
 from modular_framework_simulation.loop.simulation_loop import SimulationLoop
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_specs import Model
 from modular_framework_simulation.models.urdf_model import read_urdf_model
 from modular_framework_simulation.models.xml_nodes import parse_xml
-from modular_framework_simulation.physics.part_names import SCOPE, find_frame
+from modular_framework_simulation.physics.part_names import find_frame
 from modular_framework_simulation.physics.physics_world import WORLD_FRAMES
 
 
@@ -74,8 +75,8 @@ class ModelServices:
     def _spawn(self, service: str, request: Any, model: Model) -> Any:
         # Decomposing meshes may take seconds: it is done in this thread, while the loop continues.
         model = dataclasses.replace(model, name=request.model_name or model.name)
-        if SCOPE in model.name or model.name in WORLD_FRAMES:
-            raise ValueError(f"a model cannot have the name '{model.name}': '{SCOPE}' and {WORLD_FRAMES} are reserved")
+        if model.name in WORLD_FRAMES:
+            raise ValueError(f"a model cannot have the name '{model.name}': it stands for the frame of the world")
         prepared = self._world.prepare(model)
         initial = conversions.pose_from_msg(request.initial_pose) @ model.pose
 
@@ -100,7 +101,7 @@ class ModelServices:
         self._reads[request.model_name] += 1
         answer = srv.GetModelStateResponse(success=True, status_message="read the state of the model")
         answer.header.seq = self._reads[request.model_name]
-        answer.header.stamp = rospy.Time(*divmod(self._world.time_ns, 1_000_000_000))
+        answer.header.stamp = stamp_of(self._world)
         answer.header.frame_id = ros_names.WORLD_FRAME if reference in WORLD_FRAMES else reference
         answer.pose = conversions.pose_to_msg(state.pose)
         answer.twist = conversions.twist_to_msg(state.twist)

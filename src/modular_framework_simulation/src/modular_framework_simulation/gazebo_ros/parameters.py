@@ -20,7 +20,7 @@ class SimulationParameters:
     Attributes:
         robot_description: `robot_description`: URDF; empty for a world without a robot.
         model_path: `gazebo_model_path`: folders with one folder a model, separated by colons.
-        world_file: `~world_file`: path of a .world file; empty for an empty world.
+        world_file: `~world_file`: path of a .world file, or below GAZEBO_RESOURCE_PATH; empty for an empty world.
         starting_positions: `~starting_pose`: "-J joint value ..." [rad or m].
         robot_name: `~robot_name`: instance name; empty for the name in the description.
         gui: `~gui`: whether to open a window (false).
@@ -30,6 +30,9 @@ class SimulationParameters:
         state_digest: `~state_digest`: whether to hash the state of every physics step, for comparisons (false).
         clock_rate_hz: `~pub_clock_frequency`: of /clock, in simulated time; 0 is every step [Hz] (100).
         ros_network: `~enable_ros_network`: whether there are the topics and services of Gazebo (true).
+        gui_required: `~gui_required`: whether to end without a window (false).
+        verbose: `~verbose`: whether to log details too (false).
+        unsupported: `~unsupported`: arguments of a launch file that have no effect here, for a warning.
     """
 
     robot_description: str
@@ -44,6 +47,9 @@ class SimulationParameters:
     state_digest: bool = False
     clock_rate_hz: float = 100.0
     ros_network: bool = True
+    gui_required: bool = False
+    verbose: bool = False
+    unsupported: str = ""
 
 
 def read_parameters() -> SimulationParameters:
@@ -72,6 +78,9 @@ def read_parameters() -> SimulationParameters:
         state_digest=_read("~state_digest", False, (bool,)),
         clock_rate_hz=float(clock_rate_hz),
         ros_network=_read("~enable_ros_network", True, (bool,)),
+        gui_required=_read("~gui_required", False, (bool,)),
+        verbose=_read("~verbose", False, (bool,)),
+        unsupported=_read("~unsupported", "", (str,)),
     )
 
 

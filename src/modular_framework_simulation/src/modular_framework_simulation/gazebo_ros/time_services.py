@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
+from modular_framework_simulation.gazebo_ros.world_topics import stamp_of
 from modular_framework_simulation.loop.simulation_loop import Hook, SimulationLoop
 from modular_framework_simulation.loop.snapshots import WorldSnapshot
 from modular_framework_simulation.loop.time_holds import Advance, HoldError
@@ -81,7 +82,7 @@ class TimeServices:
                 holds.release(request.owner)
             else:
                 holds.hold(request.owner, request.lease_s, request.during_motions)
-            return self._stamp()
+            return stamp_of(self._loop.world)
 
         try:
             if not self._may_hold:
@@ -127,7 +128,7 @@ class TimeServices:
     def _now(self) -> tuple[rospy.Time, bool, WorldSnapshot | None]:
         held, world = self._loop.held, self._loop.world
         is_news = held and not self._scene.is_up_to_date(world.time_ns, world.revision)
-        return self._stamp(), held, self._take_snapshot() if is_news else None
+        return stamp_of(self._loop.world), held, self._take_snapshot() if is_news else None
 
     def _on_restart(self, _request: Any) -> TriggerResponse:
         try:
@@ -143,6 +144,3 @@ class TimeServices:
         assert digest is not None
         found = self._in_loop(ros_names.STATE_DIGEST, lambda: (*digest.checkpoints, digest.now()))
         return TriggerResponse(success=True, message=json.dumps([[item.step, item.digest] for item in found]))
-
-    def _stamp(self) -> rospy.Time:
-        return rospy.Time(*divmod(self._loop.world.time_ns, 1_000_000_000))

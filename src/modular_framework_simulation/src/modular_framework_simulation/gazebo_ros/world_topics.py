@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the clock, the states of models and links, and the objects that grippers hold."""
+"""Publishes the clock, how fast it runs, the states of models and links, and the objects that grippers hold."""
 
 from __future__ import annotations
 
@@ -21,12 +21,33 @@ _QUEUE_SIZE = 50
 """Messages that wait for a subscriber: time that runs faster than real time sends them in bursts."""
 
 
+def stamp_of(world: PhysicsWorld) -> rospy.Time:
+    """Returns simulated time."""
+    return rospy.Time(*divmod(world.time_ns, 1_000_000_000))
+
+
+class ClockTopic:
+    """Publishes /clock (rosgraph_msgs/Clock); used by the loop's thread.
+
+    Args:
+        world: Whose time is published.
+    """
+
+    def __init__(self, world: PhysicsWorld) -> None:
+        self._world = world
+        self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
+
+    def publish(self) -> None:
+        """Publishes simulated time."""
+        self._clock.publish(Clock(stamp_of(self._world)))
+
+
 class WorldTopics:
     """Publishers of the simulation; all methods are called by the loop's thread.
 
-    Publishes: /clock (rosgraph_msgs/Clock), /gazebo/model_states, /gazebo/link_states, /gazebo/performance_metrics
-    (gazebo_msgs/PerformanceMetrics, without sensors), and /gazebo/grasped_object (std_msgs/String, latched; empty while
-    nothing is held; names of several objects are separated by commas).
+    Publishes: /gazebo/model_states, /gazebo/link_states, /gazebo/performance_metrics (gazebo_msgs/PerformanceMetrics,
+    without sensors), and /gazebo/grasped_object (std_msgs/String, latched; empty while nothing is held; names of
+    several objects are separated by commas).
 
     Args:
         world: What is published.
@@ -34,7 +55,6 @@ class WorldTopics:
 
     def __init__(self, world: PhysicsWorld) -> None:
         self._world = world
-        self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
         self._models = rospy.Publisher(ros_names.MODEL_STATES, ModelStates, queue_size=_QUEUE_SIZE)
         self._links = rospy.Publisher(ros_names.LINK_STATES, LinkStates, queue_size=1)
         self._grasped = rospy.Publisher(ros_names.GRASPED_OBJECT, String, queue_size=1, latch=True)
@@ -42,10 +62,6 @@ class WorldTopics:
         self._measured_at = (time.monotonic(), world.time_ns)
         self._last_grasped: str | None = None
         self.publish_grasped(())
-
-    def publish_clock(self) -> None:
-        """Publishes simulated time."""
-        self._clock.publish(Clock(self._now()))
 
     def publish_models(self) -> None:
         """Publishes the states of all models, if there is a subscriber."""
@@ -68,11 +84,8 @@ class WorldTopics:
         self._measured_at = (real_s, simulated_ns)
         if self._performance.get_num_connections() and simulated_ns > before_ns:
             message = PerformanceMetrics(real_time_factor=(simulated_ns - before_ns) * 1e-9 / (real_s - before_s))
-            message.header.stamp = self._now()
+            message.header.stamp = stamp_of(self._world)
             self._performance.publish(message)
-
-    def _now(self) -> rospy.Time:
-        return rospy.Time(*divmod(self._world.time_ns, 1_000_000_000))
 
     def publish_grasped(self, names: Sequence[str]) -> None:
         """Publishes the names of the held objects when they changed."""

@@ -54,12 +54,12 @@ def find_joint(bodies: Mapping[str, SimulatedBody], name: str) -> PartName:
 def _find(
     bodies: Mapping[str, SimulatedBody], kind: str, name: str, parts: Callable[[SimulatedBody], list[str]]
 ) -> PartName:
-    model, separator, part = name.rpartition(SCOPE)
-    if separator and model not in bodies:
+    model, separator, _ = name.rpartition(SCOPE)
+    scoping = [each for each in bodies if name.startswith(each + SCOPE)]  # names of models may hold the separator too
+    if separator and not scoping:
         raise UnknownEntityError("model", model, list(bodies))
-    models = [model] if separator else list(bodies)
-    known = [PartName(each, own) for each in models for own in parts(bodies[each])]
-    found = [item for item in known if item.part == part]
+    known = [PartName(each, own) for each in scoping or bodies for own in parts(bodies[each])]
+    found = [item for item in known if name in (item.scoped, item.part)]
     if not found:
         raise UnknownEntityError(kind, name, [item.scoped for item in known])
     if len(found) > 1:
