@@ -21,8 +21,8 @@ from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources, no_packages
 from modular_framework_simulation.physics.applied_forces import Interval, JointEffort, LinkWrench
-from modular_framework_simulation.physics.joint_dynamics import measured_joint
-from modular_framework_simulation.physics.link_dynamics import couple, measured_inertial
+from modular_framework_simulation.physics.body_joints import measured_joint
+from modular_framework_simulation.physics.body_links import couple, measured_inertial
 from modular_framework_simulation.physics.model_changes import (
     JointChange,
     set_inertial,

@@ -13,7 +13,7 @@ from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.endpoints import Endpoints
 from modular_framework_simulation.gazebo_ros.link_services import describe
 from modular_framework_simulation.physics.applied_forces import Interval, JointEffort
-from modular_framework_simulation.physics.joint_dynamics import JointMeasurement, joint_index, measured_joint
+from modular_framework_simulation.physics.body_joints import JointMeasurement, joint_index, measured_joint
 from modular_framework_simulation.physics.model_changes import JointChange, set_joint
 from modular_framework_simulation.physics.part_names import PartName, find_joint
 from modular_framework_simulation.physics.physics_world import PhysicsWorld

@@ -13,7 +13,7 @@ from modular_framework_simulation.gazebo_ros.endpoints import Endpoints
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import Inertial
 from modular_framework_simulation.physics.applied_forces import Interval, LinkWrench
-from modular_framework_simulation.physics.link_dynamics import centre_in_world, link_mass, measured_inertial
+from modular_framework_simulation.physics.body_links import centre_in_world, link_mass, measured_inertial
 from modular_framework_simulation.physics.model_changes import set_inertial, set_link_state
 from modular_framework_simulation.physics.part_names import PartName, find_frame, find_link
 from modular_framework_simulation.physics.physics_world import WORLD_FRAMES, PhysicsWorld

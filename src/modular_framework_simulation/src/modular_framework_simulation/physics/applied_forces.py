@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from modular_framework_simulation.physics.joint_dynamics import apply_effort
-from modular_framework_simulation.physics.link_dynamics import apply_wrench, link_mass
+from modular_framework_simulation.physics.body_joints import apply_effort
+from modular_framework_simulation.physics.body_links import apply_wrench, link_mass
 from modular_framework_simulation.physics.part_names import PartName
 from modular_framework_simulation.physics.physics_engine import PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 from modular_framework_simulation.errors import ModelChangeError
 from modular_framework_simulation.models import sdf_specs as specs
-from modular_framework_simulation.physics.joint_dynamics import (
+from modular_framework_simulation.physics.body_joints import (
     JointMeasurement,
     apply_settings,
     joint_index,
     measured_joint,
 )
-from modular_framework_simulation.physics.link_dynamics import measured_inertial
+from modular_framework_simulation.physics.body_links import measured_inertial
 from modular_framework_simulation.physics.part_names import PartName
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import (

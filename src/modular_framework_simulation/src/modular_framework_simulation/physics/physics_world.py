@@ -15,8 +15,8 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.applied_forces import AppliedForces
+from modular_framework_simulation.physics.body_joints import measured_joint
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
-from modular_framework_simulation.physics.joint_dynamics import measured_joint
 from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.physics.physics_engine import Log, PhysicsEngine
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
