@@ -370,7 +370,7 @@ def test_a_reset_in_the_middle_of_a_motion_ends_it_with_that_reason(simulation: 
     until(lambda: client.get_state() == GoalStatus.ACTIVE, "the motion")
     time.sleep(0.5)
     call(f"/gazebo/{service}", Empty)
-    until(lambda: client.get_state() == GoalStatus.ABORTED, "the end of the motion")
+    until(lambda: client.get_state() == GoalStatus.PREEMPTED, "the end of the motion")
     assert client.get_goal_status_text() == client.get_result().error_string == reason
     rospy.sleep(0.5)
     joints = rospy.wait_for_message("/joint_states", JointState, 10.0)

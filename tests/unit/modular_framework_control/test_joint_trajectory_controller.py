@@ -398,7 +398,7 @@ def test_after_a_reset_of_time_the_arm_holds_and_its_goal_has_ended(loop: Any) -
     loop.time_s = 0.0
     loop.run(0.2)
     assert (goal_handle.status, goal_handle.text) == (
-        GoalStatus.ABORTED,
+        GoalStatus.CANCELED,
         "time went back, or the robot was put elsewhere",
     )
     assert commands(loop) == pytest.approx(held, abs=0.03)
@@ -485,4 +485,4 @@ def test_a_goal_that_a_reset_ends_says_what_was_reset(loop: Any) -> None:
     goal_handle = send(loop, (1.0, (1.0, 0.0, 0.0)))
     loop.run(0.5)
     loop.manager.update(loop.time_s, 0.01, True, "the world was reset")
-    assert (goal_handle.status, goal_handle.text) == (GoalStatus.ABORTED, "the world was reset")
+    assert (goal_handle.status, goal_handle.text) == (GoalStatus.CANCELED, "the world was reset")

@@ -177,7 +177,7 @@ class JointTrajectoryController(Controller):
 
     def interrupted(self, time_s: float, reason: str) -> None:
         del time_s
-        self._end_all(GoalStatus.ABORTED, reason)
+        self._end_all(GoalStatus.CANCELED, reason)
 
     def failed(self, time_s: float, reason: str) -> None:
         del time_s
