@@ -668,6 +668,42 @@ def test_a_topic_names_what_is_wrong_with_a_message(name: str) -> None:
     SEEN["topic", name, "bad"] = TOPICS[name].bad()
 
 
+def filled(message: Any, number: float, text: str) -> Any:
+    """Fills all numbers with one, and all names with a text."""
+    for name, kind in zip(message.__slots__, message._slot_types, strict=True):
+        value = getattr(message, name)
+        if kind == "float64":
+            setattr(message, name, number)
+        elif kind == "float64[]":
+            setattr(message, name, [number])
+        elif kind == "string":
+            setattr(message, name, text)
+        elif kind == "string[]":
+            setattr(message, name, [text])
+        elif hasattr(value, "_slot_types"):
+            filled(value, number, text)
+    return message
+
+
+@pytest.mark.parametrize("text", ["", "cube", "cube::link", "hinge", "::", "world", "\u00e4\n" * 3000])
+@pytest.mark.parametrize("number", [NAN, math.inf, -math.inf, 1e300])
+def test_no_number_and_no_name_does_harm(simulation: Any, number: float, text: str) -> None:
+    for name in SERVICES:
+        kind = getattr(srv, SERVICES[name].type.partition("/")[2], None)
+        if SERVICES[name].type.startswith("gazebo_msgs") and name not in ("delete_model", "get_world_properties"):
+            try:
+                answer = call(name, kind, filled(kind._request_class(), number, text))
+            except rospy.ServiceException as error:
+                assert "unexpected" not in str(error)
+                continue
+            assert "unexpected" not in getattr(answer, "status_message", "")
+            if name.startswith(("set_", "apply_", "spawn_")):
+                assert not answer.success, (name, answer.status_message)
+    found = state("cube")
+    assert is_restored() and found.pose.orientation.w == pytest.approx(1.0)
+    assert models() == ["floor", "cube", "door"]
+
+
 def test_the_node_has_everything_of_gazebo_ros_and_the_table_leaves_nothing_out(simulation: Any) -> None:
     published, subscribed, services = rosgraph.Master("/test").getSystemState()
     own = {name for name, nodes in services if "/gazebo" in nodes}
