@@ -114,5 +114,5 @@ def test_a_required_window_that_cannot_be_is_an_error(ros_session: Any, monkeypa
 def test_a_world_that_is_nowhere_is_named_with_the_places_looked_at(ros_session: Any) -> None:
     launch = ros_session.launch(with_arguments(gui="false", world_name="worlds/moon.world", server_required="true"))
     launch.wait(60.0)
-    assert "there is no 'worlds/moon.world'" in launch.log()
+    assert "worlds/moon.world: cannot be read" in launch.log()
     assert "GAZEBO_RESOURCE_PATH" in launch.log()

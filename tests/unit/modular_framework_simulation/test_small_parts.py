@@ -216,7 +216,7 @@ def test_a_world_is_found_by_path_along_gazebos_variable_and_among_our_own(tmp_p
     users.touch()
     assert find_world_file("worlds/empty.world", environment, [tmp_path / "own"]) == users
     assert find_world_file(str(own), {}, []) == own
-    with pytest.raises(DescriptionError, match=r"no 'moon\.world'; looked for .*GAZEBO_RESOURCE_PATH"):
+    with pytest.raises(DescriptionError, match=r"moon\.world: cannot be read: .* looked for .*GAZEBO_RESOURCE_PATH"):
         find_world_file("moon.world", environment, [])
 
 

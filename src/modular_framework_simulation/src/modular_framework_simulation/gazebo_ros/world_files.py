@@ -29,4 +29,5 @@ def find_world_file(name: str, environment: Mapping[str, str], own_folders: Sequ
         if candidate.is_file():
             return candidate
     looked_for = ", ".join(str(each) for each in candidates)
-    raise DescriptionError("world file", f"there is no '{name}'", f"looked for {looked_for}; set {RESOURCE_PATH}")
+    advice = f"looked for {looked_for}; set {RESOURCE_PATH}"
+    raise DescriptionError(name, "cannot be read: there is no such file", advice)
