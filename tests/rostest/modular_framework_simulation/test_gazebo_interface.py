@@ -192,11 +192,12 @@ def reasons_in_log() -> Iterator[list[str]]:
 
 @service(srv.SpawnModel, lambda: refused(call("spawn_sdf_model", srv.SpawnModel, "x", "rubbish", "", Pose(), "")))
 def spawn_sdf_model() -> str:
-    done(call("spawn_sdf_model", srv.SpawnModel, "ball", BALL, "", at(0, 2, 1), "cube"))
+    raised = BALL.replace("<link ", "<pose>0 0 0.5 0 0 0</pose><link ")
+    done(call("spawn_sdf_model", srv.SpawnModel, "ball", raised, "", at(0, 2, 1), "cube"))
     found = state("ball").pose.position
     call("delete_model", srv.DeleteModel, "ball")
-    assert (found.x, found.y, found.z) == pytest.approx((0, 2, 2))
-    return "the model is there, at the pose in its reference frame"
+    assert (found.x, found.y, found.z) == pytest.approx((0, 2, 2.5))
+    return "the model is there, at its own pose in the given one in the reference frame"
 
 
 @service(srv.SpawnModel, lambda: refused(call("spawn_urdf_model", srv.SpawnModel, "x", BALL, "", Pose(), "")))
