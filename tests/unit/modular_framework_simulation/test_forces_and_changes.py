@@ -297,6 +297,22 @@ def test_a_link_that_is_put_somewhere_takes_its_model_along(space: PhysicsWorld)
     assert measured_joint(space.engine, space.body("chain"), "hinge").position == pytest.approx(0.5)
 
 
+def test_every_tree_of_a_model_has_its_masses_forces_and_motion(space: PhysicsWorld) -> None:
+    free = CHAIN.split("<joint")[0] + "</model></sdf>"
+    space.spawn(replace(read_model_text(free, "text", Resources()), pose=Pose((0, 0, 1))))
+    leaf = PartName("chain", "leaf")
+    space.forces.add_wrench(push(leaf, (1.0, 0.0, 0.0), NOWHERE, 0.1))
+    run(space, 0.1)
+    assert space.entity_state("chain::leaf").twist.linear[0] == pytest.approx(0.2, rel=1e-3)
+    assert space.entity_state("chain::post").twist.linear == pytest.approx(NOWHERE, abs=1e-9)
+    assert measured_inertial(space.engine, space.body("chain"), "leaf").mass == pytest.approx(0.5)
+    assert set_inertial(space, leaf, specs.Inertial(Pose(), 1.0, (0.01, 0, 0, 0.01, 0, 0.01)))
+    assert space.entity_state("chain::leaf").twist.linear[0] == pytest.approx(0.2, rel=1e-3)
+    space.forces.add_wrench(push(leaf, (1.0, 0.0, 0.0), NOWHERE, 0.2))
+    run(space, 0.1)
+    assert space.entity_state("chain::leaf").twist.linear[0] == pytest.approx(0.3, rel=1e-3)
+
+
 def test_a_link_is_put_relative_to_another(space: PhysicsWorld) -> None:
     space.spawn(solid("base", CUBE, Pose.from_xyz_rpy((1, 0, 0), (0, 0, math.pi / 2)), static=True))
     space.spawn(solid("cube", CUBE, Pose()))

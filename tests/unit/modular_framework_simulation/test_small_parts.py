@@ -210,14 +210,14 @@ def test_a_world_is_found_by_path_along_gazebos_variable_and_among_our_own(tmp_p
         (tmp_path / folder / "worlds").mkdir(parents=True)
     own = tmp_path / "own" / "worlds" / "empty.world"
     own.touch()
-    environment = {"GAZEBO_RESOURCE_PATH": f"{tmp_path / 'nowhere'}:{tmp_path / 'first'}"}
-    assert find_world_file("worlds/empty.world", environment, [tmp_path / "own"]) == own
+    folders = [tmp_path / "nowhere", tmp_path / "first", tmp_path / "own"]
+    assert find_world_file("worlds/empty.world", folders) == own
     users = tmp_path / "first" / "worlds" / "empty.world"
     users.touch()
-    assert find_world_file("worlds/empty.world", environment, [tmp_path / "own"]) == users
-    assert find_world_file(str(own), {}, []) == own
+    assert find_world_file("worlds/empty.world", folders) == users
+    assert find_world_file(str(own), []) == own
     with pytest.raises(DescriptionError, match=r"moon\.world: cannot be read: .* looked for .*GAZEBO_RESOURCE_PATH"):
-        find_world_file("moon.world", environment, [])
+        find_world_file("moon.world", folders)
 
 
 def test_another_pace_counts_from_the_next_step() -> None:

@@ -13,7 +13,12 @@ from modular_framework_simulation.gazebo_ros import conversions, ros_names
 from modular_framework_simulation.gazebo_ros.endpoints import Endpoints
 from modular_framework_simulation.gazebo_ros.link_services import describe
 from modular_framework_simulation.physics.applied_forces import Interval, JointEffort
-from modular_framework_simulation.physics.body_joints import JointMeasurement, joint_index, measured_joint
+from modular_framework_simulation.physics.body_joints import (
+    JointMeasurement,
+    measured_joint,
+    movable_joints,
+    tree_with_joint,
+)
 from modular_framework_simulation.physics.model_changes import JointChange, set_joint
 from modular_framework_simulation.physics.part_names import PartName, find_joint
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
@@ -50,7 +55,7 @@ class JointServices:
         if body.spec is not None:
             kind = next(each.kind for each in body.spec.joints if each.name == joint.part)
             answer.type = getattr(answer, kind.name)
-        if joint.part not in body.joint_indices:
+        if joint.part not in movable_joints(body):
             return answer
         measured = measured_joint(self._world.engine, body, joint.part)
         if body.spec is None:
@@ -81,7 +86,7 @@ class JointServices:
 
     def _apply_effort(self, request: Any) -> Any:
         joint = self._joint(request.joint_name)
-        joint_index(self._world.body(joint.model), joint.part)
+        tree_with_joint(self._world.body(joint.model), joint.part)
         conversions.check_numbers((request.effort,), "effort", conversions.LARGEST_FORCE, "Nm or N")
         duration_ns = request.duration.to_nsec()
         if duration_ns == 0:

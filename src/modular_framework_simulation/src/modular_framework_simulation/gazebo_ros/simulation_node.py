@@ -118,7 +118,7 @@ class SimulationNode:
         spec = sdf_specs.World("empty", STANDARD_GRAVITY, (), ())
         if parameters.world_file:
             own_worlds = Path(rospkg.RosPack().get_path(_PACKAGE))
-            file = find_world_file(parameters.world_file, os.environ, (own_worlds,))
+            file = find_world_file(parameters.world_file, (*self._resources.resource_folders, own_worlds))
             spec = read_world(file, self._resources)
             if spec.ignored:
                 rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))

@@ -3,28 +3,24 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.sdf_resources import RESOURCE_PATH
 
-RESOURCE_PATH = "GAZEBO_RESOURCE_PATH"
 
-
-def find_world_file(name: str, environment: Mapping[str, str], own_folders: Sequence[Path]) -> Path:
-    """Returns the file: a path, or a path below a folder of GAZEBO_RESOURCE_PATH, or below one of our own.
+def find_world_file(name: str, folders: Sequence[Path]) -> Path:
+    """Returns the file: a path, or a path below one of the folders of resources.
 
     Args:
         name: As given, for example "worlds/empty.world".
-        environment: Variables of the environment.
-        own_folders: Where worlds that come with this package lie.
+        folders: Those of GAZEBO_RESOURCE_PATH, and that of the worlds which come with this package.
 
     Raises:
         DescriptionError: There is none.
     """
-    folders = [Path(each) for each in environment.get(RESOURCE_PATH, "").split(os.pathsep) if each]
-    candidates = [Path(name), *(folder / name for folder in (*folders, *own_folders))]
+    candidates = [Path(name), *(folder / name for folder in folders)]
     for candidate in candidates:
         if candidate.is_file():
             return candidate

@@ -32,17 +32,22 @@ class JointMeasurement:
     prismatic: bool
 
 
-def joint_index(body: SimulatedBody, joint: str) -> int:
-    """Returns the engine's number of a joint.
+def tree_with_joint(body: SimulatedBody, joint: str) -> SimulatedBody:
+    """Returns the tree of a model that a joint belongs to.
 
     Raises:
         UnknownEntityError: The model has no such joint that moves.
     """
-    index = body.joint_indices.get(joint)
-    if index is None:
-        known = [f"{body.name}::{name}" for name in body.joint_indices]
-        raise UnknownEntityError("joint that moves", f"{body.name}::{joint}", known)
-    return index
+    for tree in body.parts:
+        if joint in tree.joint_indices:
+            return tree
+    known = [f"{body.name}::{name}" for tree in body.parts for name in tree.joint_indices]
+    raise UnknownEntityError("joint that moves", f"{body.name}::{joint}", known)
+
+
+def movable_joints(body: SimulatedBody) -> list[str]:
+    """Returns the names of the joints of a model that have a position."""
+    return [name for tree in body.parts for name in tree.joint_indices]
 
 
 def measured_joint(engine: PhysicsEngine, body: SimulatedBody, joint: str) -> JointMeasurement:
@@ -51,9 +56,10 @@ def measured_joint(engine: PhysicsEngine, body: SimulatedBody, joint: str) -> Jo
     Raises:
         UnknownEntityError: The model has no such joint.
     """
-    api, index = engine.api, joint_index(body, joint)
-    info = api.getJointInfo(body.number, index, physicsClientId=engine.client)
-    state = api.getJointState(body.number, index, physicsClientId=engine.client)
+    api, tree = engine.api, tree_with_joint(body, joint)
+    index = tree.joint_indices[joint]
+    info = api.getJointInfo(tree.number, index, physicsClientId=engine.client)
+    state = api.getJointState(tree.number, index, physicsClientId=engine.client)
     lower, upper = info[8], info[9]
     if lower > upper:  # the engine's way to say that there are none
         lower, upper = -math.inf, math.inf
@@ -64,9 +70,10 @@ def measured_joint(engine: PhysicsEngine, body: SimulatedBody, joint: str) -> Jo
 
 def apply_effort(engine: PhysicsEngine, body: SimulatedBody, joint: str, effort: float) -> None:
     """Lets an effort act on a joint in the coming physics step, besides that of its drive [Nm or N]."""
+    tree = tree_with_joint(body, joint)
     engine.api.setJointMotorControl2(
-        body.number,
-        joint_index(body, joint),
+        tree.number,
+        tree.joint_indices[joint],
         engine.api.TORQUE_CONTROL,
         force=effort,
         physicsClientId=engine.client,
@@ -79,9 +86,10 @@ def apply_settings(engine: PhysicsEngine, body: SimulatedBody, joint: str, setti
     Raises:
         UnknownEntityError: The model has no such joint.
     """
-    index = joint_index(body, joint)
+    tree = tree_with_joint(body, joint)
+    number, index = tree.number, tree.joint_indices[joint]
     if settings.damping is not None:
-        engine.api.changeDynamics(body.number, index, jointDamping=settings.damping, physicsClientId=engine.client)
+        engine.api.changeDynamics(number, index, jointDamping=settings.damping, physicsClientId=engine.client)
     before = body.joint_settings.get(joint, JointSettings())
     merged = JointSettings(
         before.damping if settings.damping is None else settings.damping,
@@ -90,7 +98,7 @@ def apply_settings(engine: PhysicsEngine, body: SimulatedBody, joint: str, setti
     )
     if merged.motor_effort is not None:
         engine.api.setJointMotorControl2(
-            body.number,
+            number,
             index,
             engine.api.VELOCITY_CONTROL,
             targetVelocity=merged.motor_velocity or 0.0,
@@ -98,3 +106,19 @@ def apply_settings(engine: PhysicsEngine, body: SimulatedBody, joint: str, setti
             physicsClientId=engine.client,
         )
     body.joint_settings[joint] = merged
+
+
+def copy_joint_motion(engine: PhysicsEngine, source: SimulatedBody, target: SimulatedBody) -> None:
+    """Lets the joints of a tree be where those of another tree with the same joints are, and move like them.
+
+    Joints that are then beyond a limit are put there, at rest.
+    """
+    api, client = engine.api, engine.client
+    for joint, index in target.joint_indices.items():
+        was, bounds = measured_joint(engine, source, joint), measured_joint(engine, target, joint)
+        position = min(max(was.position, bounds.lower), bounds.upper)
+        velocity = was.velocity if position == was.position else 0.0
+        api.resetJointState(target.number, index, position, velocity, physicsClientId=client)
+    for index in target.ball_joint_indices:
+        turn, rate = api.getJointStateMultiDof(source.number, index, physicsClientId=client)[:2]
+        api.resetJointStateMultiDof(target.number, index, turn, rate, physicsClientId=client)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from modular_framework_simulation.errors import UnknownEntityError
 from modular_framework_simulation.models.poses import Pose
@@ -13,32 +14,41 @@ from modular_framework_simulation.physics.simulated_body import SimulatedBody, c
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 
-def link_index(body: SimulatedBody, link: str) -> int:
-    """Returns the engine's number of a link.
+def tree_with_link(body: SimulatedBody, link: str) -> SimulatedBody:
+    """Returns the tree of a model that a link belongs to.
 
     Raises:
         UnknownEntityError: The model has no such link of its own; a static model is one link for the engine.
     """
-    index = body.link_indices.get(link)
-    if index is None:
-        raise UnknownEntityError("link that moves", f"{body.name}::{link}", list(body.link_indices))
-    return index
+    tree = body.part_of(link)
+    if link not in tree.link_indices:
+        known = [name for each in body.parts for name in each.link_indices]
+        raise UnknownEntityError("link that moves", f"{body.name}::{link}", known)
+    return tree
 
 
 def centre_in_world(engine: PhysicsEngine, body: SimulatedBody, link: str) -> Pose:
     """Returns the centre of mass of a link with its axes of inertia, in the world frame."""
-    index = link_index(body, link)
+    tree = tree_with_link(body, link)
+    index = tree.link_indices[link]
     if index == BASE_INDEX:
-        return Pose(*engine.api.getBasePositionAndOrientation(body.number, physicsClientId=engine.client))
-    record = engine.api.getLinkState(body.number, index, 0, 1, physicsClientId=engine.client)
+        return Pose(*engine.api.getBasePositionAndOrientation(tree.number, physicsClientId=engine.client))
+    record = engine.api.getLinkState(tree.number, index, 0, 1, physicsClientId=engine.client)
     return Pose(record[0], record[1])
 
 
 def link_mass(engine: PhysicsEngine, body: SimulatedBody, link: str) -> float:
     """Returns the mass of a link [kg]; the engine has 0 for one that is fastened to the world."""
-    record = engine.api.getDynamicsInfo(body.number, link_index(body, link), physicsClientId=engine.client)
-    mass: float = record[0]
+    mass: float = _dynamics(engine, body, link)[0]
     return mass
+
+
+def _dynamics(engine: PhysicsEngine, body: SimulatedBody, link: str) -> tuple[Any, ...]:
+    tree = tree_with_link(body, link)
+    record: tuple[Any, ...] = engine.api.getDynamicsInfo(
+        tree.number, tree.link_indices[link], physicsClientId=engine.client
+    )
+    return record
 
 
 def measured_inertial(engine: PhysicsEngine, body: SimulatedBody, link: str) -> Inertial:
@@ -51,7 +61,7 @@ def measured_inertial(engine: PhysicsEngine, body: SimulatedBody, link: str) -> 
         described = next((each.inertial for each in body.spec.links if each.name == link), None)
     if body.static and body.spec is not None:
         return described or Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))  # SDF's defaults
-    record = engine.api.getDynamicsInfo(body.number, link_index(body, link), physicsClientId=engine.client)
+    record = _dynamics(engine, body, link)
     if record[0] == 0.0 and described is not None:
         return described
     centre = body.link_state(link).pose.inverse() @ centre_in_world(engine, body, link)
@@ -80,14 +90,14 @@ def apply_wrench(engine: PhysicsEngine, body: SimulatedBody, link: str, force: V
         force: At the centre of mass, in the world frame [N].
         torque: In the world frame [Nm].
     """
-    index, centre = link_index(body, link), centre_in_world(engine, body, link).position
+    tree, centre = tree_with_link(body, link), centre_in_world(engine, body, link).position
     parts: list[tuple[Vector3, Vector3]] = [(centre, force)]
     if torque != (0.0, 0.0, 0.0):
         arm, pull = couple(torque)
         parts += [(_sum(centre, arm, 0.5), pull), (_sum(centre, arm, -0.5), (-pull[0], -pull[1], -pull[2]))]
     for point, push in parts:
         engine.api.applyExternalForce(
-            body.number, index, push, point, engine.api.WORLD_FRAME, physicsClientId=engine.client
+            tree.number, tree.link_indices[link], push, point, engine.api.WORLD_FRAME, physicsClientId=engine.client
         )
 
 

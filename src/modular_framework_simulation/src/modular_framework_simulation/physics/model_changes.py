@@ -15,8 +15,9 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.physics.body_joints import (
     JointMeasurement,
     apply_settings,
-    joint_index,
     measured_joint,
+    movable_joints,
+    tree_with_joint,
 )
 from modular_framework_simulation.physics.body_links import measured_inertial
 from modular_framework_simulation.physics.part_names import PartName
@@ -66,7 +67,7 @@ def set_link_state(world: PhysicsWorld, link: PartName, state: BodyState, refere
     _require_model(body, "it stands where its description says; move its joints")
     wanted = world.state_in_world(state, reference)
     body.set_joints(
-        {name: measured_joint(world.engine, body, name).position for name in body.joint_indices}  # at rest
+        {name: measured_joint(world.engine, body, name).position for name in movable_joints(body)}  # at rest
     )
     model_in_world = wanted.pose @ body.link_state(link.part).pose.inverse() @ body.state().pose
     world.set_state(link.model, BodyState(model_in_world, twist_at(wanted.twist, wanted.pose, model_in_world)))
@@ -111,7 +112,7 @@ def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None
             motors of its own.
     """
     body = world.body(joint.model)
-    joint_index(body, joint.part)
+    tree_with_joint(body, joint.part)
     present = measured_joint(world.engine, body, joint.part)
     if change.settings.motor_effort is not None:
         _require_model(body, "its motors belong to the controllers")

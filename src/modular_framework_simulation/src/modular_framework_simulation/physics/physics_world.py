@@ -15,7 +15,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.applied_forces import AppliedForces
-from modular_framework_simulation.physics.body_joints import measured_joint
+from modular_framework_simulation.physics.body_joints import copy_joint_motion
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
 from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.physics.physics_engine import Log, PhysicsEngine
@@ -185,20 +185,11 @@ class PhysicsWorld:
         body = self._load(model, prepared)
         for before, part in zip(old.parts, body.parts, strict=True):  # the first one takes the others along
             part.set_state(before.state())
-            self._copy_joints(before, part)
+            copy_joint_motion(self.engine, before, part)
         self._remove(old)
         self._bodies[model.name] = body
         self._names_by_number.update({part.number: model.name for part in body.parts})
         self.revision += 1
-
-    def _copy_joints(self, source: SimulatedBody, target: SimulatedBody) -> None:
-        for joint, index in target.joint_indices.items():
-            was, bounds = measured_joint(self.engine, source, joint), measured_joint(self.engine, target, joint)
-            position = min(max(was.position, bounds.lower), bounds.upper)
-            velocity = was.velocity if position == was.position else 0.0
-            self.engine.api.resetJointState(
-                target.number, index, position, velocity, physicsClientId=self.engine.client
-            )
 
     def _remove(self, body: SimulatedBody) -> None:
         for part in body.parts:
