@@ -114,6 +114,19 @@ def test_what_the_simulation_refuses_leaves_no_trace(simulation: FakeSimulation)
     assert manage(simulation, "-d", "true", "-t", "box")[0] == 0
 
 
+def test_nothing_is_spawned_or_deleted_while_a_manager_is_absent(simulation: FakeSimulation) -> None:
+    assert manage(simulation, "-t", "box", "-n", "stays")[0] == 0
+    absent = "update_acm_entry:=/nobody"
+    code, text = manage(simulation, "-d", "true", "-n", "stays", absent)
+    assert (code, "nothing was changed" in text) == (1, True)
+    assert "stays" in simulation.models
+    assert object_type("stays") == "box"
+    assert manage(simulation, "-t", "box", "-n", "never", absent)[0] == 1
+    assert "never" not in simulation.models
+    assert object_type("never") == ""
+    assert manage(simulation, "-d", "true", "-n", "stays")[0] == 0
+
+
 def test_an_object_that_came_with_the_world_can_be_deleted_too(simulation: FakeSimulation) -> None:
     simulation.models["of_the_world"] = None
     assert manage(simulation, "-d", "true", "-n", "of_the_world")[0] == 0

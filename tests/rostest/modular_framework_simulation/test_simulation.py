@@ -4,18 +4,22 @@
 from __future__ import annotations
 
 import functools
+import signal
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 import rospy
+from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from gazebo_msgs.msg import LinkStates, ModelState, ModelStates
 from gazebo_msgs.srv import (
     DeleteModel,
+    GetJointProperties,
     GetLinkState,
     GetModelProperties,
     GetModelState,
@@ -33,6 +37,7 @@ from moveit_msgs.srv import (
     GetPlanningScene,
     GetPlanningSceneResponse,
 )
+from ros_session import executable
 from ros_session import until as wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -261,6 +266,58 @@ def test_spawn_model_works_from_the_command_line(simulation: Any, ros_session: A
         call("/gazebo/delete_model", DeleteModel, "dice")
 
 
+DOOR = """<sdf version="1.6"><model name="door"><link name="post"/><link name="leaf"/>
+  <joint name="fast" type="fixed"><parent>world</parent><child>post</child></joint>
+  <joint name="hinge" type="revolute"><parent>post</parent><child>leaf</child><axis><xyz>0 0 1</xyz>
+  <limit><lower>-2</lower><upper>2</upper></limit></axis></joint></model></sdf>"""
+BRACKET = """<robot name="b"><link name="l"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"
+  ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><mesh filename="package://l_bracket/meshes/l_bracket.stl"/>
+  </geometry></collision></link></robot>"""
+
+
+def test_all_options_of_spawn_model_have_their_effect(simulation: Any, ros_session: Any, tmp_path: Path) -> None:
+    door, bracket = tmp_path / "door.sdf", tmp_path / "bracket.urdf"
+    door.write_text(DOOR)
+    bracket.write_text(BRACKET)
+    command = [executable("gazebo_ros", "spawn_model")]
+
+    def spawn_model(*words: str) -> tuple[int, str]:
+        done = subprocess.run(
+            [*command, *words], env=ros_session.env, timeout=60, check=False, capture_output=True, text=True
+        )
+        return done.returncode, done.stdout + done.stderr
+
+    call("/gazebo/pause_physics", Empty)
+    frame = ("-gazebo_namespace", "/gazebo/", "-reference_frame", "table", "-wait", "table")
+    code, text = spawn_model("-sdf", "-file", str(door), "-model", "door", "-z", "3", "-J", "hinge", "0.5", *frame)
+    try:
+        assert code == 0, text
+        hinge = call("/gazebo/get_joint_properties", GetJointProperties, "door::hinge")
+        assert hinge.position[0] == pytest.approx(0.5)
+        rospy.set_param("/start_timeout", 2.0)
+        code, text = spawn_model("-sdf", "-file", str(door), "-model", "d", "-gazebo_namespace", "/nothing")
+        rospy.delete_param("/start_timeout")
+        assert (code, "/nothing/spawn_sdf_model" in text) == (1, True)
+        words = ("-urdf", "-file", str(bracket), "-model", "bracket", "-x", "3", "-z", "1")
+        assert spawn_model(*words)[0] == 1, "there is no package of that name"
+        code, text = spawn_model(*words, "-package_to_model", "-robot_namespace", "/some", "-unpause")
+        assert code == 0, text
+        assert "-robot_namespace /some has no effect" in text
+        assert not call("/gazebo/get_physics_properties", GetPhysicsProperties).pause
+        bonded = subprocess.Popen(
+            [*command, "-sdf", "-database", "cube", "-model", "bonded", "-b"], env=ros_session.env
+        )
+        until(lambda: call("/gazebo/get_model_state", GetModelState, "bonded", "").success, "the bonded model")
+        time.sleep(0.5)
+        bonded.send_signal(signal.SIGINT)
+        assert bonded.wait(20) == 0
+        assert not call("/gazebo/get_model_state", GetModelState, "bonded", "").success
+    finally:
+        call("/gazebo/unpause_physics", Empty)
+        for name in ("door", "bracket", "bonded"):
+            call("/gazebo/delete_model", DeleteModel, name)
+
+
 def test_states_of_models_and_links_are_published(simulation: Any) -> None:
     models = rospy.wait_for_message("/gazebo/model_states", ModelStates, 10.0)
     links = rospy.wait_for_message("/gazebo/link_states", LinkStates, 10.0)
@@ -295,6 +352,32 @@ def test_reset_world_puts_models_and_robot_back_and_controllers_go_on(simulation
     joints = rospy.wait_for_message("/joint_states", JointState, 10.0)
     positions = dict(zip(joints.name, joints.position, strict=True))
     assert [positions[name] for name in ARM] == pytest.approx(START, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("service", "reason"), [("reset_world", "the world was reset"), ("reset_simulation", "the simulation was reset")]
+)
+def test_a_reset_in_the_middle_of_a_motion_ends_it_with_that_reason(simulation: Any, service: str, reason: str) -> None:
+    client = SteadyActionClient("/arm_trajectory_controller/follow_joint_trajectory", FollowJointTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(20))
+    goal = FollowJointTrajectoryGoal()
+    goal.trajectory.joint_names = ARM
+    target = [1.0, -1.6, 1.5, -1.5, -1.5, 0.5]
+    goal.trajectory.points = [JointTrajectoryPoint(positions=target, time_from_start=rospy.Duration(20))]
+    client.send_goal(goal)
+    away = ModelState(model_name="can", pose=Pose(Point(0.2, 0.7, 1.2), Quaternion(0, 0, 0, 1)))
+    assert call("/gazebo/set_model_state", SetModelState, away).success
+    until(lambda: client.get_state() == GoalStatus.ACTIVE, "the motion")
+    time.sleep(0.5)
+    call(f"/gazebo/{service}", Empty)
+    until(lambda: client.get_state() == GoalStatus.PREEMPTED, "the end of the motion")
+    assert client.get_goal_status_text() == client.get_result().error_string == reason
+    rospy.sleep(0.5)
+    joints = rospy.wait_for_message("/joint_states", JointState, 10.0)
+    positions = dict(zip(joints.name, joints.position, strict=True))
+    assert [positions[name] for name in ARM] == pytest.approx(START, abs=0.002)
+    place = call("/gazebo/get_model_state", GetModelState, "can", "").pose.position
+    assert (place.x, place.y) == pytest.approx((0.27, 0.45), abs=0.005)
 
 
 def test_joints_are_put_somewhere_and_the_controllers_hold_them_there(simulation: Any) -> None:

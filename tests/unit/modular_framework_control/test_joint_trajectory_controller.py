@@ -397,7 +397,10 @@ def test_after_a_reset_of_time_the_arm_holds_and_its_goal_has_ended(loop: Any) -
     held = commands(loop)
     loop.time_s = 0.0
     loop.run(0.2)
-    assert goal_handle.status is GoalStatus.CANCELED
+    assert (goal_handle.status, goal_handle.text) == (
+        GoalStatus.CANCELED,
+        "time went back, or the robot was put elsewhere",
+    )
     assert commands(loop) == pytest.approx(held, abs=0.03)
 
 
@@ -476,3 +479,10 @@ def test_a_goal_whose_taking_up_fails_is_rejected_with_those_behind_it(
     assert taken_up.status is behind.status is GoalStatus.REJECTED
     assert "no such spline" in taken_up.text and "no such spline" in behind.text
     assert [report.state for report in loop.manager.list_controllers()] == [ControllerState.STOPPED]
+
+
+def test_a_goal_that_a_reset_ends_says_what_was_reset(loop: Any) -> None:
+    goal_handle = send(loop, (1.0, (1.0, 0.0, 0.0)))
+    loop.run(0.5)
+    loop.manager.update(loop.time_s, 0.01, True, "the world was reset")
+    assert (goal_handle.status, goal_handle.text) == (GoalStatus.CANCELED, "the world was reset")

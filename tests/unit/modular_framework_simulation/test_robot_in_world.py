@@ -51,9 +51,11 @@ class Commander:
     def __init__(self) -> None:
         self.script: Script = lambda time_s: None
         self.resets = 0
+        self.reasons: list[str] = []
 
-    def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
+    def update(self, time_s: float, period_s: float, reset_controllers: bool = False, reset_reason: str = "") -> None:
         self.resets += reset_controllers
+        self.reasons += [reset_reason] if reset_controllers else []
         if period_s > 0:
             self.script(time_s)
 

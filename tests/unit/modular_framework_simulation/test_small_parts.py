@@ -12,6 +12,7 @@ import trimesh
 
 from modular_framework_simulation.errors import DescriptionError, LoopTimeoutError
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
+from modular_framework_simulation.gazebo_ros.world_files import find_world_file
 from modular_framework_simulation.loop.grasp_watch import GraspWatch
 from modular_framework_simulation.loop.pacing import Pacer
 from modular_framework_simulation.loop.request_queue import RequestQueue
@@ -70,7 +71,7 @@ def test_a_factor_of_two_runs_twice_as_fast_and_zero_never_sleeps() -> None:
 
 def test_time_that_nobody_waits_for_may_pass_at_another_pace() -> None:
     time = FakeTime()
-    pacer = Pacer(0.0, time.clock, time.sleep, idle_factor=1.0)
+    pacer = Pacer(0.0, time.clock, time.sleep, idle_limit=1.0)
     pacer.keep(1.0, idle=True)
     pacer.keep(1.2, idle=True)
     assert time.now == pytest.approx(50.2)
@@ -202,3 +203,32 @@ def test_an_exact_mesh_keeps_its_triangles_and_a_broken_one_is_refused(tmp_path:
     broken.write_text("this is no mesh")
     with pytest.raises(DescriptionError, match=r"broken\.stl"):
         load_mesh(Mesh(broken))
+
+
+def test_a_world_is_found_by_path_along_gazebos_variable_and_among_our_own(tmp_path: Path) -> None:
+    for folder in ("first", "own"):
+        (tmp_path / folder / "worlds").mkdir(parents=True)
+    own = tmp_path / "own" / "worlds" / "empty.world"
+    own.touch()
+    folders = [tmp_path / "nowhere", tmp_path / "first", tmp_path / "own"]
+    assert find_world_file("worlds/empty.world", folders) == own
+    users = tmp_path / "first" / "worlds" / "empty.world"
+    users.touch()
+    assert find_world_file("worlds/empty.world", folders) == users
+    assert find_world_file(str(own), []) == own
+    with pytest.raises(DescriptionError, match=r"moon\.world: cannot be read: .* looked for .*GAZEBO_RESOURCE_PATH"):
+        find_world_file("moon.world", folders)
+
+
+def test_another_pace_counts_from_the_next_step() -> None:
+    time = FakeTime()
+    pacer = Pacer(1.0, time.clock, time.sleep)
+    pacer.keep(1.0)
+    pacer.set_factor(2.0)
+    pacer.keep(1.5)
+    pacer.keep(2.5)
+    assert time.now == pytest.approx(51.5)
+    pacer.reset_factor()
+    assert pacer.real_time_factor == 1.0
+    with pytest.raises(ValueError, match="allowed"):
+        pacer.set_factor(float("nan"))

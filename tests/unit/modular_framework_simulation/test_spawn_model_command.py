@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pytest
 
+from modular_framework_simulation.gazebo_ros.ros_names import SPAWN_SDF_MODEL, in_namespace
 from modular_framework_simulation.gazebo_ros.spawn_model_command import Format, Source, parse_spawn_command
 from modular_framework_simulation.models.poses import Pose
 
@@ -22,6 +23,16 @@ def test_a_short_one_stands_at_the_origin() -> None:
     command = parse_spawn_command("-sdf -stdin -model m -b".split())
     assert (command.format, command.source, command.source_name) == (Format.SDF, Source.STDIN, "")
     assert (command.pose, command.joints, command.bond) == (Pose(), {}, True)
+
+
+def test_the_simulation_may_be_in_another_namespace_and_meshes_in_the_folders_of_models() -> None:
+    words = "-sdf -stdin -model m -gazebo_namespace /other/ -robot_namespace /r -package_to_model -bond"
+    command = parse_spawn_command(words.split())
+    assert (command.namespace, command.package_to_model, command.bond) == ("/r", True, True)
+    assert in_namespace(SPAWN_SDF_MODEL, command.gazebo_namespace) == "/other/spawn_sdf_model"
+    assert in_namespace(SPAWN_SDF_MODEL, parse_spawn_command("-sdf -stdin -model m".split()).gazebo_namespace) == (
+        SPAWN_SDF_MODEL
+    )
 
 
 @pytest.mark.parametrize(

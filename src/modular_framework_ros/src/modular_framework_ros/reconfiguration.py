@@ -79,6 +79,15 @@ class Reconfiguration:
             rospy.set_param(f"{self._namespace}/{name}", value)
         self._server = _Server(described(self._table, defaults), self._adjust, self._namespace)
 
+    def refresh(self) -> None:
+        """Publish the settings as they are, after something else has changed them; nothing while not serving."""
+        if self._server is None:
+            return
+        settings = getattr(self._holder, self._attribute)
+        values = {item.name: getattr(settings, item.name) for item in self._table}
+        if any(self._server.config[name] != value for name, value in values.items()):
+            self._server.update_configuration(values)
+
     def close(self) -> None:
         """Stop serving; may be called twice."""
         server, self._server = self._server, None

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The errors this package raises, so that the ROS interface can turn every one of them into a status message."""
 
+LONGEST_NAME = 100
+"""Characters of a name that a message shows at most."""
+LONGEST_LIST = 50
+"""Names that a message lists at most."""
+
 
 class SimulationError(Exception):
     """Base of all errors of the simulation."""
@@ -32,10 +37,38 @@ class UnknownEntityError(SimulationError):
     """
 
     def __init__(self, kind: str, name: str, known: list[str]) -> None:
-        listed = ", ".join(sorted(known)) or "none"
-        super().__init__(f"there is no {kind} '{name}' in the simulated world; known: {listed}")
+        super().__init__(f"there is no {kind} '{_shown(name)}' in the simulated world; known: {_listed(known)}")
         self.kind = kind
         self.name = name
+
+
+class AmbiguousNameError(SimulationError):
+    """Several models have a link or joint of a requested name.
+
+    Args:
+        kind: What was meant: "link" or "joint".
+        name: The requested name.
+        found: The full names of all that have it.
+    """
+
+    def __init__(self, kind: str, name: str, found: list[str]) -> None:
+        super().__init__(f"{len(found)} models have a {kind} '{_shown(name)}'; name the model too: {_listed(found)}")
+        self.kind = kind
+        self.name = name
+
+
+def _shown(name: str) -> str:
+    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+
+
+def _listed(names: list[str]) -> str:
+    shown = sorted(names)[:LONGEST_LIST]
+    more = len(names) - len(shown)
+    return (", ".join(shown) or "none") + (f" and {more} more" if more else "")
+
+
+class ModelChangeError(SimulationError):
+    """A model cannot be changed as asked for."""
 
 
 class DuplicateModelError(SimulationError):

@@ -77,6 +77,11 @@ class Controller:
     def stopping(self, time_s: float) -> None:
         """Called once after the last update before a stop."""
 
+    def interrupted(self, time_s: float, reason: str) -> None:
+        """Called instead of `stopping` where it is started again at once; `reason` is for the results of its goals."""
+        del reason
+        self.stopping(time_s)
+
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
         """Called once when the hardware of its joints cannot follow: end goals, hold, refuse new ones.
 

@@ -103,7 +103,13 @@ class ControllerManager:
         """Whether a running controller carries out a goal."""
         return any(entry.running and entry.controller.moving for entry in self._loaded)
 
-    def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
+    def update(
+        self,
+        time_s: float,
+        period_s: float,
+        reset_controllers: bool = False,
+        reset_reason: str = "time went back, or the robot was put elsewhere",
+    ) -> None:
         """Updates every running controller, then carries out a pending switch. Never raises, never waits.
 
         Args:
@@ -111,6 +117,7 @@ class ControllerManager:
             period_s: time since the last cycle [s].
             reset_controllers: restart the running controllers first (after a reset of the simulation); a time before
                 that of the last cycle does the same.
+            reset_reason: why, for the results of the goals that end with it.
         """
         reset = reset_controllers or time_s < self._last_time_s
         self._last_time_s = time_s
@@ -121,7 +128,7 @@ class ControllerManager:
             if entry.state is not ControllerState.RUNNING:
                 continue
             if reset:
-                entry.stop(time_s)
+                entry.interrupt(time_s, reset_reason)
                 if entry.start(time_s):
                     continue
             if faults or entry.fault:

@@ -110,6 +110,10 @@ class LoadedController:
         """Stops it; an exception in `stopping` is logged and leaves it stopped."""
         self._end(ControllerState.STOPPED, self.controller.stopping, time_s)
 
+    def interrupt(self, time_s: float, reason: str) -> None:
+        """Stops it before a new start; an exception in `interrupted` is logged."""
+        self._end(ControllerState.STOPPED, lambda now_s: self.controller.interrupted(now_s, reason), time_s)
+
     def _end(self, state: ControllerState, hook: Callable[[float], None], time_s: float) -> None:
         self.state = state
         try:

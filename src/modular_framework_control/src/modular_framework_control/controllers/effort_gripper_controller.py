@@ -36,6 +36,10 @@ class EffortGripperActionController(GripperActionController):
         super().stopping(time_s)
         self._handle.command = 0.0
 
+    def interrupted(self, time_s: float, reason: str) -> None:
+        super().interrupted(time_s, reason)
+        self._handle.command = 0.0
+
     def failed(self, time_s: float, reason: str) -> None:
         super().failed(time_s, reason)
         self._handle.command = 0.0

@@ -145,6 +145,9 @@ class GripperActionController(Controller):
     def stopping(self, time_s: float) -> None:
         self._end_all(GoalStatus.CANCELED, "the controller was stopped")
 
+    def interrupted(self, time_s: float, reason: str) -> None:
+        self._end_all(GoalStatus.CANCELED, reason)
+
     def failed(self, time_s: float, reason: str) -> None:
         self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
 

@@ -175,6 +175,10 @@ class JointTrajectoryController(Controller):
         del time_s
         self._end_all(GoalStatus.CANCELED, "the controller was stopped")
 
+    def interrupted(self, time_s: float, reason: str) -> None:
+        del time_s
+        self._end_all(GoalStatus.CANCELED, reason)
+
     def failed(self, time_s: float, reason: str) -> None:
         del time_s
         self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")

@@ -99,9 +99,15 @@ class RosControllerManager:
             full_name = join_names(self._namespace, f"controller_manager/{name}")
             self._services.append(rospy.Service(full_name, kind, answer))
 
-    def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
+    def update(
+        self,
+        time_s: float,
+        period_s: float,
+        reset_controllers: bool = False,
+        reset_reason: str = "time went back, or the robot was put elsewhere",
+    ) -> None:
         """One control cycle; see ControllerManager.update."""
-        self.manager.update(time_s, period_s, reset_controllers)
+        self.manager.update(time_s, period_s, reset_controllers, reset_reason)
         now_s = time.monotonic()
         if self._statistics is not None and now_s >= self._statistics_due_s:
             self._statistics_due_s = now_s + STATISTICS_PERIOD_S

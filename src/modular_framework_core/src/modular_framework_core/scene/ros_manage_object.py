@@ -8,6 +8,7 @@ refuses, what was done before is undone, and the exit code says so.
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 import rospy
@@ -16,7 +17,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 
 from modular_framework_core import srv
 from modular_framework_core.scene.manage_object import ObjectRequest, ObjectRequestError, parse_request
-from modular_framework_ros.calls import CallError, request_service
+from modular_framework_ros.calls import CallError, request_service, wait_for_service
 from modular_framework_urdf.rotations import quaternion_from_rpy
 
 SERVICE_TIMEOUT_S = 15.0
@@ -68,6 +69,13 @@ def spawn(request: ObjectRequest) -> None:
     """
     if request.sdf_file is None:
         raise RefusedError(f"no SDF file is known for '{request.name}'")
+    _require(
+        {
+            "add_gazebo_mapping": srv.AddGazeboMapping,
+            "gazebo/spawn_sdf_model": SpawnModel,
+            "update_acm_entry": srv.UpdateACMEntry,
+        }
+    )
     try:
         xml = request.sdf_file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -102,17 +110,34 @@ def spawn(request: ObjectRequest) -> None:
 def delete(request: ObjectRequest) -> None:
     """Deletes an object, also one that came with the world file; or leaves everything as it was.
 
-    The simulation decides whether the object exists: only objects that were spawned here are in the map of types.
+    The simulation decides whether the object exists: only objects that were spawned here are in the map of types. What
+    was deleted there cannot be put back as it was, so all services have to be there before.
 
     Raises:
-        RefusedError: A service refused.
+        RefusedError: A service is absent or refused.
     """
+    _require(
+        {
+            "gazebo/delete_model": DeleteModel,
+            "delete_gazebo_mapping": srv.DeleteGazeboMapping,
+            "update_acm_entry": srv.UpdateACMEntry,
+        }
+    )
     mapping = srv.GetGazeboTypeRequest(object_name=request.name)
     was_spawned_here = ask("get_object_type", srv.GetGazeboType, mapping).success
     call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
     if was_spawned_here:
         call("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
     call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.DELETE_ENTRY, request.name))
+
+
+def _require(services: Mapping[str, Any]) -> None:
+    """Waits for services, given with their types; raises RefusedError where one is absent."""
+    for name, service_type in services.items():
+        try:
+            wait_for_service(rospy.ServiceProxy(name, service_type), SERVICE_TIMEOUT_S)
+        except CallError as error:
+            raise RefusedError(f"nothing was changed: {error}") from error
 
 
 def _acm(action: int, name: str) -> srv.UpdateACMEntryRequest:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
@@ -23,6 +24,10 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 LARGEST_COORDINATE_M = LARGEST_LENGTH_M
 LARGEST_VELOCITY = 1e3
 """Largest values with which the physics engine stays stable; larger ones in requests are refused [m/s, rad/s]."""
+LARGEST_FORCE = 1e5
+"""Largest forces and torques of requests [N, Nm]: with more, a small object leaves all reason within one step."""
+LARGEST_MASS = 1e6
+"""Largest masses and inertias of requests [kg, kg m^2]."""
 
 
 def pose_to_msg(pose: Pose) -> PoseMsg:
@@ -38,11 +43,29 @@ def pose_from_msg(message: PoseMsg) -> Pose:
     """
     p, q = message.position, message.orientation
     position = (p.x, p.y, p.z)
-    _check(position, "position", LARGEST_COORDINATE_M, "m")
+    check_numbers(position, "position", LARGEST_COORDINATE_M, "m")
     return Pose(position, normalised_quaternion((q.x, q.y, q.z, q.w)))
 
 
-def _check(values: tuple[float, float, float], what: str, bound: float, unit: str) -> None:
+def vector_from_msg(message: Vector3 | Point, what: str, bound: float, unit: str) -> tuple[float, float, float]:
+    """Returns the numbers of a vector or point.
+
+    Args:
+        message: The vector or point.
+        what: Named in the error.
+        bound: Largest size of each number.
+        unit: Of the numbers.
+
+    Raises:
+        ValueError: A number is not finite or larger.
+    """
+    values = (message.x, message.y, message.z)
+    check_numbers(values, what, bound, unit)
+    return values
+
+
+def check_numbers(values: Sequence[float], what: str, bound: float, unit: str) -> None:
+    """Raises ValueError where a number is not finite or larger than a bound, with what it is and its unit."""
     if not all(math.isfinite(value) and abs(value) <= bound for value in values):
         raise ValueError(f"{what} {list(values)} is not allowed; give finite numbers of at most {bound:g} {unit}")
 
@@ -60,8 +83,8 @@ def twist_from_msg(message: TwistMsg) -> Twist:
     """
     linear = (message.linear.x, message.linear.y, message.linear.z)
     angular = (message.angular.x, message.angular.y, message.angular.z)
-    _check(linear, "linear velocity", LARGEST_VELOCITY, "m/s")
-    _check(angular, "angular velocity", LARGEST_VELOCITY, "rad/s")
+    check_numbers(linear, "linear velocity", LARGEST_VELOCITY, "m/s")
+    check_numbers(angular, "angular velocity", LARGEST_VELOCITY, "rad/s")
     return Twist(linear, angular)
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ class SimulationParameters:
     Attributes:
         robot_description: `robot_description`: URDF; empty for a world without a robot.
         model_path: `gazebo_model_path`: folders with one folder a model, separated by colons.
-        world_file: `~world_file`: path of a .world file; empty for an empty world.
+        world_file: `~world_file`: path of a .world file, or below GAZEBO_RESOURCE_PATH; empty for an empty world.
         starting_positions: `~starting_pose`: "-J joint value ..." [rad or m].
         robot_name: `~robot_name`: instance name; empty for the name in the description.
         gui: `~gui`: whether to open a window (false).
@@ -27,6 +28,11 @@ class SimulationParameters:
         real_time_factor: `~real_time_factor`: simulated over real time (1.0; 0 = as fast as possible).
         wait_for_planning: `/wait_for_planning`: whether nodes may hold time while they compute (false).
         state_digest: `~state_digest`: whether to hash the state of every physics step, for comparisons (false).
+        clock_rate_hz: `~pub_clock_frequency`: of /clock, in simulated time; 0 is every step [Hz] (100).
+        ros_network: `~enable_ros_network`: whether there are the topics and services of Gazebo (true).
+        gui_required: `~gui_required`: whether to end without a window (false).
+        verbose: `~verbose`: whether to log details too (false).
+        unsupported: `~unsupported`: arguments of a launch file that have no effect here, for a warning.
     """
 
     robot_description: str
@@ -39,6 +45,11 @@ class SimulationParameters:
     real_time_factor: float
     wait_for_planning: bool = False
     state_digest: bool = False
+    clock_rate_hz: float = 100.0
+    ros_network: bool = True
+    gui_required: bool = False
+    verbose: bool = False
+    unsupported: str = ""
 
 
 def read_parameters() -> SimulationParameters:
@@ -51,6 +62,9 @@ def read_parameters() -> SimulationParameters:
     factor = _read("~real_time_factor", 1.0, (int, float))
     if factor < 0:
         raise ParameterError(f"parameter ~real_time_factor: got {factor}; allowed: 0 (as fast as possible) or greater")
+    clock_rate_hz = _read("~pub_clock_frequency", 100, (int, float))
+    if not 0 <= clock_rate_hz < math.inf:
+        raise ParameterError(f"parameter ~pub_clock_frequency: got {clock_rate_hz}; allowed: 0 (every step) or greater")
     return SimulationParameters(
         robot_description=_read("/robot_description", "", (str,)),
         model_path=_read("/gazebo_model_path", "", (str,)),
@@ -62,6 +76,11 @@ def read_parameters() -> SimulationParameters:
         real_time_factor=float(factor),
         wait_for_planning=_read("/wait_for_planning", False, (bool,)),
         state_digest=_read("~state_digest", False, (bool,)),
+        clock_rate_hz=float(clock_rate_hz),
+        ros_network=_read("~enable_ros_network", True, (bool,)),
+        gui_required=_read("~gui_required", False, (bool,)),
+        verbose=_read("~verbose", False, (bool,)),
+        unsupported=_read("~unsupported", "", (str,)),
     )
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import threading
@@ -21,7 +22,8 @@ from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServic
 from modular_framework_simulation.gazebo_ros.parameters import SimulationParameters, read_parameters
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
 from modular_framework_simulation.gazebo_ros.time_services import TimeServices
-from modular_framework_simulation.gazebo_ros.world_topics import WorldTopics
+from modular_framework_simulation.gazebo_ros.world_files import find_world_file
+from modular_framework_simulation.gazebo_ros.world_topics import ClockTopic, WorldTopics
 from modular_framework_simulation.loop.pacing import Pacer
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.simulation_loop import Actors, Hook, SimulationLoop
@@ -40,9 +42,10 @@ from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
 
-_CLOCK_RATE_HZ = 100
+_PACKAGE = "modular_framework_simulation"
 _STATES_RATE_HZ = 50
 _GRASP_RATE_HZ = 50
+_PERFORMANCE_RATE_HZ = 5
 _SNAPSHOT_RATE_HZ = 20
 _PACE_REPORT_S = 30
 _SWITCH_INTERVAL_S = 0.0005
@@ -52,8 +55,7 @@ _STOP_TIMEOUT_S = 5.0
 def _pacer(parameters: SimulationParameters) -> Pacer:
     """Returns the pacer; between episodes simulated time leaves the processor to nodes that start or compute."""
     factor = parameters.real_time_factor
-    idle_factor = min(factor or 1.0, 1.0) if parameters.wait_for_planning else None
-    return Pacer(factor, idle_factor=idle_factor)
+    return Pacer(factor, idle_limit=1.0 if parameters.wait_for_planning else None)
 
 
 def _resources(model_path: str) -> Resources:
@@ -90,7 +92,8 @@ class SimulationNode:
         self._world = self._build_world(parameters)
         self._controllers: RosControllerManager | None = None
         actors = self._build_robot(parameters)
-        self._topics = WorldTopics(self._world)
+        self._clock = ClockTopic(self._world)
+        self._topics = WorldTopics(self._world) if parameters.ros_network else None
         self._loop = SimulationLoop(
             self._world,
             _pacer(parameters),
@@ -105,19 +108,23 @@ class SimulationNode:
         self._scene = PlanningScenePublisher()
         digest = WorldDigest(self._world, actors.robot if actors else None) if parameters.state_digest else None
         self._time_services = TimeServices(
-            self._loop, self._scene, self._snapshot, parameters.wait_for_planning, digest
+            self._loop, self._scene, self._snapshot, parameters.wait_for_planning, digest, self._services.refresh
         )
-        self._add_hooks()
+        self._add_hooks(parameters.clock_rate_hz)
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
         self._failed = False
 
     def _build_world(self, parameters: SimulationParameters) -> PhysicsWorld:
         spec = sdf_specs.World("empty", STANDARD_GRAVITY, (), ())
         if parameters.world_file:
-            spec = read_world(Path(parameters.world_file), self._resources)
+            own_worlds = Path(rospkg.RosPack().get_path(_PACKAGE))
+            file = find_world_file(parameters.world_file, (*self._resources.resource_folders, own_worlds))
+            spec = read_world(file, self._resources)
             if spec.ignored:
                 rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))
         world = PhysicsWorld(self._settings, self._parts, spec.gravity, parameters.gui, rospy.logwarn)
+        if parameters.gui_required and not world.engine.has_window:
+            raise SimulationError("~gui_required is true and there is no window; set it to false to run without one")
         for model in spec.models:
             world.spawn(model, keep=True)
         rospy.loginfo("world '%s' with %d models: %s", spec.name, len(spec.models), ", ".join(world.names()) or "none")
@@ -139,15 +146,15 @@ class SimulationNode:
         self._controllers = RosControllerManager(hardware)
         return Actors(robot, hardware, self._controllers)
 
-    def _add_hooks(self) -> None:
-        step_ns = self._settings.time_step_ns
-
+    def _add_hooks(self, clock_rate_hz: float) -> None:
         def every(rate_hz: float) -> int:
-            return max(1, round(1e9 / rate_hz / step_ns))
+            return round(1e9 / rate_hz) if rate_hz else 0
 
-        self._loop.add_hook(Hook(every(_CLOCK_RATE_HZ), self._topics.publish_clock))
-        self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
-        self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
+        self._loop.add_hook(Hook(every(clock_rate_hz), self._clock.publish))
+        if self._topics is not None:
+            self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
+            self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
+            self._loop.add_hook(Hook(every(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
         self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
         self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
         self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))
@@ -156,8 +163,8 @@ class SimulationNode:
         before = [watch.held for watch in self._loop.grasp_watches]
         self._loop.watch_grasps()
         held = [watch.held for watch in self._loop.grasp_watches]
-        # also after a reset, which forgets what was held
-        self._topics.publish_grasped(sorted({name for name in held if name is not None}))
+        if self._topics is not None:  # also after a reset, which forgets what was held
+            self._topics.publish_grasped(sorted({name for name in held if name is not None}))
         for was, now in zip(before, held, strict=True):
             if now != was:
                 rospy.loginfo("the gripper %s", f"holds '{now}'" if now else f"let go of '{was}'")
@@ -166,7 +173,7 @@ class SimulationNode:
 
     def _on_paused_tick(self) -> None:
         """Publishes the state while time is paused, because models may be spawned, moved and deleted then."""
-        self._topics.publish_clock()
+        self._clock.publish()
         self._show_snapshot()
 
     def _show_snapshot(self) -> None:
@@ -201,11 +208,14 @@ class SimulationNode:
         sys.setswitchinterval(_SWITCH_INTERVAL_S)
         # Topics close at a shutdown: the loop has to have ended before.
         rospy.on_shutdown(self._stop_loop)
-        self._topics.publish_clock()
+        self._clock.publish()
         self._thread.start()
         if self._controllers is not None:
             self._controllers.connect()
-        self._services.connect()
+        if self._topics is not None:
+            self._services.connect()
+        else:
+            rospy.loginfo("~enable_ros_network is false: no topics and services of Gazebo but /clock")
         self._time_services.connect()
         self._scene.connect()
         rospy.loginfo("simulation is running%s", " (paused)" if self._loop.paused else "")
@@ -239,7 +249,12 @@ def main() -> int:
     """
     rospy.init_node(ros_names.NODE)
     try:
-        node = SimulationNode(read_parameters())
+        parameters = read_parameters()
+        if parameters.verbose:
+            logging.getLogger("rosout").setLevel(logging.DEBUG)
+        if parameters.unsupported:
+            rospy.logwarn("without effect in this simulation: %s", parameters.unsupported)
+        node = SimulationNode(parameters)
     except (SimulationError, HardwareInterfaceError, ParameterError, ValueError) as error:
         rospy.logfatal("the simulation cannot start: %s", error)
         return 1

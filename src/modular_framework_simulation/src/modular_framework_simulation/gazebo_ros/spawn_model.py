@@ -19,6 +19,9 @@ from modular_framework_simulation.gazebo_ros.spawn_model_command import (
     SpawnCommand,
     parse_spawn_command,
 )
+from modular_framework_urdf import xml_text
+
+_PACKAGE_SCHEME, _MODEL_SCHEME = "package://", "model://"
 
 
 class SpawnError(Exception):
@@ -39,33 +42,62 @@ def main() -> int:
         rospy.logerr("spawn_model: %s", error)
         return 1
     if command.bond:
-        rospy.on_shutdown(lambda: _call(ros_names.DELETE_MODEL, srv.DeleteModel, command.model))
+        rospy.loginfo("spawn_model: '%s' is deleted when this program ends", command.model)
+        rospy.core.add_preshutdown_hook(lambda _reason: _delete(command))
         rospy.spin()
     return 0
 
 
+def _delete(command: SpawnCommand) -> None:
+    """Deletes the model, without waiting for a simulation that may have ended before."""
+    name = ros_names.in_namespace(ros_names.DELETE_MODEL, command.gazebo_namespace)
+    try:
+        answer = rospy.ServiceProxy(name, srv.DeleteModel)(command.model)
+    except (rospy.ROSException, rospy.ServiceException, OSError) as error:
+        rospy.logerr("spawn_model: '%s' was not deleted: %s", command.model, error)
+        return
+    if not answer.success:
+        rospy.logerr("spawn_model: '%s' was not deleted: %s", command.model, answer.status_message)
+
+
 def _spawn(command: SpawnCommand) -> None:
-    text = _description(command)
     if command.wait_for:
-        _wait_for_model(command.wait_for)
+        _wait_for_model(command)
+    text = _description(command)
+    if command.package_to_model:
+        text = package_to_model(text, command.source_name or command.source.value)
+    if command.namespace.strip("/"):
+        rospy.logwarn(
+            "spawn_model: -robot_namespace %s has no effect: models of this simulation have no ROS interfaces of their "
+            "own, and controllers are those of the robot that it was started with",
+            command.namespace,
+        )
     name = ros_names.SPAWN_SDF_MODEL if command.format is Format.SDF else ros_names.SPAWN_URDF_MODEL
     pose = conversions.pose_to_msg(command.pose)
-    answer = _call(name, srv.SpawnModel, command.model, text, command.namespace, pose, command.reference_frame)
+    answer = _call(command, name, srv.SpawnModel, command.model, text, command.namespace, pose, command.reference_frame)
     rospy.loginfo("spawn_model: %s", answer.status_message)
     if command.joints:
         joints, values = list(command.joints), list(command.joints.values())
         parameter = command.source_name if command.source is Source.PARAM else ""
-        _call(ros_names.SET_MODEL_CONFIGURATION, srv.SetModelConfiguration, command.model, parameter, joints, values)
+        _call(
+            command,
+            ros_names.SET_MODEL_CONFIGURATION,
+            srv.SetModelConfiguration,
+            command.model,
+            parameter,
+            joints,
+            values,
+        )
     if command.unpause:
-        _call(ros_names.UNPAUSE_PHYSICS, Empty)
+        _call(command, ros_names.UNPAUSE_PHYSICS, Empty)
 
 
 def _description(command: SpawnCommand) -> str:
     match command.source:
         case Source.FILE:
-            return Path(command.source_name).read_text(encoding="utf-8")
+            return _not_empty(Path(command.source_name).read_text(encoding="utf-8"), f"file {command.source_name}")
         case Source.STDIN:
-            return sys.stdin.read()
+            return _not_empty(sys.stdin.read(), "the standard input")
         case Source.DATABASE:
             return f"<sdf version='1.6'><include><uri>model://{command.source_name}</uri></include></sdf>"
         case Source.PARAM:
@@ -75,9 +107,38 @@ def _description(command: SpawnCommand) -> str:
             return text
 
 
-def _wait_for_model(model: str) -> None:
-    _wait_for_service(ros_names.GET_WORLD_PROPERTIES)
-    world = rospy.ServiceProxy(ros_names.GET_WORLD_PROPERTIES, srv.GetWorldProperties)
+def _not_empty(text: str, source: str) -> str:
+    if not text.strip():
+        raise SpawnError(f"{source} is empty; give the description of a model")
+    return text
+
+
+def package_to_model(text: str, source: str) -> str:
+    """Returns a description in which meshes of package:// are looked for in the folders of models.
+
+    Args:
+        text: The description.
+        source: What to call it in messages.
+
+    Raises:
+        SpawnError: It is not well-formed.
+    """
+    try:
+        root = xml_text.parse(text, source)
+    except xml_text.XmlError as error:
+        raise SpawnError(str(error)) from error
+    for mesh in root.iter("mesh"):
+        uri = mesh.get("filename", "")
+        if uri.startswith(_PACKAGE_SCHEME):
+            mesh.set("filename", _MODEL_SCHEME + uri.removeprefix(_PACKAGE_SCHEME))
+    return xml_text.to_text(root)
+
+
+def _wait_for_model(command: SpawnCommand) -> None:
+    name = ros_names.in_namespace(ros_names.GET_WORLD_PROPERTIES, command.gazebo_namespace)
+    _wait_for_service(name)
+    world = rospy.ServiceProxy(name, srv.GetWorldProperties)
+    model = command.wait_for
     if not wait_for_start(lambda: model in world().model_names, f"model '{model}' of the simulation"):
         raise SpawnError(
             f"model '{model}' did not appear within {start_timeout():g} s (parameter /start_timeout); "
@@ -100,7 +161,8 @@ def _wait_for_service(name: str) -> None:
         )
 
 
-def _call(name: str, kind: Any, *values: Any) -> Any:
+def _call(command: SpawnCommand, service: str, kind: Any, *values: Any) -> Any:
+    name = ros_names.in_namespace(service, command.gazebo_namespace)
     _wait_for_service(name)
     answer = rospy.ServiceProxy(name, kind)(*values)
     if not getattr(answer, "success", True):

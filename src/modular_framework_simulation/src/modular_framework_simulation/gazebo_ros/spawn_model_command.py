@@ -22,7 +22,9 @@ class SpawnCommand:
         source_name: File, parameter or model folder; empty for stdin.
         pose: Of the model, in the reference frame.
         reference_frame: Model, "model::link" or empty for the world.
-        namespace: Namespace of the robot's ROS interfaces.
+        namespace: Namespace of the model's ROS interfaces; empty for none given.
+        gazebo_namespace: Namespace of the simulation's services.
+        package_to_model: Look for meshes of package:// in the folders of models.
         joints: Positions to put joints at after the spawn [rad or m].
         wait_for: Model to wait for first; empty for none.
         unpause: Let time go on afterwards.
@@ -36,6 +38,8 @@ class SpawnCommand:
     pose: Pose
     reference_frame: str
     namespace: str
+    gazebo_namespace: str
+    package_to_model: bool
     joints: dict[str, float]
     wait_for: str
     unpause: bool
@@ -76,6 +80,12 @@ def parse_spawn_command(arguments: Sequence[str]) -> SpawnCommand:
     parser.add_argument("-model", required=True, metavar="NAME", help="name of the model in the simulation")
     parser.add_argument("-reference_frame", default="", metavar="FRAME", help="model or model::link of the pose")
     parser.add_argument("-robot_namespace", default="", metavar="NS", help="namespace of the model's ROS interfaces")
+    parser.add_argument(
+        "-gazebo_namespace", default="/gazebo", metavar="NS", help="of the simulation's services, default /gazebo"
+    )
+    parser.add_argument(
+        "-package_to_model", action="store_true", help="look for meshes of package:// in the folders of models"
+    )
     for name in ("x", "y", "z"):
         parser.add_argument(f"-{name}", type=float, default=0.0, help="position [m], default 0")
     for name, meaning in (("R", "roll"), ("P", "pitch"), ("Y", "yaw")):
@@ -83,9 +93,9 @@ def parse_spawn_command(arguments: Sequence[str]) -> SpawnCommand:
     parser.add_argument("-J", nargs=2, action="append", default=[], metavar=("JOINT", "VALUE"), help="joint position")
     parser.add_argument("-wait", default="", metavar="MODEL", help="wait for this model first")
     parser.add_argument("-unpause", action="store_true", help="let time go on afterwards")
-    parser.add_argument("-b", action="store_true", help="delete the model when this program ends")
+    parser.add_argument("-b", "-bond", dest="bond", action="store_true", help="delete the model when this program ends")
     options = parser.parse_args(arguments)
-    joints = {}
+    joints: dict[str, float] = {}
     for joint, value in options.J:
         try:
             joints[joint] = float(value)
@@ -100,8 +110,10 @@ def parse_spawn_command(arguments: Sequence[str]) -> SpawnCommand:
         pose=Pose.from_xyz_rpy((options.x, options.y, options.z), (options.R, options.P, options.Y)),
         reference_frame=options.reference_frame,
         namespace=options.robot_namespace,
+        gazebo_namespace=options.gazebo_namespace,
+        package_to_model=options.package_to_model,
         joints=joints,
         wait_for=options.wait,
         unpause=options.unpause,
-        bond=options.b,
+        bond=options.bond,
     )

@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
+from modular_framework_simulation.gazebo_ros.world_topics import stamp_of
 from modular_framework_simulation.loop.simulation_loop import Hook, SimulationLoop
 from modular_framework_simulation.loop.snapshots import WorldSnapshot
 from modular_framework_simulation.loop.time_holds import Advance, HoldError
@@ -36,6 +37,7 @@ class TimeServices:
         take_snapshot: Copies the state of the world; called by the loop's thread.
         may_hold: Whether time may be held: the parameter /wait_for_planning.
         digest: Hashes every step; None where nobody asks for that.
+        after_restart: Called, beside the loop, once the world has begun again.
     """
 
     def __init__(
@@ -45,11 +47,12 @@ class TimeServices:
         take_snapshot: Callable[[], WorldSnapshot],
         may_hold: bool,
         digest: WorldDigest | None = None,
+        after_restart: Callable[[], None] = lambda: None,
     ) -> None:
         self._loop, self._scene, self._take_snapshot, self._may_hold = loop, scene, take_snapshot, may_hold
-        self._digest = digest
+        self._digest, self._after_restart = digest, after_restart
         if digest is not None:
-            loop.add_hook(Hook(1, digest.add))
+            loop.add_hook(Hook(0, digest.add))
         self._services: list[rospy.Service] = []
 
     def connect(self) -> None:
@@ -79,7 +82,7 @@ class TimeServices:
                 holds.release(request.owner)
             else:
                 holds.hold(request.owner, request.lease_s, request.during_motions)
-            return self._stamp()
+            return stamp_of(self._loop.world)
 
         try:
             if not self._may_hold:
@@ -125,11 +128,12 @@ class TimeServices:
     def _now(self) -> tuple[rospy.Time, bool, WorldSnapshot | None]:
         held, world = self._loop.held, self._loop.world
         is_news = held and not self._scene.is_up_to_date(world.time_ns, world.revision)
-        return self._stamp(), held, self._take_snapshot() if is_news else None
+        return stamp_of(self._loop.world), held, self._take_snapshot() if is_news else None
 
     def _on_restart(self, _request: Any) -> TriggerResponse:
         try:
             self._in_loop(ros_names.RESTART, self._loop.restart)
+            self._after_restart()
         except SimulationError as error:
             rospy.logerr("%s: %s", ros_names.RESTART, error)
             return TriggerResponse(success=False, message=str(error))
@@ -140,6 +144,3 @@ class TimeServices:
         assert digest is not None
         found = self._in_loop(ros_names.STATE_DIGEST, lambda: (*digest.checkpoints, digest.now()))
         return TriggerResponse(success=True, message=json.dumps([[item.step, item.digest] for item in found]))
-
-    def _stamp(self) -> rospy.Time:
-        return rospy.Time(*divmod(self._loop.world.time_ns, 1_000_000_000))

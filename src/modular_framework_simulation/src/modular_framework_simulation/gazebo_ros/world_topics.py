@@ -1,29 +1,53 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the clock, the states of models and links, and the objects that grippers hold."""
+"""Publishes the clock, how fast it runs, the states of models and links, and the objects that grippers hold."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import Any
 
 import rospy
-from gazebo_msgs.msg import LinkStates, ModelStates
+from gazebo_msgs.msg import LinkStates, ModelStates, PerformanceMetrics
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from modular_framework_simulation.gazebo_ros import conversions, ros_names
-from modular_framework_simulation.physics.physics_world import SCOPE, PhysicsWorld
+from modular_framework_simulation.physics.part_names import SCOPE
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState
 
 _QUEUE_SIZE = 50
 """Messages that wait for a subscriber: time that runs faster than real time sends them in bursts."""
 
 
+def stamp_of(world: PhysicsWorld) -> rospy.Time:
+    """Returns simulated time."""
+    return rospy.Time(*divmod(world.time_ns, 1_000_000_000))
+
+
+class ClockTopic:
+    """Publishes /clock (rosgraph_msgs/Clock); used by the loop's thread.
+
+    Args:
+        world: Whose time is published.
+    """
+
+    def __init__(self, world: PhysicsWorld) -> None:
+        self._world = world
+        self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
+
+    def publish(self) -> None:
+        """Publishes simulated time."""
+        self._clock.publish(Clock(stamp_of(self._world)))
+
+
 class WorldTopics:
     """Publishers of the simulation; all methods are called by the loop's thread.
 
-    Publishes: /clock (rosgraph_msgs/Clock), /gazebo/model_states, /gazebo/link_states, and /gazebo/grasped_object
-    (std_msgs/String, latched; empty while nothing is held; names of several objects are separated by commas).
+    Publishes: /gazebo/model_states, /gazebo/link_states, /gazebo/performance_metrics (gazebo_msgs/PerformanceMetrics,
+    without sensors), and /gazebo/grasped_object (std_msgs/String, latched; empty while nothing is held; names of
+    several objects are separated by commas).
 
     Args:
         world: What is published.
@@ -31,16 +55,13 @@ class WorldTopics:
 
     def __init__(self, world: PhysicsWorld) -> None:
         self._world = world
-        self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
         self._models = rospy.Publisher(ros_names.MODEL_STATES, ModelStates, queue_size=_QUEUE_SIZE)
         self._links = rospy.Publisher(ros_names.LINK_STATES, LinkStates, queue_size=1)
         self._grasped = rospy.Publisher(ros_names.GRASPED_OBJECT, String, queue_size=1, latch=True)
+        self._performance = rospy.Publisher(ros_names.PERFORMANCE_METRICS, PerformanceMetrics, queue_size=10)
+        self._measured_at = (time.monotonic(), world.time_ns)
         self._last_grasped: str | None = None
         self.publish_grasped(())
-
-    def publish_clock(self) -> None:
-        """Publishes simulated time."""
-        self._clock.publish(Clock(rospy.Time(*divmod(self._world.time_ns, 1_000_000_000))))
 
     def publish_models(self) -> None:
         """Publishes the states of all models, if there is a subscriber."""
@@ -55,6 +76,16 @@ class WorldTopics:
             links = [(name, body, link) for name, body in bodies for link in body.link_names()]
             states = [(f"{name}{SCOPE}{link}", body.link_state(link)) for name, body, link in links]
             self._links.publish(_filled(LinkStates(), states))
+
+    def publish_performance(self) -> None:
+        """Publishes simulated over real time since the last call; nothing after a reset of time."""
+        real_s, simulated_ns = time.monotonic(), self._world.time_ns
+        before_s, before_ns = self._measured_at
+        self._measured_at = (real_s, simulated_ns)
+        if self._performance.get_num_connections() and simulated_ns > before_ns:
+            message = PerformanceMetrics(real_time_factor=(simulated_ns - before_ns) * 1e-9 / (real_s - before_s))
+            message.header.stamp = stamp_of(self._world)
+            self._performance.publish(message)
 
     def publish_grasped(self, names: Sequence[str]) -> None:
         """Publishes the names of the held objects when they changed."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,7 +36,7 @@ class Pacer:
         real_time_factor: Simulated over real time; 0 is as fast as possible.
         clock: Real time [s].
         sleep: Waits [s].
-        idle_factor: The same while nobody waits for simulated time; None: `real_time_factor`.
+        idle_limit: Largest factor while nobody waits for simulated time; None: any.
     """
 
     def __init__(
@@ -43,12 +44,12 @@ class Pacer:
         real_time_factor: float,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
-        idle_factor: float | None = None,
+        idle_limit: float | None = None,
     ) -> None:
-        if real_time_factor < 0:
-            raise ValueError(f"real_time_factor is {real_time_factor:g}; allowed: 0 (as fast as possible) or greater")
-        self._factors = (real_time_factor, real_time_factor if idle_factor is None else idle_factor)
+        self._idle_limit = idle_limit
+        self.real_time_factor = self._initial_factor = real_time_factor
         self._factor = real_time_factor
+        self.set_factor(real_time_factor)
         self._clock = clock
         self._sleep = sleep
         self._start_real_s = 0.0
@@ -58,6 +59,25 @@ class Pacer:
         self._slept_s = 0.0
         self._steps = 0
         self.start(0.0)
+
+    def set_factor(self, real_time_factor: float) -> None:
+        """Keeps another factor from now on.
+
+        Args:
+            real_time_factor: Simulated over real time; 0 is as fast as possible.
+
+        Raises:
+            ValueError: It is negative or not finite.
+        """
+        if not 0 <= real_time_factor < math.inf:
+            raise ValueError(f"real_time_factor is {real_time_factor:g}; allowed: 0 (as fast as possible) or greater")
+        self.real_time_factor = real_time_factor
+        limit = self._idle_limit
+        self._idle_factor = real_time_factor if limit is None else min(real_time_factor or limit, limit)
+
+    def reset_factor(self) -> None:
+        """Keeps the factor of the beginning again."""
+        self.set_factor(self._initial_factor)
 
     def start(self, simulated_s: float) -> None:
         """Restarts, after a pause or a reset of time.
@@ -78,8 +98,9 @@ class Pacer:
             simulated_s: Present simulated time [s].
             idle: Whether nobody waits for it.
         """
-        if self._factor != self._factors[idle]:
-            self._factor = self._factors[idle]
+        factor = self._idle_factor if idle else self.real_time_factor
+        if self._factor != factor:
+            self._factor = factor
             self.start(simulated_s)
         self._steps += 1
         if self._factor == 0.0:

@@ -15,6 +15,7 @@ from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.snapshots import HeldObject
 from modular_framework_simulation.loop.time_holds import TimeHolds
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.model_changes import set_joint_positions
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
@@ -36,8 +37,8 @@ class Controllers(Protocol):
     def moving(self) -> bool:
         """Whether a controller carries out a goal."""
 
-    def update(self, time_s: float, period_s: float, reset_controllers: bool = False) -> None:
-        """Runs one control cycle."""
+    def update(self, time_s: float, period_s: float, reset_controllers: bool = False, reset_reason: str = "") -> None:
+        """Runs one control cycle; a reset restarts the controllers first, and their goals end with the reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +46,11 @@ class Hook:
     """An action that the loop's thread repeats while time advances.
 
     Attributes:
-        every_steps: Physics steps from one call to the next.
+        period_ns: Simulated time from one call to the next [ns]; 0: every physics step.
         action: Must be quick.
     """
 
-    every_steps: int
+    period_ns: int
     action: Callable[[], None]
 
 
@@ -89,13 +90,14 @@ class SimulationLoop:
         self._actors = actors
         self.grasp_watches = tuple(GraspWatch() for _ in actors.robot.grippers) if actors is not None else ()
         self._hooks: list[Hook] = []
+        self._hook_turns: list[int] = []
         self._on_paused_tick = on_paused_tick
         self.holds = holds if holds is not None else TimeHolds(print)
         self._held_at = -1
         self._next_tick_s = 0.0
         self._paused = False
         self._stop = threading.Event()
-        self._reset_controllers = False
+        self._reset_reason = ""
 
     @property
     def held(self) -> bool:
@@ -110,6 +112,7 @@ class SimulationLoop:
     def add_hook(self, hook: Hook) -> None:
         """Adds an action that is repeated while time advances; to be called before `run`."""
         self._hooks.append(hook)
+        self._hook_turns.append(0)
 
     def pause(self) -> None:
         """Stops time; requests are still carried out."""
@@ -121,48 +124,60 @@ class SimulationLoop:
         self.pacer.start(self._time_s())
 
     def reset_poses(self) -> None:
-        """Puts models and robot at their initial poses, at rest; time continues."""
+        """Puts models and robot at their initial poses, at rest, without forces of requests; time continues.
+
+        Goals that controllers carry out end with that reason.
+        """
         self.world.reset_poses()
-        self._restart_robot(RobotBody.reset)
+        self._restart_robot(RobotBody.reset, "the world was reset")
 
     def set_joints(self, name: str, positions: dict[str, float]) -> None:
         """Puts joints of a model or of the robot at positions [rad or m], at rest.
 
         Raises:
             UnknownEntityError: There is no such model, or it has no such joint.
+            ModelChangeError: A position is beyond a limit, or a joint is not where it was put.
         """
-        body = self.world.body(name)
-        body.set_joints(positions)
-        if self._actors is not None and body is self._actors.robot.body:
-            self._restart_control()
+        set_joint_positions(self.world, name, positions)
+        if self._actors is not None and self.world.body(name) is self._actors.robot.body:
+            self._restart_control("the joints were put elsewhere by a request")
 
-    def _restart_robot(self, place: Callable[[RobotBody], None]) -> None:
+    def _restart_robot(self, place: Callable[[RobotBody], None], reason: str) -> None:
         """Puts the robot where it starts, with empty grippers, and restarts what drives it."""
         for watch in self.grasp_watches:
             watch.reset()
         if self._actors is not None:
             place(self._actors.robot)
-        self._restart_control()
+        self._restart_control(reason)
 
-    def _restart_control(self) -> None:
-        """Restarts hardware and controllers from the present joint positions."""
+    def _restart_control(self, reason: str) -> None:
+        """Restarts hardware and controllers from the present joint positions; goals end with the reason."""
         if self._actors is not None:
             self._actors.hardware.read(self._time_s(), 0.0)
             self._actors.hardware.hold()
-        self._reset_controllers = True
+        self._reset_reason = reason
 
     def reset_all(self) -> None:
-        """Puts models and robot where they started and simulated time to 0."""
+        """Puts models and robot where they started, without forces of requests, and simulated time to 0.
+
+        Goals that controllers carry out, and requests for time to pass, end.
+        """
         self.world.reset_time()
-        self.reset_poses()
-        self.pacer.start(0.0)
+        self.world.reset_poses()
+        self._restart_robot(RobotBody.reset, "the simulation was reset")
+        self._begin_time(_STEPS_BEFORE_HOLD if self.holds.owners else 0)
 
     def restart(self) -> None:
         """Begins again in an empty physics engine, with the world as at the start; spawned models are gone."""
         self.world.restart()
-        self._restart_robot(RobotBody.reload)
+        self.pacer.reset_factor()
+        self._restart_robot(RobotBody.reload, "the world began again")
+        self._begin_time(_STEPS_BEFORE_HOLD)
+
+    def _begin_time(self, steps: int) -> None:
+        """Ends requests for time to pass, makes the first steps, and keeps pace from there."""
         self.holds.restart()
-        for _ in range(_STEPS_BEFORE_HOLD):
+        for _ in range(steps):
             self.step()
         self._held_at = -1
         self.pacer.start(self._time_s())
@@ -180,7 +195,8 @@ class SimulationLoop:
                 self._on_paused_tick()
                 if self._actors is not None:
                     # Controllers can be loaded and started while time is paused.
-                    self._actors.controllers.update(self._time_s(), 0.0)
+                    reason, self._reset_reason = self._reset_reason, ""
+                    self._actors.controllers.update(self._time_s(), 0.0, bool(reason), reason)
                 self.requests.wait(_PAUSED_TICK_S)
             elif self.holds.may_pass(self.world.steps, self._actors is not None and self._actors.controllers.moving):
                 self._pass_time()
@@ -204,8 +220,8 @@ class SimulationLoop:
             if self._actors is not None:
                 self._actors.hardware.read(now_s, 0.0)
         if self._actors is not None:
-            reset, self._reset_controllers = self._reset_controllers, False
-            self._actors.controllers.update(now_s, 0.0, reset)
+            reason, self._reset_reason = self._reset_reason, ""
+            self._actors.controllers.update(now_s, 0.0, bool(reason), reason)
         if first or time.monotonic() >= self._next_tick_s:
             self._next_tick_s = time.monotonic() + _PAUSED_TICK_S
             self._on_paused_tick()
@@ -213,7 +229,7 @@ class SimulationLoop:
 
     def _halt(self, robot: RobotBody) -> None:
         """Lets the controllers hold the robot at its present position, and continues until it is at rest."""
-        self._restart_control()
+        self._restart_control("the simulation ends")
         begun_s = self._time_s()
         for shortest_s in _HALT_S:
             while self._time_s() - begun_s < shortest_s:
@@ -228,13 +244,15 @@ class SimulationLoop:
         if self._actors is not None:
             now_s = self._time_s()
             self._actors.hardware.read(now_s, period_s)
-            reset, self._reset_controllers = self._reset_controllers, False
-            self._actors.controllers.update(now_s, period_s, reset)
+            reason, self._reset_reason = self._reset_reason, ""
+            self._actors.controllers.update(now_s, period_s, bool(reason), reason)
             self._actors.hardware.write(now_s, period_s)
         self.world.step()
-        steps = self.world.steps
-        for hook in self._hooks:
-            if steps % hook.every_steps == 0:
+        time_ns = self.world.time_ns
+        for rank, hook in enumerate(self._hooks):
+            turn = time_ns // hook.period_ns if hook.period_ns else self.world.steps
+            before, self._hook_turns[rank] = self._hook_turns[rank], turn
+            if turn > before:
                 hook.action()
 
     def watch_grasps(self) -> None:

@@ -100,7 +100,7 @@ class PhysicsEngine:
             log(f"no window of the simulation could be opened ({error}): running headless")
         self.has_window = self.client >= 0
 
-    def _configure(self, gravity: Vector3) -> None:
+    def _set_parameters(self, gravity: Vector3) -> None:
         settings = self.settings
         self.api.setGravity(*gravity, physicsClientId=self.client)
         self.api.setPhysicsEngineParameter(
@@ -112,12 +112,25 @@ class PhysicsEngine:
             deterministicOverlappingPairs=1,
             physicsClientId=self.client,
         )
+
+    def _configure(self, gravity: Vector3) -> None:
+        self._set_parameters(gravity)
         if self.has_window:
             # Side panels and shadows cost more than the physics where the graphics are drawn by software.
             self.api.configureDebugVisualizer(self.api.COV_ENABLE_GUI, 0, physicsClientId=self.client)
             self.api.configureDebugVisualizer(self.api.COV_ENABLE_SHADOWS, 0, physicsClientId=self.client)
             distance_m, yaw_deg, pitch_deg, target = 1.8, 50.0, -30.0, (0.0, 0.4, 0.9)
             self.api.resetDebugVisualizerCamera(distance_m, yaw_deg, pitch_deg, target, physicsClientId=self.client)
+
+    def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
+        """Continues with other settings.
+
+        Args:
+            settings: Numbers of the engine.
+            gravity: [m/s^2]
+        """
+        self.settings = settings
+        self._set_parameters(gravity)
 
     def restart(self, gravity: Vector3) -> None:
         """Takes everything out, contacts and their caches too.

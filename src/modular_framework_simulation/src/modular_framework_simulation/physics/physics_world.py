@@ -6,23 +6,25 @@ All calls come from one thread, the one that owns the loop.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.applied_forces import AppliedForces
+from modular_framework_simulation.physics.body_joints import copy_joint_motion
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
+from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.physics.physics_engine import Log, PhysicsEngine
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
-WORLD_FRAMES = ("", "world", "map")
+WORLD_FRAMES = ("", "world", "map", "/map")
 """Names that stand for the frame of the world in requests."""
-
-SCOPE = "::"
-"""Separates model and link in the name of an entity, as in model::link."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,8 @@ class PhysicsWorld:
         self.settings = settings
         self.gravity = gravity
         self.engine = PhysicsEngine(settings, gravity, gui, log)
+        self.forces = AppliedForces(self.engine)
+        self._initial_physics = (settings, gravity)
         self._convex_parts = convex_parts
         self._log = log
         self._noted: set[tuple[str, ...]] = set()
@@ -71,14 +75,14 @@ class PhysicsWorld:
         self._instances: dict[str, int] = {}
         self._last_instance = 0
         self._initial: list[tuple[specs.Model, BodyUrdf]] = []
-        self._steps = 0
+        self._steps = self._time_ns = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
 
     @property
     def time_ns(self) -> int:
         """Simulated time [ns] since the start or the last reset."""
-        return self._steps * self.settings.time_step_ns
+        return self._time_ns
 
     @property
     def steps(self) -> int:
@@ -87,8 +91,25 @@ class PhysicsWorld:
 
     def step(self) -> None:
         """Advances the world by one time step."""
+        self.forces.apply(self._time_ns, self.gravity, self._bodies)
         self.engine.step()
         self._steps += 1
+        self._time_ns += self.settings.time_step_ns
+
+    def set_physics(self, settings: PhysicsSettings, gravity: Vector3) -> None:
+        """Continues with other settings, until `restart`.
+
+        Args:
+            settings: Numbers of the physics engine.
+            gravity: [m/s^2]
+        """
+        self.engine.adjust(settings, gravity)
+        self.settings, self.gravity = settings, gravity
+
+    @property
+    def bodies(self) -> Mapping[str, SimulatedBody]:
+        """All models by name, in order of appearance; a view."""
+        return MappingProxyType(self._bodies)
 
     def names(self) -> list[str]:
         """Returns the names of all models, in order of appearance."""
@@ -127,23 +148,53 @@ class PhysicsWorld:
         """
         if model.name in self._bodies:
             raise DuplicateModelError(model.name)
-        api = self.engine.api
         written = prepared if prepared is not None else self.prepare(model)
         if model.notes and model.notes not in self._noted:
             self._noted.add(model.notes)
             self._log(f"model '{model.name}': {'; '.join(model.notes)}")
+        body = self._load(model, written)
+        self.add(body, model.pose)
+        if keep:
+            self._initial.append((model, written))
+        return body
+
+    def _load(self, model: specs.Model, written: BodyUrdf) -> SimulatedBody:
         parts = []
         for tree in (written, *written.further):
-            number = self.engine.load_urdf(tree.text, model.name, tree.fixed, api.URDF_USE_INERTIA_FROM_FILE)
+            flags = self.engine.api.URDF_USE_INERTIA_FROM_FILE
+            number = self.engine.load_urdf(tree.text, model.name, tree.fixed, flags)
             parts.append(SimulatedBody(self.engine, number, model.name, tree, model.static, model))
             parts[-1].release_ball_joints()
             self._set_surfaces(parts[-1], model)
         body = parts[0]
         body.further = tuple(parts[1:])
-        self.add(body, model.pose)
-        if keep:
-            self._initial.append((model, written))
         return body
+
+    def replace(self, model: specs.Model, prepared: BodyUrdf) -> None:
+        """Gives a model another description; it goes on moving as it does, joints within their limits.
+
+        Args:
+            model: Has the name of the model that it takes the place of, and its links and joints.
+            prepared: What `prepare` made of it.
+
+        Raises:
+            UnknownEntityError: There is no such model.
+            DescriptionError: The engine cannot represent it; nothing has changed then.
+        """
+        old = self.body(model.name)
+        body = self._load(model, prepared)
+        for before, part in zip(old.parts, body.parts, strict=True):  # the first one takes the others along
+            part.set_state(before.state())
+            copy_joint_motion(self.engine, before, part)
+        self._remove(old)
+        self._bodies[model.name] = body
+        self._names_by_number.update({part.number: model.name for part in body.parts})
+        self.revision += 1
+
+    def _remove(self, body: SimulatedBody) -> None:
+        for part in body.parts:
+            self.engine.api.removeBody(part.number, physicsClientId=self.engine.client)
+            del self._names_by_number[part.number]
 
     def add(self, body: SimulatedBody, pose_in_world: Pose) -> None:
         """Adds a body that is already in the engine, at a pose in the world frame."""
@@ -164,10 +215,9 @@ class PhysicsWorld:
             UnknownEntityError: There is no such model.
         """
         body = self.body(name)
-        for part in body.parts:
-            self.engine.api.removeBody(part.number, physicsClientId=self.engine.client)
-            del self._names_by_number[part.number]
-        del self._bodies[name], self._initial_poses[name]
+        self._remove(body)
+        del self._bodies[name], self._initial_poses[name], self._instances[name]
+        self.forces.forget_model(name)
         self.revision += 1
 
     def entity_state(self, entity: str) -> BodyState:
@@ -217,15 +267,24 @@ class PhysicsWorld:
         Raises:
             UnknownEntityError: The model or the reference does not exist.
         """
-        body, frame = self.body(name), self.entity_state(reference)
+        body = self.body(name)
+        body.set_state(self.state_in_world(state, reference))
+        self.revision += 1
+
+    def state_in_world(self, state: BodyState, reference: str) -> BodyState:
+        """Returns a state as seen from a reference as one in the world.
+
+        Raises:
+            UnknownEntityError: The reference does not exist.
+        """
+        frame = self.entity_state(reference)
         offset = rotate_vector(frame.pose.quaternion, state.pose.position)
         lever = cross(frame.twist.angular, offset)
         rotated = twist_in_frame(state.twist, frame.pose.inverse())
         linear = tuple(a + b + c for a, b, c in zip(rotated.linear, frame.twist.linear, lever, strict=True))
         angular = tuple(a + b for a, b in zip(rotated.angular, frame.twist.angular, strict=True))
         twist = Twist((linear[0], linear[1], linear[2]), (angular[0], angular[1], angular[2]))
-        body.set_state(BodyState(frame.pose @ state.pose, twist))
-        self.revision += 1
+        return BodyState(frame.pose @ state.pose, twist)
 
     def pose_in_world(self, pose: Pose, reference: str) -> Pose:
         """Returns a pose given in a reference as a pose in the world."""
@@ -243,7 +302,8 @@ class PhysicsWorld:
         ]
 
     def reset_poses(self) -> None:
-        """Puts every model where it first appeared, at rest; joints of models go to 0."""
+        """Puts every model where it first appeared, at rest; joints of models go to 0; forces of requests end."""
+        self.forces.clear()
         for name, body in self._bodies.items():
             if body.spec is not None:
                 body.reset_joints({})
@@ -260,10 +320,14 @@ class PhysicsWorld:
 
     def restart(self) -> None:
         """Empties the engine, adds the models to keep, and starts time at 0; robots must load themselves."""
+        self.settings, self.gravity = self._initial_physics
+        self.engine.settings = self.settings
         self.engine.restart(self.gravity)
+        self.forces.restart()
         self._bodies.clear()
         self._names_by_number.clear()
         self._initial_poses.clear()
+        self._instances.clear()
         for model, prepared in self._initial:
             self.spawn(model, prepared)
         self.reset_time()
@@ -271,7 +335,7 @@ class PhysicsWorld:
 
     def reset_time(self) -> None:
         """Starts simulated time at 0 again."""
-        self._steps = 0
+        self._steps = self._time_ns = 0
 
     def close(self) -> None:
         """Closes the physics engine; may be called twice."""

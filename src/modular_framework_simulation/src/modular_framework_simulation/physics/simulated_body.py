@@ -29,6 +29,21 @@ class BodyState:
     twist: Twist
 
 
+@dataclass(frozen=True, slots=True)
+class JointSettings:
+    """Settings of a joint that a request changed; None where its description decides.
+
+    Attributes:
+        damping: Resistance per velocity [Nm s/rad or N s/m].
+        motor_velocity: What a motor in the joint wants [rad/s or m/s].
+        motor_effort: What it has for that [Nm or N]; 0: there is no motor.
+    """
+
+    damping: float | None = None
+    motor_velocity: float | None = None
+    motor_effort: float | None = None
+
+
 def cross(a: Vector3, b: Vector3) -> Vector3:
     """Returns the cross product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
@@ -71,6 +86,7 @@ class SimulatedBody:
         self._model_in_root = self._root_in_model.inverse()
         frames = tree.frame_in_link if tree is not None else {}
         self._link_in_frame = {link: frame.inverse() for link, frame in frames.items()}
+        self.joint_settings: dict[str, JointSettings] = {}
         api, client = engine.api, engine.client
         root_name = api.getBodyInfo(number, physicsClientId=client)[0].decode()
         infos = engine.joint_infos(number)
@@ -99,11 +115,17 @@ class SimulatedBody:
             return [link.name for link in self.spec.links]
         return list(self.link_indices)
 
+    def joint_names(self) -> list[str]:
+        """Returns the names of the joints as its description has them; of a robot those that move."""
+        if self.spec is not None:
+            return [joint.name for joint in self.spec.joints]
+        return list(self.joint_indices)
+
     def state(self) -> BodyState:
         """Returns pose and velocity of the model frame in the world."""
         centre_in_world, twist = self._centre_state()
         model_in_world = centre_in_world @ self._root_in_centre @ self._model_in_root
-        return BodyState(model_in_world, _twist_at(twist, centre_in_world, model_in_world))
+        return BodyState(model_in_world, twist_at(twist, centre_in_world, model_in_world))
 
     def link_state(self, link: str) -> BodyState:
         """Returns pose and velocity of a link frame in the world.
@@ -123,12 +145,12 @@ class SimulatedBody:
         if index == BASE_INDEX:
             centre_in_world, twist = self._centre_state()
             link_in_world = centre_in_world @ self._root_in_centre
-            return BodyState(link_in_world, _twist_at(twist, centre_in_world, link_in_world))
+            return BodyState(link_in_world, twist_at(twist, centre_in_world, link_in_world))
         api, client = self._engine.api, self._engine.client
         record = api.getLinkState(self.number, index, 1, 1, physicsClientId=client)
         centre_in_world, twist = Pose(record[0], record[1]), Twist(record[6], record[7])
         link_in_world = Pose(record[4], record[5]) @ self._link_in_frame.get(link, Pose())
-        return BodyState(link_in_world, _twist_at(twist, centre_in_world, link_in_world))
+        return BodyState(link_in_world, twist_at(twist, centre_in_world, link_in_world))
 
     def set_state(self, state: BodyState) -> None:
         """Puts the model somewhere as one rigid body; its joints keep their positions.
@@ -139,14 +161,14 @@ class SimulatedBody:
         model_in_world = self.state().pose if self.further else Pose()
         for part in self.further:
             part_in_world = state.pose @ model_in_world.inverse() @ part.state().pose
-            part.set_state(BodyState(part_in_world, _twist_at(state.twist, state.pose, part_in_world)))
+            part.set_state(BodyState(part_in_world, twist_at(state.twist, state.pose, part_in_world)))
         api, client = self._engine.api, self._engine.client
         centre_in_world = state.pose @ self._root_in_model @ self._centre_in_root
         api.resetBasePositionAndOrientation(
             self.number, centre_in_world.position, centre_in_world.quaternion, physicsClientId=client
         )
         if not self.static:
-            twist = _twist_at(state.twist, state.pose, centre_in_world)
+            twist = twist_at(state.twist, state.pose, centre_in_world)
             api.resetBaseVelocity(self.number, twist.linear, twist.angular, physicsClientId=client)
 
     def release_ball_joints(self) -> None:
@@ -208,7 +230,7 @@ class SimulatedBody:
         return Pose(position, quaternion), Twist(linear, angular)
 
 
-def _twist_at(twist: Twist, from_in_world: Pose, to_in_world: Pose) -> Twist:
+def twist_at(twist: Twist, from_in_world: Pose, to_in_world: Pose) -> Twist:
     """Returns the twist of a rigid body at another of its points."""
     x, y, z = (b - a for a, b in zip(from_in_world.position, to_in_world.position, strict=True))
     return Twist(add(twist.linear, cross(twist.angular, (x, y, z))), twist.angular)

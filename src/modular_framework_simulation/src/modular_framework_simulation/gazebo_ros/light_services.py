@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Services about lights, of which this simulation has none."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gazebo_msgs import srv
+
+from modular_framework_simulation.gazebo_ros import ros_names
+from modular_framework_simulation.gazebo_ros.endpoints import Endpoints
+
+
+class LightServices:
+    """Answers /gazebo/{get,set}_light_properties and delete_light: they are not supported, and the answer says so."""
+
+    def connect(self, endpoints: Endpoints) -> None:
+        """Advertises the services."""
+        for name, kind in (
+            (ros_names.GET_LIGHT_PROPERTIES, srv.GetLightProperties),
+            (ros_names.SET_LIGHT_PROPERTIES, srv.SetLightProperties),
+            (ros_names.DELETE_LIGHT, srv.DeleteLight),
+        ):
+            endpoints.serve_beside(name, kind, _refuse)
+
+
+def _refuse(request: Any) -> Any:
+    raise ValueError(
+        f"light '{request.light_name}': lights are not supported: this simulation draws with a light of its own, "
+        "and those of world files have no effect"
+    )

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""empty_world.launch takes every argument of Gazebo's, and obeys it or says that it does not."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import pytest
+import roslaunch.arg_dump
+import roslaunch.config
+import roslaunch.xmlloader
+import rospkg
+import rospy
+import rosservice
+from gazebo_msgs.srv import GetPhysicsProperties, GetWorldProperties
+from ros_session import until as wait_until
+from rosgraph_msgs.msg import Clock
+
+PUBLIC_ARGUMENTS = {
+    "paused", "use_sim_time", "extra_gazebo_args", "gui", "recording", "headless", "debug", "physics", "verbose",
+    "output", "world_name", "respawn_gazebo", "use_clock_frequency", "pub_clock_frequency", "enable_ros_network",
+    "server_required", "gui_required",
+}  # fmt: skip
+LAUNCH = """<launch><include file="$(find gazebo_ros)/launch/empty_world.launch">{}</include></launch>"""
+
+until = functools.partial(wait_until, timeout_s=30.0)
+
+
+def with_arguments(**arguments: object) -> str:
+    return LAUNCH.format("".join(f'<arg name="{name}" value="{value}"/>' for name, value in arguments.items()))
+
+
+def loaded(text: str) -> Any:
+    config = roslaunch.config.ROSLaunchConfig()
+    roslaunch.xmlloader.XmlLoader().load_string(text, config)
+    return config
+
+
+def test_it_has_the_arguments_of_gazebo() -> None:
+    file = f"{rospkg.RosPack().get_path('gazebo_ros')}/launch/empty_world.launch"
+    assert roslaunch.arg_dump.get_args([file]).keys() >= PUBLIC_ARGUMENTS
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ({}, (False, False, "screen")),
+        ({"server_required": "true"}, (True, False, "screen")),
+        ({"respawn_gazebo": "true", "output": "log"}, (False, True, "log")),
+    ],
+)
+def test_the_node_ends_is_started_again_and_prints_as_asked(
+    arguments: dict[str, str], expected: tuple[bool, bool, str]
+) -> None:
+    (node,) = loaded(with_arguments(**arguments)).nodes
+    assert (node.required, node.respawn, node.output) == expected
+
+
+def test_arguments_become_parameters() -> None:
+    def parameters(**arguments: object) -> dict[str, Any]:
+        return {name: item.value for name, item in loaded(with_arguments(**arguments)).params.items()}
+
+    usual = parameters()
+    assert usual["/use_sim_time"] is True
+    assert usual["/gazebo/pub_clock_frequency"] == 100
+    assert usual["/gazebo/unsupported"] == ""
+    other = parameters(use_sim_time="false", use_clock_frequency="true", pub_clock_frequency="40", headless="true")
+    assert (other["/use_sim_time"], other["/gazebo/pub_clock_frequency"]) == (False, 40)
+    assert parameters(pub_clock_frequency="40")["/gazebo/pub_clock_frequency"] == 100
+    assert parameters(extra_gazebo_args="-u")["/gazebo/paused"] is True
+    assert parameters(enable_ros_network="false", verbose="true")["/gazebo/enable_ros_network"] is False
+
+
+def test_the_usual_world_has_a_floor_and_what_has_no_effect_is_named(ros_session: Any) -> None:
+    launch = ros_session.launch(
+        with_arguments(
+            gui="false",
+            paused="true",
+            physics="ode",
+            recording="true",
+            debug="true",
+            verbose="true",
+            extra_gazebo_args="--seed 3",
+            use_clock_frequency="true",
+            pub_clock_frequency="0",
+        )
+    )
+    ros_session.wait_for_service("/gazebo/get_physics_properties", 40.0)
+    assert rospy.ServiceProxy("/gazebo/get_physics_properties", GetPhysicsProperties)().pause
+    assert rospy.ServiceProxy("/gazebo/get_world_properties", GetWorldProperties)().model_names == ["ground_plane"]
+    until(lambda: "without effect in this simulation: " in launch.log(), "the warning")
+    for each in ("recording:=true", "debug:=true", "physics:=ode", "extra_gazebo_args:=--seed 3"):
+        assert each in launch.log()
+    launch.stop()
+
+
+def test_without_its_ros_network_there_is_only_the_clock(ros_session: Any) -> None:
+    launch = ros_session.launch(with_arguments(gui="false", enable_ros_network="false"))
+    assert rospy.wait_for_message("/clock", Clock, 40.0).clock.to_sec() > 0
+    until(lambda: "simulation is running" in launch.log(), "the end of the start")
+    assert not {"/gazebo/spawn_sdf_model", "/gazebo/set_parameters"} & set(rosservice.get_service_list())
+    assert not [name for name, _ in rospy.get_published_topics("/gazebo")]
+    launch.stop()
+
+
+def test_a_required_window_that_cannot_be_is_an_error(ros_session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(ros_session.env, "DISPLAY", "")
+    launch = ros_session.launch(with_arguments(gui_required="true", server_required="true"))
+    launch.wait(60.0)
+    assert "gui_required is true and there is no window" in launch.log()
+
+
+def test_a_world_that_is_nowhere_is_named_with_the_places_looked_at(ros_session: Any) -> None:
+    launch = ros_session.launch(with_arguments(gui="false", world_name="worlds/moon.world", server_required="true"))
+    launch.wait(60.0)
+    assert "worlds/moon.world: cannot be read" in launch.log()
+    assert "GAZEBO_RESOURCE_PATH" in launch.log()
