@@ -195,8 +195,7 @@ class SimulationLoop:
                 self._on_paused_tick()
                 if self._actors is not None:
                     # Controllers can be loaded and started while time is paused.
-                    reason, self._reset_reason = self._reset_reason, ""
-                    self._actors.controllers.update(self._time_s(), 0.0, bool(reason), reason)
+                    self._update_controllers(self._actors.controllers, 0.0)
                 self.requests.wait(_PAUSED_TICK_S)
             elif self.holds.may_pass(self.world.steps, self._actors is not None and self._actors.controllers.moving):
                 self._pass_time()
@@ -220,8 +219,7 @@ class SimulationLoop:
             if self._actors is not None:
                 self._actors.hardware.read(now_s, 0.0)
         if self._actors is not None:
-            reason, self._reset_reason = self._reset_reason, ""
-            self._actors.controllers.update(now_s, 0.0, bool(reason), reason)
+            self._update_controllers(self._actors.controllers, 0.0)
         if first or time.monotonic() >= self._next_tick_s:
             self._next_tick_s = time.monotonic() + _PAUSED_TICK_S
             self._on_paused_tick()
@@ -238,14 +236,20 @@ class SimulationLoop:
             if all(abs(reading.velocity) < _AT_REST for reading in robot.read()):
                 return
 
+    def _update_controllers(self, controllers: Controllers, period_s: float) -> None:
+        reason, self._reset_reason = self._reset_reason, ""
+        if reason:
+            controllers.update(self._time_s(), period_s, True, reason)
+        else:
+            controllers.update(self._time_s(), period_s)
+
     def step(self) -> None:
         """Advances the world by one physics step: measure, control, actuate, move."""
         period_s = self.world.settings.time_step_s
         if self._actors is not None:
             now_s = self._time_s()
             self._actors.hardware.read(now_s, period_s)
-            reason, self._reset_reason = self._reset_reason, ""
-            self._actors.controllers.update(now_s, period_s, bool(reason), reason)
+            self._update_controllers(self._actors.controllers, period_s)
             self._actors.hardware.write(now_s, period_s)
         self.world.step()
         time_ns = self.world.time_ns
