@@ -12,10 +12,13 @@ from modular_framework_simulation.errors import DuplicateModelError, UnknownEnti
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.body_forces import BodyForce, forces_of
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
+from modular_framework_simulation.physics.joint_dynamics import set_joint_dynamics
 from modular_framework_simulation.physics.physics_engine import Log, PhysicsEngine
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
+from modular_framework_simulation.physics.surfaces import set_surface, surface_of, take_damping_away
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 WORLD_FRAMES = ("", "world", "map")
@@ -71,6 +74,7 @@ class PhysicsWorld:
         self._instances: dict[str, int] = {}
         self._last_instance = 0
         self._initial: list[tuple[specs.Model, BodyUrdf]] = []
+        self._forces: dict[int, tuple[BodyForce, ...]] = {}
         self._steps = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
@@ -87,6 +91,9 @@ class PhysicsWorld:
 
     def step(self) -> None:
         """Advances the world by one time step."""
+        for forces in self._forces.values():
+            for force in forces:
+                force.apply(self.gravity)
         self.engine.step()
         self._steps += 1
 
@@ -127,17 +134,16 @@ class PhysicsWorld:
         """
         if model.name in self._bodies:
             raise DuplicateModelError(model.name)
-        api = self.engine.api
         written = prepared if prepared is not None else self.prepare(model)
         if model.notes and model.notes not in self._noted:
             self._noted.add(model.notes)
             self._log(f"model '{model.name}': {'; '.join(model.notes)}")
         parts = []
         for tree in (written, *written.further):
-            number = self.engine.load_urdf(tree.text, model.name, tree.fixed, api.URDF_USE_INERTIA_FROM_FILE)
+            number = self.engine.load_urdf(tree.text, model.name, tree.fixed)
             parts.append(SimulatedBody(self.engine, number, model.name, tree, model.static, model))
             parts[-1].release_ball_joints()
-            self._set_surfaces(parts[-1], model)
+            self._set_properties(parts[-1], model)
         body = parts[0]
         body.further = tuple(parts[1:])
         self.add(body, model.pose)
@@ -167,6 +173,7 @@ class PhysicsWorld:
         for part in body.parts:
             self.engine.api.removeBody(part.number, physicsClientId=self.engine.client)
             del self._names_by_number[part.number]
+            self._forces.pop(part.number, None)
         del self._bodies[name], self._initial_poses[name]
         self.revision += 1
 
@@ -263,6 +270,7 @@ class PhysicsWorld:
         self.engine.restart(self.gravity)
         self._bodies.clear()
         self._names_by_number.clear()
+        self._forces.clear()
         self._initial_poses.clear()
         for model, prepared in self._initial:
             self.spawn(model, prepared)
@@ -277,30 +285,16 @@ class PhysicsWorld:
         """Closes the physics engine; may be called twice."""
         self.engine.close()
 
-    def _set_surfaces(self, body: SimulatedBody, model: specs.Model) -> None:
+    def _set_properties(self, body: SimulatedBody, model: specs.Model) -> None:
+        """Gives one tree of a model what its URDF does not say: surfaces, and how links and joints resist."""
+        engine = self.engine
         for link in model.links:
             index = body.link_indices.get(STATIC_LINK if model.static else link.name)
-            if index is None or not link.collisions:
-                continue
-            frictions = [each.friction for each in link.collisions]
-            spinning = [each.torsional for each in frictions if each.torsional is not None]
-            rolling = [each.rolling for each in frictions if each.rolling is not None]
-            self.engine.api.changeDynamics(
-                body.number,
-                index,
-                # One coefficient a link is all the engine takes: the most slippery surface decides.
-                lateralFriction=min(each.lateral for each in frictions),
-                spinningFriction=min(spinning, default=self.settings.body_spinning_friction),
-                rollingFriction=min(rolling, default=self.settings.body_rolling_friction),
-                restitution=0.0,
-                linearDamping=0.0,
-                angularDamping=0.01,
+            if index is not None and link.collisions:
+                set_surface(engine, body.number, index, surface_of(link.collisions, engine.settings))
                 # The engine's default lets cylinders and meshes float a millimetre above what they stand on.
-                collisionMargin=0.0,
-                physicsClientId=self.engine.client,
-            )
-        for index in body.joint_indices.values():
-            # Joints of models are free: the engine would otherwise brake them with a motor of its own.
-            self.engine.api.setJointMotorControl2(
-                body.number, index, self.engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=self.engine.client
-            )
+                engine.api.changeDynamics(body.number, index, collisionMargin=0.0, physicsClientId=engine.client)
+        take_damping_away(engine, body.number)
+        set_joint_dynamics(engine, body, {joint.name: joint.dynamics for joint in model.joints})
+        if forces := forces_of(engine, body, model):
+            self._forces[body.number] = forces
