@@ -279,9 +279,9 @@ def test_a_finger_that_mimics_is_ten_milliseconds_behind_its_leader(
     assert positions["slide_2"] == pytest.approx(0.03, abs=2e-5)
 
 
-@pytest.mark.parametrize("step_ns", [0, 999_999, 5_000_000])
+@pytest.mark.parametrize("step_ns", [0, 99_999, 10_000_001])
 def test_a_time_step_out_of_range_is_refused(step_ns: int) -> None:
-    with pytest.raises(SimulationError, match=r"time step of the physics: got .* allowed: 0\.001 s \(1 kHz\) to"):
+    with pytest.raises(SimulationError, match=r"time step of the physics: got .* allowed: 0\.0001 s to 0\.01 s"):
         PhysicsSettings(time_step_ns=step_ns)
 
 

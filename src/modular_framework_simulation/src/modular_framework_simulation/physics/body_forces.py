@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from modular_framework_simulation.models import sdf_specs as specs
-from modular_framework_simulation.physics.joint_dynamics import inverse_mass_matrix
+from modular_framework_simulation.physics.joint_resistance import inverse_mass_matrix
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX, PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 from modular_framework_urdf.rotations import Vector3
@@ -98,14 +98,20 @@ class _OnLink:
 
     def _push(self, position: Vector3, force: np.ndarray) -> None:
         api = self._engine.api
+        point, push = position, force.tolist()
         api.applyExternalForce(
-            self._body.number,
-            self._index,
-            force.tolist(),
-            position,
-            api.WORLD_FRAME,
-            physicsClientId=self._engine.client,
+            self._body.number, self._index, push, point, api.WORLD_FRAME, physicsClientId=self._engine.client
         )
+
+    def _turn(self, position: Vector3, torque: np.ndarray) -> None:
+        """Lets two forces turn the link: the engine's function for torques mistakes the frame of some links."""
+        size = float(np.linalg.norm(torque))
+        if size > 0.0:
+            arm = np.cross(torque, np.eye(3)[np.argmin(np.abs(torque))])
+            arm /= np.linalg.norm(arm)
+            for side in (0.5, -0.5):
+                x, y, z = (position + side * arm).tolist()
+                self._push((x, y, z), 2.0 * side * np.cross(torque, arm))
 
 
 class _Drag(_OnLink):
@@ -122,13 +128,9 @@ class _Drag(_OnLink):
     def apply(self, gravity: Vector3) -> None:
         """Brakes the link."""
         del gravity
-        api = self._engine.api
         position, axes, linear, angular = self._motion()
         self._push(position, self._linear * self._mass * linear)
-        torque = self._angular * (axes @ (self._moments * (axes.T @ angular)))
-        api.applyExternalTorque(
-            self._body.number, self._index, torque.tolist(), api.WORLD_FRAME, physicsClientId=self._engine.client
-        )
+        self._turn(position, self._angular * (axes @ (self._moments * (axes.T @ angular))))
 
 
 class _Buoyancy(_OnLink):

@@ -6,6 +6,7 @@ All calls come from one thread, the one that owns the loop.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
@@ -14,8 +15,9 @@ from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.body_forces import BodyForce, forces_of
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
-from modular_framework_simulation.physics.joint_dynamics import set_joint_dynamics
-from modular_framework_simulation.physics.physics_engine import Log, PhysicsEngine
+from modular_framework_simulation.physics.carried_object import CarriedObject
+from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX, Log, PhysicsEngine
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
 from modular_framework_simulation.physics.surfaces import set_surface, surface_of, take_damping_away
@@ -75,6 +77,7 @@ class PhysicsWorld:
         self._last_instance = 0
         self._initial: list[tuple[specs.Model, BodyUrdf]] = []
         self._forces: dict[int, tuple[BodyForce, ...]] = {}
+        self._carried: dict[tuple[str, str], CarriedObject] = {}
         self._steps = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
@@ -94,8 +97,26 @@ class PhysicsWorld:
         for forces in self._forces.values():
             for force in forces:
                 force.apply(self.gravity)
+        for carried in self._carried.values():
+            carried.before_step()
         self.engine.step()
+        for carried in self._carried.values():
+            carried.after_step()
         self._steps += 1
+
+    def carry(self, robot: SimulatedBody, held: Sequence[tuple[str, str]]) -> None:
+        """Sets which models move with a hand from now on: those that are held.
+
+        Args:
+            robot: The robot that holds them.
+            held: Model and the robot's link that carries it, of each.
+        """
+        if tuple(self._carried) != tuple(held):
+            self._carried = {
+                (name, link): CarriedObject(self.engine, self.body(name), robot, robot.link_indices[link])
+                for name, link in held
+                if robot.link_indices[link] != BASE_INDEX
+            }
 
     def names(self) -> list[str]:
         """Returns the names of all models, in order of appearance."""
@@ -170,6 +191,7 @@ class PhysicsWorld:
             UnknownEntityError: There is no such model.
         """
         body = self.body(name)
+        self._carried = {key: carried for key, carried in self._carried.items() if key[0] != name}
         for part in body.parts:
             self.engine.api.removeBody(part.number, physicsClientId=self.engine.client)
             del self._names_by_number[part.number]
@@ -251,6 +273,7 @@ class PhysicsWorld:
 
     def reset_poses(self) -> None:
         """Puts every model where it first appeared, at rest; joints of models go to 0."""
+        self._carried.clear()
         for name, body in self._bodies.items():
             if body.spec is not None:
                 body.reset_joints({})
@@ -271,6 +294,7 @@ class PhysicsWorld:
         self._bodies.clear()
         self._names_by_number.clear()
         self._forces.clear()
+        self._carried.clear()
         self._initial_poses.clear()
         for model, prepared in self._initial:
             self.spawn(model, prepared)
@@ -295,6 +319,6 @@ class PhysicsWorld:
                 # The engine's default lets cylinders and meshes float a millimetre above what they stand on.
                 engine.api.changeDynamics(body.number, index, collisionMargin=0.0, physicsClientId=engine.client)
         take_damping_away(engine, body.number)
-        set_joint_dynamics(engine, body, {joint.name: joint.dynamics for joint in model.joints})
+        set_joint_resistance(engine, body, {joint.name: joint.dynamics for joint in model.joints})
         if forces := forces_of(engine, body, model):
             self._forces[body.number] = forces

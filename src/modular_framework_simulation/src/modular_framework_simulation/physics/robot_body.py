@@ -17,7 +17,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import RobotDescription, RobotJoint
 from modular_framework_simulation.models.sdf_specs import JointDynamics
-from modular_framework_simulation.physics.joint_dynamics import set_joint_dynamics
+from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 from modular_framework_simulation.physics.surfaces import Surface, set_surface, take_damping_away
@@ -138,7 +138,7 @@ class RobotBody:
         self._set_surfaces()
         self.world.add(self.body, self._pose)
         self.reset()
-        set_joint_dynamics(self.world.engine, self.body, self._dynamics)
+        set_joint_resistance(self.world.engine, self.body, self._dynamics)
 
     def reload(self) -> None:
         """Puts the robot into the world again, which has been emptied; joints are at their starting positions."""

@@ -18,7 +18,7 @@ _LARGEST_SHARE = 0.5
 easier to move than at the start, the engine's explicit integration is stable."""
 
 
-def set_joint_dynamics(engine: PhysicsEngine, body: SimulatedBody, dynamics: Mapping[str, JointDynamics]) -> None:
+def set_joint_resistance(engine: PhysicsEngine, body: SimulatedBody, dynamics: Mapping[str, JointDynamics]) -> None:
     """Sets damping and friction of all movable joints; those that are not named get none.
 
     Args:
