@@ -117,6 +117,7 @@ class PhysicsEngine:
             numSubSteps=0,
             contactERP=settings.contact_erp,
             frictionERP=settings.friction_erp,
+            contactBreakingThreshold=settings.contact_reach,
             restitutionVelocityThreshold=settings.bounce_threshold,
             enableConeFriction=1,
             deterministicOverlappingPairs=1,

@@ -27,6 +27,9 @@ class PhysicsSettings:
             the velocity, and what the solver leaves of it adds up. Touches on fingers therefore remember where they
             began (friction anchors of the engine), and are drawn back there while the force is within the friction
             cone. The engine keeps the normal of such a touch, too: in a hand that turns, it begins anew now and then.
+        contact_reach: How near surfaces are that may touch in the coming step, and how near two touches of the same
+            surfaces are that count as one, as a share of the smaller body's radius. The engine's 0.02 joins touches
+            that a cube in the hand makes at different places while it shakes: it creeps four times as far as with this.
         bounce_threshold: Impacts that are slower do not bounce [m/s]. Gravity adds 0.02 m/s in a step of 2 ms: below
             about twice that, objects at rest would hop for ever.
         bounce_erp: As contact_erp, for surfaces that bounce: what is corrected in the step of the impact adds to the
@@ -46,6 +49,7 @@ class PhysicsSettings:
     solver_iterations: int = 150
     contact_erp: float = 0.05
     friction_erp: float = 0.8
+    contact_reach: float = 0.005
     bounce_threshold: float = 0.05
     bounce_erp: float = 0.01
     hardest_erp: float = 0.2
