@@ -298,3 +298,13 @@ def set_joint_velocity(world: PhysicsWorld, model: str, joint: str, velocity: fl
     world.engine.api.resetJointState(
         body.number, body.joint_indices[joint], 0.0, velocity, physicsClientId=world.engine.client
     )
+
+
+def test_a_model_with_a_ball_joint_has_damped_joints_and_springs_too(world: PhysicsWorld) -> None:
+    model = jointed("lamp", 0.4, specs.JointDynamics(0.01, 0.0, 0.3, 0.5), Pose((0, 0, 2)))
+    bob = replace(model.links[0], name="shade", pose=Pose((0.6, 0, 0)))
+    ball = specs.Joint("ball", specs.JointType.BALL, "bob", "shade", Pose((-0.2, 0, 0)), (0, 0, 1), 0.0, 0.0)
+    world.spawn(replace(model, links=(*model.links, bob), joints=(*model.joints, ball)))
+    run(world, 2.0)
+    assert math.isfinite(joint_state(world, "lamp", "hinge")[0])
+    assert math.dist(world.entity_state("lamp::bob").pose.position, (0, 0, 2)) == pytest.approx(0.4, abs=1e-6)

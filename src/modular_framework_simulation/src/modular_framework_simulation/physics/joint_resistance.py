@@ -68,9 +68,15 @@ def stable_damping(engine: PhysicsEngine, body: SimulatedBody, damping: Mapping[
 
 
 def inverse_mass_matrix(engine: PhysicsEngine, body: SimulatedBody) -> npt.NDArray[np.float64]:
-    """Returns how the movable joints answer to forces on them [1/(kg m^2) or 1/kg], where the joints are now."""
+    """Returns how the movable joints answer to forces on them [1/(kg m^2) or 1/kg], where the joints are now.
+
+    Zeros for a body with ball joints, whose mass matrix the engine does not give: what depends on it is as described.
+    """
     indices = list(body.joint_indices.values())
+    if body.ball_joint_indices:
+        return np.zeros((len(indices), len(indices)))
     states = engine.api.getJointStates(body.number, indices, physicsClientId=engine.client)
     positions = [state[0] for state in states]
     matrix = np.array(engine.api.calculateMassMatrix(body.number, positions, physicsClientId=engine.client))
-    return np.linalg.inv(matrix)[-len(indices) :, -len(indices) :]
+    inverse: npt.NDArray[np.float64] = np.linalg.inv(matrix)[-len(indices) :, -len(indices) :]
+    return inverse
