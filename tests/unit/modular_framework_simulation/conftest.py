@@ -14,6 +14,7 @@ from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_urdf.rotations import Vector3
 
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated_samples import solid  # noqa: E402
@@ -26,12 +27,12 @@ def convex_parts(tmp_path_factory: pytest.TempPathFactory) -> ConvexParts:
 
 
 @pytest.fixture
-def make_world(convex_parts: ConvexParts) -> Iterator[Callable[[], PhysicsWorld]]:
+def make_world(convex_parts: ConvexParts) -> Iterator[Callable[..., PhysicsWorld]]:
     """Makes worlds with a floor at z = 0 and takes them down at the end."""
     worlds: list[PhysicsWorld] = []
 
-    def make() -> PhysicsWorld:
-        world = PhysicsWorld(PhysicsSettings(), convex_parts, (0.0, 0.0, -9.81))
+    def make(time_step_ns: int = 2_000_000, gravity: Vector3 = (0.0, 0.0, -9.81)) -> PhysicsWorld:
+        world = PhysicsWorld(PhysicsSettings(time_step_ns), convex_parts, gravity)
         world.spawn(solid("floor", specs.Plane((0, 0, 1), (10, 10)), Pose(), static=True))
         worlds.append(world)
         return world
@@ -42,6 +43,6 @@ def make_world(convex_parts: ConvexParts) -> Iterator[Callable[[], PhysicsWorld]
 
 
 @pytest.fixture
-def world(make_world: Callable[[], PhysicsWorld]) -> PhysicsWorld:
+def world(make_world: Callable[..., PhysicsWorld]) -> PhysicsWorld:
     """A world with a floor at z = 0."""
     return make_world()

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
@@ -39,12 +42,49 @@ def lift_robot_urdf(lift_interface: str = "hardware_interface/PositionJointInter
     return LIFT_ROBOT.format(fingers=one + two, lift_interface=lift_interface)
 
 
-def solid(name: str, geometry: specs.Geometry, pose: Pose, mass: float = 0.2, static: bool = False) -> specs.Model:
-    """A model of one link called "link" with one shape."""
-    collision = specs.Collision("shape", Pose(), geometry, specs.Friction(0.8))
+def solid(
+    name: str,
+    geometry: specs.Geometry,
+    pose: Pose,
+    mass: float = 0.2,
+    static: bool = False,
+    surface: specs.Collision | None = None,
+) -> specs.Model:
+    """A model of one link called "link" with one shape; `surface` says how it slides and bounces."""
+    like = surface or specs.Collision("shape", Pose(), geometry, specs.Friction(0.8))
+    collision = replace(like, geometry=geometry)
     moment = mass * 0.05**2 / 6
     inertial = specs.Inertial(Pose(), mass, (moment, 0, 0, moment, 0, moment))
     return specs.Model(name, pose, static, (specs.Link("link", Pose(), inertial, (collision,), ()),), (), "test")
+
+
+def jointed(
+    name: str,
+    length: float,
+    dynamics: specs.JointDynamics = specs.JointDynamics(),  # noqa: B008  (frozen)
+    pose: Pose = Pose(),  # noqa: B008
+) -> specs.Model:
+    """A bob of 0.5 kg and 0.001 kg m^2 at the end of a bar along x, turning about y on a hinge in the world."""
+    inertial = specs.Inertial(Pose(), 0.5, (0.001, 0, 0, 0.001, 0, 0.001))
+    bob = specs.Link("bob", Pose((length, 0, 0)), inertial, (), ())
+    hinge = specs.Joint(
+        "hinge",
+        specs.JointType.CONTINUOUS,
+        specs.WORLD,
+        "bob",
+        Pose((-length, 0, 0)),
+        (0, 1, 0),
+        -math.inf,
+        math.inf,
+        dynamics=dynamics,
+    )
+    return specs.Model(name, pose, False, (bob,), (hinge,), "test")
+
+
+def run(world: PhysicsWorld, seconds: float) -> None:
+    """Lets simulated time pass."""
+    for _ in range(round(seconds / world.settings.time_step_s)):
+        world.step()
 
 
 def exact_state(world: PhysicsWorld) -> tuple[int, dict[str, BodyState]]:

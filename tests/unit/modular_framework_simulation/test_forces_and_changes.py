@@ -140,12 +140,10 @@ def test_forces_end_with_their_model(space: PhysicsWorld) -> None:
     model = solid("cube", CUBE, Pose((0, 0, 1)), mass=0.2)
     space.spawn(model)
     space.forces.add_wrench(LinkWrench(LINK, (1.0, 0, 0), NOWHERE, Interval(0, None)))
-    space.forces.set_weight(LINK, False)
     space.delete("cube")
     body = space.spawn(model)
     run(space, 0.1)
     assert body.state().twist.linear == pytest.approx(NOWHERE, abs=1e-12)
-    assert space.forces.has_weight(LINK)
 
 
 def test_an_effort_turns_a_joint_for_its_duration_and_several_add_up(space: PhysicsWorld) -> None:
@@ -170,12 +168,13 @@ def test_an_effort_on_a_joint_of_the_robot_adds_to_its_drive(world: PhysicsWorld
 
 def test_a_link_without_weight_floats(world: PhysicsWorld) -> None:
     body = world.spawn(solid("cube", CUBE, Pose((0, 0, 1))))
-    world.forces.set_weight(LINK, False)
+    inertial = measured_inertial(world.engine, body, "link")
+    assert set_inertial(world, LINK, inertial, gravity=False)
     run(world, 0.5)
-    assert body.state().pose.position[2] == pytest.approx(1.0, abs=1e-6)
-    world.forces.set_weight(LINK, True)
+    assert world.entity_state("cube").pose.position[2] == pytest.approx(1.0, abs=1e-6)
+    assert set_inertial(world, LINK, inertial, gravity=True)
     run(world, 0.1)
-    assert body.state().twist.linear[2] == pytest.approx(-0.981, rel=0.01)
+    assert world.entity_state("cube").twist.linear[2] == pytest.approx(-0.981, rel=0.01)
 
 
 def test_a_new_mass_counts_from_the_next_step_and_the_motion_goes_on(space: PhysicsWorld) -> None:

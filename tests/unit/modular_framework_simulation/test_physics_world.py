@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import trimesh
-from simulated_samples import exact_state, solid
+from simulated_samples import exact_state, run, solid
 
 from modular_framework_simulation.errors import DescriptionError, DuplicateModelError, UnknownEntityError
 from modular_framework_simulation.models import sdf_specs as specs
@@ -22,11 +22,6 @@ from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 
 CUBE = specs.Box((0.05, 0.05, 0.05))
-
-
-def run(world: PhysicsWorld, seconds: float) -> None:
-    for _ in range(round(seconds / world.settings.time_step_s)):
-        world.step()
 
 
 def test_a_box_falls_as_newton_says_and_comes_to_rest_on_the_floor(world: PhysicsWorld) -> None:

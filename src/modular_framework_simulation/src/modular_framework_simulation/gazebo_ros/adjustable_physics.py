@@ -12,9 +12,8 @@ from geometry_msgs.msg import Vector3
 
 from modular_framework_ros.reconfiguration import Adjustable
 from modular_framework_simulation.loop.simulation_loop import SimulationLoop
+from modular_framework_simulation.physics.physics_settings import LONGEST_STEP_NS, SHORTEST_STEP_NS
 
-SHORTEST_STEP_S, LONGEST_STEP_S = 1e-4, 1e-2
-"""Allowed physics steps [s]: in a longer one fingers pass through thin objects, with a shorter one time crawls."""
 _LARGEST_GRAVITY = 100.0
 _LARGEST_RATE_HZ = 1e6
 
@@ -54,7 +53,7 @@ class PhysicsValues:
 _NOTHING_LIKE_IT = "ODE only: this engine has nothing like it, and the value stays"
 
 TABLE = (
-    Adjustable("time_step", SHORTEST_STEP_S, LONGEST_STEP_S, "one physics step [s]"),
+    Adjustable("time_step", SHORTEST_STEP_NS * 1e-9, LONGEST_STEP_NS * 1e-9, "one physics step [s]"),
     Adjustable("max_update_rate", 0.0, _LARGEST_RATE_HZ, "physics steps a second of real time [Hz]; 0: no limit"),
     Adjustable("gravity_x", -_LARGEST_GRAVITY, _LARGEST_GRAVITY, "gravity along x [m/s^2]"),
     Adjustable("gravity_y", -_LARGEST_GRAVITY, _LARGEST_GRAVITY, "gravity along y [m/s^2]"),

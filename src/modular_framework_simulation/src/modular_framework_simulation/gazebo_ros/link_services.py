@@ -14,7 +14,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import Inertial
 from modular_framework_simulation.physics.applied_forces import Interval, LinkWrench
 from modular_framework_simulation.physics.body_links import centre_in_world, link_mass, measured_inertial
-from modular_framework_simulation.physics.model_changes import set_inertial, set_link_state
+from modular_framework_simulation.physics.model_changes import has_weight, set_inertial, set_link_state
 from modular_framework_simulation.physics.part_names import PartName, find_frame, find_link
 from modular_framework_simulation.physics.physics_world import WORLD_FRAMES, PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import add, cross
@@ -73,7 +73,7 @@ class LinkServices:
         inertial = measured_inertial(self._world.engine, self._world.body(link.model), link.part)
         answer = srv.GetLinkPropertiesResponse(success=True, status_message="read the properties of the link")
         answer.com = conversions.pose_to_msg(inertial.pose)
-        answer.gravity_mode = self._world.forces.has_weight(link)
+        answer.gravity_mode = has_weight(self._world.body(link.model), link.part)
         answer.mass = inertial.mass
         answer.ixx, answer.ixy, answer.ixz, answer.iyy, answer.iyz, answer.izz = inertial.inertia
         return answer
@@ -86,9 +86,8 @@ class LinkServices:
         inertial = Inertial(conversions.pose_from_msg(request.com), request.mass, moments)
         if not request.gravity_mode:
             self._require_movable(link)
-        changed = set_inertial(self._world, link, inertial)
-        self._world.forces.set_weight(link, request.gravity_mode)
-        mass = "new mass and inertia" if changed else "mass and inertia as they were"
+        changed = set_inertial(self._world, link, inertial, request.gravity_mode)
+        mass = "new properties" if changed else "everything as it was"
         weight = "gravity acts on it" if request.gravity_mode else "gravity does not act on it"
         return srv.SetLinkPropertiesResponse(True, f"link '{link.scoped}': {mass}; {weight}")
 

@@ -266,6 +266,7 @@ class SimulationLoop:
         robot = self._actors.robot
         for gripper, watch in zip(robot.grippers, self.grasp_watches, strict=True):
             watch.update(self._time_s(), [self._touched(robot, finger) for finger in gripper.fingers])
+        self.world.carry(robot.body, [(held.model, held.carrier_link) for held in self.held_objects()])
 
     def _touched(self, robot: RobotBody, finger: Sequence[int]) -> set[str]:
         """Returns the movable objects that a finger presses on."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
-from modular_framework_simulation.models.sdf_specs import Mesh
+from modular_framework_simulation.models.sdf_specs import UNLIMITED_FRICTION, Mesh
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
@@ -70,6 +70,7 @@ class RobotDescription:
         parents: Parent link of every link that has one.
         engine_urdf: The URDF for the physics engine.
         initial_positions: Where the description lets joints begin [rad or m], by name.
+        frictions: Coefficients of friction (`<mu1>` of a `<gazebo reference=...>`) by link, where the description says.
     """
 
     name: str
@@ -78,6 +79,7 @@ class RobotDescription:
     parents: dict[str, str]
     engine_urdf: str
     initial_positions: dict[str, float]
+    frictions: dict[str, float]
 
 
 def read_robot(
@@ -113,7 +115,8 @@ def read_robot(
     parents = {joint.child: joint.parent for joint in robot.joints}
     followers = {joint.name for joint in robot.joints if joint.mimic is not None}
     initial = {joint.name: joint.initial_position for joint in simulated if joint.name not in followers}
-    return RobotDescription(root.get("name", "robot"), joints, links, parents, xml_text.to_text(root), initial)
+    text = xml_text.to_text(root)
+    return RobotDescription(root.get("name", "robot"), joints, links, parents, text, initial, _frictions(root))
 
 
 def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
@@ -189,6 +192,24 @@ def _joint(joint: Joint, interfaces: tuple[str, ...]) -> RobotJoint:
         interfaces=interfaces,
         mimic=joint.mimic,
     )
+
+
+def _frictions(root: Element) -> dict[str, float]:
+    frictions = {}
+    for extension in root.findall("gazebo"):
+        link, coefficient = extension.get("reference"), extension.find("mu1")
+        if link is None or coefficient is None:
+            continue
+        try:
+            value = float((coefficient.text or "").strip())
+        except ValueError:
+            value = math.nan
+        if math.isnan(value):
+            where = f"robot_description: <gazebo reference='{link}'>, <mu1>"
+            allowed = "allowed: a number; -1 for surfaces that never slide"
+            raise DescriptionError(where, f"got '{coefficient.text}'", allowed)
+        frictions[link] = UNLIMITED_FRICTION if value < 0 else value
+    return frictions
 
 
 def _rewrite_meshes(root: Element, find_package: PackageFinder, convex_parts: ConvexParts, with_visuals: bool) -> None:

@@ -171,7 +171,7 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True)
 class VelocityDecay:
-    """Share of its velocity that a link loses in a second, as a damping of the engine [1/s]."""
+    """Share of its velocity that a link loses in every step of Gazebo, of 1 ms by default."""
 
     linear: float = 0.0
     angular: float = 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Forces and torques that requests let act on links and joints for some of simulated time; links without weight."""
+"""Forces and torques that requests let act on links and joints for some of simulated time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from modular_framework_simulation.physics.body_joints import apply_effort
-from modular_framework_simulation.physics.body_links import apply_wrench, link_mass
+from modular_framework_simulation.physics.body_links import apply_wrench
 from modular_framework_simulation.physics.part_names import PartName
 from modular_framework_simulation.physics.physics_engine import PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
@@ -76,7 +76,6 @@ class AppliedForces:
         self._engine = engine
         self._wrenches: list[LinkWrench] = []
         self._efforts: list[JointEffort] = []
-        self._weightless: dict[PartName, None] = {}
 
     def add_wrench(self, wrench: LinkWrench) -> None:
         """Adds a force and a torque; several on one link add up."""
@@ -99,40 +98,22 @@ class AppliedForces:
         return before - len(self._efforts)
 
     def clear(self) -> None:
-        """Ends all wrenches and efforts; what has no weight stays so."""
+        """Ends all wrenches and efforts."""
         self._wrenches, self._efforts = [], []
 
     def forget_model(self, model: str) -> None:
         """Ends everything that has to do with a model that is gone."""
         self._wrenches = [each for each in self._wrenches if each.link.model != model]
         self._efforts = [each for each in self._efforts if each.joint.model != model]
-        self._weightless = {link: None for link in self._weightless if link.model != model}
 
-    def set_weight(self, link: PartName, has_weight: bool) -> None:
-        """Lets gravity act on a link, or not."""
-        if has_weight:
-            self._weightless.pop(link, None)
-        else:
-            self._weightless[link] = None
-
-    def has_weight(self, link: PartName) -> bool:
-        """Whether gravity acts on a link."""
-        return link not in self._weightless
-
-    def restart(self) -> None:
-        """Ends everything: the world begins again."""
-        self.clear()
-        self._weightless.clear()
-
-    def apply(self, time_ns: int, gravity: Vector3, bodies: Mapping[str, SimulatedBody]) -> None:
+    def apply(self, time_ns: int, bodies: Mapping[str, SimulatedBody]) -> None:
         """Lets everything act that is due in the step that begins now.
 
         Args:
             time_ns: Simulated time at the beginning of the step [ns].
-            gravity: What links without weight do not feel [m/s^2].
             bodies: The models by name.
         """
-        if not (self._wrenches or self._efforts or self._weightless):
+        if not (self._wrenches or self._efforts):
             return
         self._wrenches = [each for each in self._wrenches if not each.interval.is_over(time_ns)]
         self._efforts = [each for each in self._efforts if not each.interval.is_over(time_ns)]
@@ -143,8 +124,3 @@ class AppliedForces:
         for effort in self._efforts:
             if effort.interval.start_ns <= time_ns:
                 apply_effort(self._engine, bodies[effort.joint.model], effort.joint.part, effort.effort)
-        for link in self._weightless:
-            body = bodies[link.model]
-            mass = link_mass(self._engine, body, link.part)
-            lift = (-mass * gravity[0], -mass * gravity[1], -mass * gravity[2])
-            apply_wrench(self._engine, body, link.part, lift, (0.0, 0.0, 0.0))

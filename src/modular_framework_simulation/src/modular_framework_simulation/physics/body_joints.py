@@ -63,8 +63,9 @@ def measured_joint(engine: PhysicsEngine, body: SimulatedBody, joint: str) -> Jo
     lower, upper = info[8], info[9]
     if lower > upper:  # the engine's way to say that there are none
         lower, upper = -math.inf, math.inf
-    changed = body.joint_settings.get(joint, JointSettings()).damping  # the engine goes on to report the first one
-    damping = info[6] if changed is None else changed
+    damping = body.joint_settings.get(joint, JointSettings()).damping or 0.0  # the engine has no way to say it
+    if body.spec is not None:
+        damping = next(each.dynamics.damping for each in body.spec.joints if each.name == joint)
     return JointMeasurement(state[0], state[1], damping, lower, upper, info[2] == api.JOINT_PRISMATIC)
 
 
@@ -88,7 +89,7 @@ def apply_settings(engine: PhysicsEngine, body: SimulatedBody, joint: str, setti
     """
     tree = tree_with_joint(body, joint)
     number, index = tree.number, tree.joint_indices[joint]
-    if settings.damping is not None:
+    if settings.damping is not None and body.spec is None:  # of a model it is in the description
         engine.api.changeDynamics(number, index, jointDamping=settings.damping, physicsClientId=engine.client)
     before = body.joint_settings.get(joint, JointSettings())
     merged = JointSettings(

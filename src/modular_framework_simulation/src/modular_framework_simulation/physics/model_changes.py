@@ -73,13 +73,14 @@ def set_link_state(world: PhysicsWorld, link: PartName, state: BodyState, refere
     world.set_state(link.model, BodyState(model_in_world, twist_at(wanted.twist, wanted.pose, model_in_world)))
 
 
-def set_inertial(world: PhysicsWorld, link: PartName, inertial: specs.Inertial) -> bool:
-    """Gives a link another mass, centre of mass and inertia; the model goes on moving as it does.
+def set_inertial(world: PhysicsWorld, link: PartName, inertial: specs.Inertial, gravity: bool = True) -> bool:
+    """Gives a link another mass, centre of mass, inertia and weight; the model goes on moving as it does.
 
     Args:
         world: The world.
         link: The link.
         inertial: The new values.
+        gravity: Whether gravity acts on it.
 
     Returns:
         Whether they differ from the present ones.
@@ -90,17 +91,25 @@ def set_inertial(world: PhysicsWorld, link: PartName, inertial: specs.Inertial) 
     """
     body = world.body(link.model)
     present = {each: measured_inertial(world.engine, body, each) for each in body.link_names()}
-    if _are_same(present[link.part], inertial):
+    if _are_same(present[link.part], inertial) and has_weight(body, link.part) == gravity:
         return False
     model = _require_model(body, "its masses are those of its description")
     if body.static:
         raise ModelChangeError(f"model '{link.model}' is static: it has no mass that matters; spawn one that is not")
     _require_rigid(link, inertial)
     links = tuple(
-        replace(each, inertial=inertial if each.name == link.part else present[each.name]) for each in model.links
+        replace(each, inertial=inertial, gravity=gravity)
+        if each.name == link.part
+        else replace(each, inertial=present[each.name])
+        for each in model.links
     )
     _make_anew(world, replace(model, links=links))
     return True
+
+
+def has_weight(body: SimulatedBody, link: str) -> bool:
+    """Returns whether gravity acts on a link."""
+    return body.spec is None or all(each.gravity for each in body.spec.links if each.name == link)
 
 
 def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None:
@@ -116,14 +125,22 @@ def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None
     present = measured_joint(world.engine, body, joint.part)
     if change.settings.motor_effort is not None:
         _require_model(body, "its motors belong to the controllers")
-    if change.lower is not None or change.upper is not None:
+    if body.spec is None:
+        if change.lower is not None or change.upper is not None:
+            _require_model(body, "the limits of its joints are those of its description")
+    elif (change.lower, change.upper, change.settings.damping) != (None, None, None):
         lower = present.lower if change.lower is None else change.lower
         upper = present.upper if change.upper is None else change.upper
         if not lower <= upper:
             raise ModelChangeError(f"joint '{joint.scoped}': lower limit {lower:g} is above the upper limit {upper:g}")
-        model = _require_model(body, "the limits of its joints are those of its description")
-        joints = tuple(_limited(each, lower, upper) if each.name == joint.part else each for each in model.joints)
-        _make_anew(world, replace(model, joints=joints))
+        damping = present.damping if change.settings.damping is None else change.settings.damping
+        joints = tuple(
+            replace(_limited(each, lower, upper), dynamics=replace(each.dynamics, damping=damping))
+            if each.name == joint.part
+            else each
+            for each in body.spec.joints
+        )
+        _make_anew(world, replace(body.spec, joints=joints))
     apply_settings(world.engine, world.body(joint.model), joint.part, change.settings)
 
 

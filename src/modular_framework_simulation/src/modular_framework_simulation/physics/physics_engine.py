@@ -7,6 +7,7 @@ Everything here must be called from one thread: the engine keeps global state.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import tempfile
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_simulation.errors import DescriptionError, SimulationError
+from modular_framework_simulation.physics.contact_rules import let_smaller_coefficient_count
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.rotations import Vector3
@@ -86,6 +88,12 @@ class PhysicsEngine:
             self.client = self.api.connect(self.api.DIRECT)
         if self.client < 0:
             raise SimulationError("the physics engine accepts no further connection; end another simulation first")
+        self._smaller_counts = let_smaller_coefficient_count(self.api)
+        if not self._smaller_counts:
+            log(
+                "this build of the physics engine multiplies coefficients of friction and bounce: between two "
+                "different surfaces their geometric mean counts, not the smaller one"
+            )
         self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
         self._files_written = 0
         self._configure(gravity)
@@ -108,6 +116,9 @@ class PhysicsEngine:
             numSolverIterations=settings.solver_iterations,
             numSubSteps=0,
             contactERP=settings.contact_erp,
+            frictionERP=settings.friction_erp,
+            contactBreakingThreshold=settings.contact_reach,
+            restitutionVelocityThreshold=settings.bounce_threshold,
             enableConeFriction=1,
             deterministicOverlappingPairs=1,
             physicsClientId=self.client,
@@ -132,6 +143,10 @@ class PhysicsEngine:
         self.settings = settings
         self._set_parameters(gravity)
 
+    def engine_coefficient(self, coefficient: float) -> float:
+        """Returns what to give a surface of the engine for a coefficient of friction or restitution."""
+        return coefficient if self._smaller_counts else math.sqrt(coefficient)
+
     def restart(self, gravity: Vector3) -> None:
         """Takes everything out, contacts and their caches too.
 
@@ -141,14 +156,14 @@ class PhysicsEngine:
         self.api.resetSimulation(physicsClientId=self.client)
         self._configure(gravity)
 
-    def load_urdf(self, text: str, name: str, fixed: bool, flags: int) -> int:
+    def load_urdf(self, text: str, name: str, fixed: bool, flags: int = 0) -> int:
         """Loads a body at the world origin.
 
         Args:
             text: URDF with absolute mesh paths.
             name: Named in the error.
             fixed: Whether its root link is fastened to the world.
-            flags: The engine's URDF_ flags.
+            flags: Further URDF_ flags of the engine.
 
         Returns:
             The engine's number of the body.
@@ -163,7 +178,13 @@ class PhysicsEngine:
         file.write_text(text, encoding="utf-8")
         try:
             with _silenced():
-                body: int = self.api.loadURDF(str(file), useFixedBase=fixed, flags=flags, physicsClientId=self.client)
+                body: int = self.api.loadURDF(
+                    str(file),
+                    useFixedBase=fixed,
+                    # With their faces known, boxes and hulls touch in up to four points at once, not in one.
+                    flags=flags | self.api.URDF_USE_INERTIA_FROM_FILE | self.api.URDF_INITIALIZE_SAT_FEATURES,
+                    physicsClientId=self.client,
+                )
             file.unlink()
         except self.api.error as error:
             problem = f"is refused by the physics engine ({error})"

@@ -5,36 +5,67 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from modular_framework_simulation.errors import SimulationError
+
+SHORTEST_STEP_NS = 100_000
+LONGEST_STEP_NS = 10_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class PhysicsSettings:
     """Settings of the physics engine.
 
     Attributes:
-        time_step_ns: One physics step [ns]; an integer, so that simulated time never drifts. 2 ms keeps a grasp held by
-            friction still (an object creeps by about 0.1 mm/s at most in the hand), and five steps make one tick of a
-            100 Hz clock.
-        solver_iterations: Of the contact solver. A grasped object hangs in a chain arm - finger - object - finger; with
-            60 iterations the solver leaves a creep of 1 to 2 mm/s behind in that chain, with 150 a tenth of it.
-        contact_erp: Share of a penetration that is corrected in one step; low, so that objects that fall or are
-            spawned a little too deep do not jump.
+        time_step_ns: One physics step [ns]; an integer, so that simulated time never drifts. The laws of physics are
+            tested from 1 ms to 1/240 s, grasps with 2 ms: five steps make one tick of a 100 Hz clock. Errors of motion
+            grow with the step (a fall of t seconds ends g t step / 2 too low), so does the creep of held objects.
+        solver_iterations: Of the contact solver, at most; it ends earlier where nothing changes any more. A grasped
+            object hangs in a chain arm - finger - object - finger, through which forces travel link by link.
+        contact_erp: Share of a penetration that is corrected in one step. An object that falls is up to one step too
+            deep when it touches, and leaves with up to this share of its velocity; low, so that it does not jump.
+        friction_erp: Share of a slip that is taken back in one step where surfaces stick. Friction alone only stops
+            the velocity, and what the solver leaves of it adds up. Touches on fingers therefore remember where they
+            began (friction anchors of the engine), and are drawn back there while the force is within the friction
+            cone. The engine keeps the normal of such a touch, too: in a hand that turns, it begins anew now and then.
+        contact_reach: How near surfaces are that may touch in the coming step, and how near two touches of the same
+            surfaces are that count as one, as a share of the smaller body's radius. The engine's 0.02 joins touches
+            that a cube in the hand makes at different places while it shakes: it creeps four times as far as with this.
+        bounce_threshold: Impacts that are slower do not bounce [m/s]. Gravity adds 0.02 m/s in a step of 2 ms: below
+            about twice that, objects at rest would hop for ever.
+        bounce_erp: As contact_erp, for surfaces that bounce: what is corrected in the step of the impact adds to the
+            velocity afterwards, up to this share of the velocity before.
+        hardest_erp: As contact_erp, the most that a stiffness in a model may ask for.
         body_spinning_friction: Resistance of objects against spinning about a contact normal [m], where the
             model does not say; about the radius of a small contact patch.
         body_rolling_friction: Resistance of objects against rolling [m]; brings balls to rest on a table.
-        pad_friction: Lateral friction of the gripper's links (rubber pads). The engine multiplies the coefficients of
-            both sides of a contact.
+        body_friction: Coefficient of friction of links of robots whose description does not say.
+        pad_friction: Of the gripper's links (rubber pads) whose description does not say. The smaller coefficient of
+            the two surfaces of a contact counts.
         pad_spinning_friction: Of the gripper's links [m]; soft pads touch over an area.
         pad_rolling_friction: Of the gripper's links [m].
     """
 
     time_step_ns: int = 2_000_000
     solver_iterations: int = 150
-    contact_erp: float = 0.1
+    contact_erp: float = 0.05
+    friction_erp: float = 0.8
+    contact_reach: float = 0.005
+    bounce_threshold: float = 0.05
+    bounce_erp: float = 0.01
+    hardest_erp: float = 0.2
     body_spinning_friction: float = 0.0005
     body_rolling_friction: float = 0.0001
-    pad_friction: float = 1.2
+    body_friction: float = 1.0
+    pad_friction: float = 1.0
     pad_spinning_friction: float = 0.005
     pad_rolling_friction: float = 0.0005
+
+    def __post_init__(self) -> None:
+        if not SHORTEST_STEP_NS <= self.time_step_ns <= LONGEST_STEP_NS:
+            raise SimulationError(
+                f"time step of the physics: got {self.time_step_s:g} s; allowed: {SHORTEST_STEP_NS * 1e-9:g} s to "
+                f"{LONGEST_STEP_NS * 1e-9:g} s"
+            )
 
     @property
     def time_step_s(self) -> float:

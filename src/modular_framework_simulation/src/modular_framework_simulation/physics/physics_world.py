@@ -6,7 +6,7 @@ All calls come from one thread, the one that owns the loop.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -15,12 +15,16 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.applied_forces import AppliedForces
-from modular_framework_simulation.physics.body_joints import copy_joint_motion
+from modular_framework_simulation.physics.body_forces import BodyForce, forces_of
+from modular_framework_simulation.physics.body_joints import apply_settings, copy_joint_motion
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
+from modular_framework_simulation.physics.carried_object import CarriedObject
+from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.part_names import SCOPE
-from modular_framework_simulation.physics.physics_engine import Log, PhysicsEngine
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX, Log, PhysicsEngine
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
+from modular_framework_simulation.physics.surfaces import set_surface, surface_of, take_damping_away
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 WORLD_FRAMES = ("", "world", "map", "/map")
@@ -75,6 +79,8 @@ class PhysicsWorld:
         self._instances: dict[str, int] = {}
         self._last_instance = 0
         self._initial: list[tuple[specs.Model, BodyUrdf]] = []
+        self._forces: dict[int, tuple[BodyForce, ...]] = {}
+        self._carried: dict[tuple[str, str], CarriedObject] = {}
         self._steps = self._time_ns = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
@@ -91,8 +97,15 @@ class PhysicsWorld:
 
     def step(self) -> None:
         """Advances the world by one time step."""
-        self.forces.apply(self._time_ns, self.gravity, self._bodies)
+        for forces in self._forces.values():
+            for force in forces:
+                force.apply(self.gravity)
+        self.forces.apply(self._time_ns, self._bodies)
+        for carried in self._carried.values():
+            carried.before_step()
         self.engine.step()
+        for carried in self._carried.values():
+            carried.after_step()
         self._steps += 1
         self._time_ns += self.settings.time_step_ns
 
@@ -105,11 +118,31 @@ class PhysicsWorld:
         """
         self.engine.adjust(settings, gravity)
         self.settings, self.gravity = settings, gravity
+        for body in self._bodies.values():  # how surfaces and joints resist depends on the step
+            if body.spec is not None:
+                for part in body.parts:
+                    self._set_properties(part, body.spec)
+                for joint, values in body.joint_settings.items():
+                    apply_settings(self.engine, body, joint, values)
 
     @property
     def bodies(self) -> Mapping[str, SimulatedBody]:
         """All models by name, in order of appearance; a view."""
         return MappingProxyType(self._bodies)
+
+    def carry(self, robot: SimulatedBody, held: Sequence[tuple[str, str]]) -> None:
+        """Sets which models move with a hand from now on: those that are held.
+
+        Args:
+            robot: The robot that holds them.
+            held: Model and the robot's link that carries it, of each.
+        """
+        if tuple(self._carried) != tuple(held):
+            self._carried = {
+                (name, link): CarriedObject(self.engine, self.body(name), robot, robot.link_indices[link])
+                for name, link in held
+                if robot.link_indices[link] != BASE_INDEX
+            }
 
     def names(self) -> list[str]:
         """Returns the names of all models, in order of appearance."""
@@ -161,11 +194,10 @@ class PhysicsWorld:
     def _load(self, model: specs.Model, written: BodyUrdf) -> SimulatedBody:
         parts = []
         for tree in (written, *written.further):
-            flags = self.engine.api.URDF_USE_INERTIA_FROM_FILE
-            number = self.engine.load_urdf(tree.text, model.name, tree.fixed, flags)
+            number = self.engine.load_urdf(tree.text, model.name, tree.fixed)
             parts.append(SimulatedBody(self.engine, number, model.name, tree, model.static, model))
             parts[-1].release_ball_joints()
-            self._set_surfaces(parts[-1], model)
+            self._set_properties(parts[-1], model)
         body = parts[0]
         body.further = tuple(parts[1:])
         return body
@@ -195,6 +227,8 @@ class PhysicsWorld:
         for part in body.parts:
             self.engine.api.removeBody(part.number, physicsClientId=self.engine.client)
             del self._names_by_number[part.number]
+            self._forces.pop(part.number, None)
+        self._carried = {key: carried for key, carried in self._carried.items() if key[0] != body.name}
 
     def add(self, body: SimulatedBody, pose_in_world: Pose) -> None:
         """Adds a body that is already in the engine, at a pose in the world frame."""
@@ -304,6 +338,7 @@ class PhysicsWorld:
     def reset_poses(self) -> None:
         """Puts every model where it first appeared, at rest; joints of models go to 0; forces of requests end."""
         self.forces.clear()
+        self._carried.clear()
         for name, body in self._bodies.items():
             if body.spec is not None:
                 body.reset_joints({})
@@ -323,9 +358,11 @@ class PhysicsWorld:
         self.settings, self.gravity = self._initial_physics
         self.engine.settings = self.settings
         self.engine.restart(self.gravity)
-        self.forces.restart()
+        self.forces.clear()
         self._bodies.clear()
         self._names_by_number.clear()
+        self._forces.clear()
+        self._carried.clear()
         self._initial_poses.clear()
         self._instances.clear()
         for model, prepared in self._initial:
@@ -341,30 +378,16 @@ class PhysicsWorld:
         """Closes the physics engine; may be called twice."""
         self.engine.close()
 
-    def _set_surfaces(self, body: SimulatedBody, model: specs.Model) -> None:
+    def _set_properties(self, body: SimulatedBody, model: specs.Model) -> None:
+        """Gives one tree of a model what its URDF does not say: surfaces, and how links and joints resist."""
+        engine = self.engine
         for link in model.links:
             index = body.link_indices.get(STATIC_LINK if model.static else link.name)
-            if index is None or not link.collisions:
-                continue
-            frictions = [each.friction for each in link.collisions]
-            spinning = [each.torsional for each in frictions if each.torsional is not None]
-            rolling = [each.rolling for each in frictions if each.rolling is not None]
-            self.engine.api.changeDynamics(
-                body.number,
-                index,
-                # One coefficient a link is all the engine takes: the most slippery surface decides.
-                lateralFriction=min(each.lateral for each in frictions),
-                spinningFriction=min(spinning, default=self.settings.body_spinning_friction),
-                rollingFriction=min(rolling, default=self.settings.body_rolling_friction),
-                restitution=0.0,
-                linearDamping=0.0,
-                angularDamping=0.01,
+            if index is not None and link.collisions:
+                set_surface(engine, body.number, index, surface_of(link.collisions, engine.settings))
                 # The engine's default lets cylinders and meshes float a millimetre above what they stand on.
-                collisionMargin=0.0,
-                physicsClientId=self.engine.client,
-            )
-        for index in body.joint_indices.values():
-            # Joints of models are free: the engine would otherwise brake them with a motor of its own.
-            self.engine.api.setJointMotorControl2(
-                body.number, index, self.engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=self.engine.client
-            )
+                engine.api.changeDynamics(body.number, index, collisionMargin=0.0, physicsClientId=engine.client)
+        take_damping_away(engine, body.number)
+        set_joint_resistance(engine, body, {joint.name: joint.dynamics for joint in model.joints})
+        if forces := forces_of(engine, body, model):
+            self._forces[body.number] = forces

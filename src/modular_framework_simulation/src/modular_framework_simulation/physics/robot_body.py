@@ -10,14 +10,17 @@ that it gives way when an object presses against it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import RobotDescription, RobotJoint
+from modular_framework_simulation.models.sdf_specs import JointDynamics
+from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
+from modular_framework_simulation.physics.surfaces import Surface, set_surface, take_damping_away
 
 _POSITION_GAIN = 0.2
 """Share of a position error that a drive corrects within one physics step; velocities are fed forward in full."""
@@ -123,17 +126,19 @@ class RobotBody:
         self._set_up()
 
     def _load(self) -> None:
-        api = self.world.engine.api
-        flags = api.URDF_USE_INERTIA_FROM_FILE | api.URDF_USE_SELF_COLLISION
-        number = self.world.engine.load_urdf(self.description.engine_urdf, self._name, True, flags)
-        self.body = SimulatedBody(self.world.engine, number, self._name, None, True, None)
+        engine = self.world.engine
+        number = engine.load_urdf(self.description.engine_urdf, self._name, True, engine.api.URDF_USE_SELF_COLLISION)
+        self.body = SimulatedBody(engine, number, self._name, None, True, None)
+        self._dynamics = {
+            info[1].decode(): JointDynamics(damping=info[6], friction=info[7]) for info in engine.joint_infos(number)
+        }
 
     def _set_up(self) -> None:
         self._limit_self_collisions()
         self._set_surfaces()
-        self._disable_default_motors()
         self.world.add(self.body, self._pose)
         self.reset()
+        set_joint_resistance(self.world.engine, self.body, self._dynamics)
 
     def reload(self) -> None:
         """Puts the robot into the world again, which has been emptied; joints are at their starting positions."""
@@ -203,7 +208,8 @@ class RobotBody:
         efforts: list[float] = []
         for rank, joint in enumerate(self._joints):
             position = self.readings[rank].position
-            target, velocity, effort = position, 0.0, 0.0
+            # A joint that nothing drives is held by its friction alone.
+            target, velocity, effort = position, 0.0, self._dynamics[joint.name].friction
             drive = drives.get(joint.name)
             if drive is not None and drive.mode is Mode.POSITION:
                 target, velocity, effort = drive.command, drive.feed_forward, drive.effort_limit
@@ -281,27 +287,15 @@ class RobotBody:
     def _set_surfaces(self) -> None:
         engine, settings = self.world.engine, self.world.settings
         finger_links = {index for finger in self.fingers for index in finger}
-        for index in self.body.link_indices.values():
+        pad = Surface(settings.pad_friction, settings.pad_spinning_friction, settings.pad_rolling_friction)
+        other = Surface(settings.body_friction, 0.0, 0.0)
+        for link, index in self.body.link_indices.items():
             on_finger = index in finger_links
-            engine.api.changeDynamics(
-                self.body.number,
-                index,
-                lateralFriction=settings.pad_friction if on_finger else 0.5,
-                spinningFriction=settings.pad_spinning_friction if on_finger else 0.0,
-                rollingFriction=settings.pad_rolling_friction if on_finger else 0.0,
-                restitution=0.0,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                jointDamping=0.0,
-                physicsClientId=engine.client,
-            )
-
-    def _disable_default_motors(self) -> None:
-        engine = self.world.engine
-        for index in self._indices:
-            engine.api.setJointMotorControl2(
-                self.body.number, index, engine.api.VELOCITY_CONTROL, force=0.0, physicsClientId=engine.client
-            )
+            surface = pad if on_finger else other
+            if link in self.description.frictions:
+                surface = replace(surface, lateral=self.description.frictions[link])
+            set_surface(engine, self.body.number, index, surface, anchored=on_finger)
+        take_damping_away(engine, self.body.number)
 
 
 def _role(joint: RobotJoint, description: RobotDescription) -> Role:
