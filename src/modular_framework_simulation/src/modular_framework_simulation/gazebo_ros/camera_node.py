@@ -100,6 +100,14 @@ def serve(pipe: Connection) -> None:
         done += 1
 
 
+def _keep_the_engine_off_the_terminal() -> None:
+    """Leaves the terminal to Python: the engine and graphics drivers write to it from C++."""
+    sys.stdout, sys.stderr = (os.fdopen(os.dup(stream), "w", buffering=1) for stream in (1, 2))
+    with open(os.devnull, "w") as nothing:
+        for stream in (1, 2):
+            os.dup2(nothing.fileno(), stream)
+
+
 def main() -> int:
     """Runs the node; argument: number of the open file that leads to the simulation.
 
@@ -107,10 +115,7 @@ def main() -> int:
         Exit code: 0.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    # The engine and graphics drivers write to the standard output, which is the log of the simulation.
-    sys.stdout = os.fdopen(os.dup(1), "w", buffering=1)
-    with open(os.devnull, "w") as nothing:
-        os.dup2(nothing.fileno(), 1)
+    _keep_the_engine_off_the_terminal()
     arguments = rospy.myargv(sys.argv)
     # Without simulated time: messages carry that of the simulation, and nothing here waits.
     rospy.init_node(ros_names.CAMERAS_NODE, disable_rostime=True)
