@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import functools
 import os
+import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -46,12 +47,16 @@ def simulation(ros_session: Any) -> Iterator[Any]:
     launch.stop()
 
 
+def processes(part_of_command: str) -> list[int]:
+    """The processes of this master with a text in their command line."""
+    pids = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+    return [pid for pid in pids if part_of_command in command_line(pid)]
+
+
 def processor_time_s(part_of_command: str) -> float:
     """Seconds of processor time that the one process with this text in its command line has used."""
-    pids = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
-    children = [pid for pid in pids if part_of_command in command_line(pid)]
-    assert len(children) == 1, children
-    fields = Path(f"/proc/{children[0]}/stat").read_text().rpartition(")")[2].split()
+    (pid,) = processes(part_of_command)
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
@@ -122,3 +127,20 @@ def test_images_come_at_the_rate_of_the_camera_in_simulated_time(simulation: Any
     # one that comes late on a busy machine does not delay the others
     assert np.mean(np.diff(stamps)) == pytest.approx(0.1, rel=0.1)
     assert stamps == sorted(set(stamps))
+
+
+def test_time_goes_on_without_the_process_that_draws_and_the_log_says_so(simulation: Any) -> None:
+    (pid,) = processes("camera_node")
+    os.kill(pid, signal.SIGKILL)
+    until(lambda: "cameras are silent now" in simulation.log(), "a line in the log")
+    before = rospy.get_time()
+    until(lambda: rospy.get_time() > before + 0.2, "simulated time")
+
+
+def test_the_process_that_draws_ends_with_the_simulation(ros_session: Any, simulation: Any) -> None:
+    simulation.stop()
+    again = ros_session.launch(LAUNCH)
+    until(lambda: processes("camera_node"), "the process that draws")
+    until(lambda: "simulation is running" in again.log(), "a simulation that runs")
+    again.stop()
+    until(lambda: not processes("camera_node"), "the end of the process that draws", timeout_s=10.0)

@@ -19,6 +19,8 @@ from modular_framework_simulation.sensors.drawing_choice import fastest_drawing
 from modular_framework_simulation.sensors.renderer import Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneReport, SceneUpdate
 
+_NICENESS = 5
+"""Physics comes first where processors are scarce."""
 _POLL_S = 0.1
 """How long a new subscriber may wait until the simulation knows of it [s]."""
 
@@ -77,7 +79,7 @@ def _subscribed(publisher: Any) -> bool:
 
 
 def serve(pipe: Connection) -> None:
-    """Draws for the simulation at the other end of a pipe, until that closes it or ROS shuts down."""
+    """Draws for the simulation at the other end of a pipe, until that sends None or is gone, or ROS shuts down."""
     cameras: tuple[Camera, ...] = pipe.recv()
     publishers = [CameraPublisher(camera) for camera in cameras]
     renderer: Renderer | None = None
@@ -89,7 +91,9 @@ def serve(pipe: Connection) -> None:
             reported = report
         if not pipe.poll(_POLL_S):
             continue
-        update: SceneUpdate = pipe.recv()
+        update: SceneUpdate | None = pipe.recv()
+        if update is None:
+            return
         if renderer is None:
             meshes = ConvexParts(default_cache_folder())
             renderer = Renderer(fastest_drawing(rospy.loginfo), meshes, rospy.logwarn)
@@ -116,6 +120,7 @@ def main() -> int:
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     _keep_the_engine_off_the_terminal()
+    os.nice(_NICENESS)
     arguments = rospy.myargv(sys.argv)
     # Without simulated time: messages carry that of the simulation, and nothing here waits.
     rospy.init_node(ros_names.CAMERAS_NODE, disable_rostime=True)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import threading
@@ -105,7 +106,8 @@ class CameraProcess:
         pipe, self._pipe = self._pipe, None
         if pipe is None or self._process is None:
             return
-        pipe.close()
+        with contextlib.suppress(OSError):  # it has ended before
+            pipe.send(None)
         try:
             self._process.wait(_END_TIMEOUT_S)
         except subprocess.TimeoutExpired:
