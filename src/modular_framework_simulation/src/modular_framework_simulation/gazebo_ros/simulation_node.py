@@ -19,6 +19,7 @@ from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.gazebo_ros.camera_process import simulated_cameras
+from modular_framework_simulation.gazebo_ros.force_torque_topics import force_torque_topics
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
 from modular_framework_simulation.gazebo_ros.parameters import SimulationParameters, read_parameters
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
@@ -116,6 +117,9 @@ class SimulationNode:
         self._cameras = simulated_cameras(
             self._world, actors.robot if actors else None, parameters.robot_description, self._resources.find_package
         )
+        self._wrenches = force_torque_topics(
+            self._world, actors.robot.body.name if actors else "", parameters.robot_description
+        )
         self._add_hooks(parameters.clock_rate_hz)
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
         self._failed = False
@@ -163,6 +167,8 @@ class SimulationNode:
             self._loop.add_hook(Hook(every(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
         self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
         self._loop.add_hook(Hook(every(_CAMERA_RATE_HZ), lambda: self._cameras.tick(self._world.time_ns)))
+        for wrench in self._wrenches:
+            self._loop.add_hook(Hook(every(wrench.sensor.rate_hz), wrench.publish))
         self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
         self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))
 
