@@ -6,6 +6,7 @@ from __future__ import annotations
 NODE = "gazebo"
 NAMESPACE = "/gazebo"
 """Of everything below, but for the clock; that of the node, as Gazebo has it."""
+CAMERAS_NODE = "gazebo_cameras"
 CLOCK = "/clock"
 
 MODEL_STATES = "/gazebo/model_states"

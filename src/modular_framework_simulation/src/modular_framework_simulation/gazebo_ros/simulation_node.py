@@ -18,6 +18,8 @@ from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
+from modular_framework_simulation.gazebo_ros.camera_process import simulated_cameras
+from modular_framework_simulation.gazebo_ros.force_torque_topics import force_torque_topics
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
 from modular_framework_simulation.gazebo_ros.parameters import SimulationParameters, read_parameters
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
@@ -46,6 +48,8 @@ _PACKAGE = "modular_framework_simulation"
 _STATES_RATE_HZ = 50
 _GRASP_RATE_HZ = 50
 _PERFORMANCE_RATE_HZ = 5
+_CAMERA_RATE_HZ = 500
+"""How often is looked whether an image is due."""
 _SNAPSHOT_RATE_HZ = 20
 _PACE_REPORT_S = 30
 _SWITCH_INTERVAL_S = 0.0005
@@ -74,7 +78,7 @@ class SimulationNode:
     """Builds the world from parameters and runs it.
 
     Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `GazeboServices`,
-    `TimeServices`, `PlanningScenePublisher` and, for the controllers, `RosControllerManager`.
+    `TimeServices`, `PlanningScenePublisher`, `CameraPublisher` and, for the controllers, `RosControllerManager`.
 
     Args:
         parameters: What to simulate and how.
@@ -109,6 +113,12 @@ class SimulationNode:
         digest = WorldDigest(self._world, actors.robot if actors else None) if parameters.state_digest else None
         self._time_services = TimeServices(
             self._loop, self._scene, self._snapshot, parameters.wait_for_planning, digest, self._services.refresh
+        )
+        self._cameras = simulated_cameras(
+            self._world, actors.robot if actors else None, parameters.robot_description, self._resources.find_package
+        )
+        self._wrenches = force_torque_topics(
+            self._world, actors.robot.body.name if actors else "", parameters.robot_description
         )
         self._add_hooks(parameters.clock_rate_hz)
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
@@ -156,6 +166,9 @@ class SimulationNode:
             self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
             self._loop.add_hook(Hook(every(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
         self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
+        self._loop.add_hook(Hook(every(_CAMERA_RATE_HZ), lambda: self._cameras.tick(self._world.time_ns)))
+        for wrench in self._wrenches:
+            self._loop.add_hook(Hook(every(wrench.sensor.rate_hz), wrench.publish))
         self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
         self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))
 
@@ -209,6 +222,7 @@ class SimulationNode:
         # Topics close at a shutdown: the loop has to have ended before.
         rospy.on_shutdown(self._stop_loop)
         self._clock.publish()
+        self._cameras.connect()
         self._thread.start()
         if self._controllers is not None:
             self._controllers.connect()
@@ -234,6 +248,7 @@ class SimulationNode:
         self._time_services.close()
         self._scene.close()
         self._stop_loop()
+        self._cameras.close()
         if self._controllers is not None:
             self._controllers.close()
             self._controllers = None

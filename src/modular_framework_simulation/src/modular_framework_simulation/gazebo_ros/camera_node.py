@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The process that draws and publishes what cameras see, beside the simulation, which starts it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from multiprocessing.connection import Connection
+from typing import Any
+
+import rospy
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+
+from modular_framework_simulation.gazebo_ros import camera_messages, ros_names
+from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.sensors.cameras import Camera
+from modular_framework_simulation.sensors.drawing_choice import fastest_drawing
+from modular_framework_simulation.sensors.renderer import Renderer
+from modular_framework_simulation.sensors.visible_scene import SceneReport, SceneUpdate
+
+_NICENESS = 5
+"""Physics comes first where processors are scarce."""
+_POLL_S = 0.1
+"""How long a new subscriber may wait until the simulation knows of it [s]."""
+
+
+class CameraPublisher:
+    """The topics of one camera.
+
+    Publishes: colour image, depth image and their camera_info, and point cloud, under the names in `CameraTopics`.
+
+    Args:
+        camera: The camera.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+        topics = camera.topics
+        self._image = _publisher(topics.image, Image)
+        self._depth = _publisher(topics.depth, Image)
+        self._points = _publisher(topics.points, PointCloud2)
+        self._infos = [_publisher(name, CameraInfo) for name in {topics.image_info, topics.depth_info}]
+
+    @property
+    def draws(self) -> bool:
+        """Whether somebody subscribes to what has to be drawn."""
+        return any(_subscribed(each) for each in (self._image, self._depth, self._points))
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody subscribes to anything."""
+        return self.draws or any(_subscribed(each) for each in self._infos)
+
+    def publish(self, update: SceneUpdate, renderer: Renderer) -> None:
+        """Draws and publishes what somebody subscribes to."""
+        camera = self.camera
+        head = camera_messages.header(camera.frame_id, update.time_ns)
+        for info in self._infos:
+            if _subscribed(info):
+                info.publish(camera_messages.camera_info(camera.pinhole, head))
+        if not self.draws:
+            return
+        image = renderer.image(camera.pinhole, update.cameras[camera.name]).within(camera.depth_range)
+        if _subscribed(self._image):
+            self._image.publish(camera_messages.rgb_image(image, head))
+        if _subscribed(self._depth):
+            self._depth.publish(camera_messages.depth_image(image, head))
+        if _subscribed(self._points):
+            self._points.publish(camera_messages.point_cloud(camera.pinhole, image, head))
+
+
+def _publisher(topic: str, kind: type) -> Any:
+    return rospy.Publisher(topic, kind, queue_size=1) if topic else None
+
+
+def _subscribed(publisher: Any) -> bool:
+    return publisher is not None and publisher.get_num_connections() > 0
+
+
+def serve(pipe: Connection) -> None:
+    """Draws for the simulation at the other end of a pipe, until that sends None or is gone, or ROS shuts down."""
+    cameras: tuple[Camera, ...] = pipe.recv()
+    publishers = [CameraPublisher(camera) for camera in cameras]
+    renderer: Renderer | None = None
+    done, reported = 0, SceneReport(0, frozenset())
+    while not rospy.is_shutdown():
+        report = SceneReport(done, frozenset(each.camera.name for each in publishers if each.wanted))
+        if report != reported:
+            pipe.send(report)
+            reported = report
+        if not pipe.poll(_POLL_S):
+            continue
+        update: SceneUpdate | None = pipe.recv()
+        if update is None:
+            return
+        if renderer is None:
+            meshes = ConvexParts(default_cache_folder())
+            renderer = Renderer(fastest_drawing(rospy.loginfo), meshes, rospy.logwarn)
+        renderer.apply(update)
+        for each in publishers:
+            if each.camera.name in update.cameras:
+                each.publish(update, renderer)
+        done += 1
+
+
+def _keep_the_engine_off_the_terminal() -> None:
+    """Leaves the terminal to Python: the engine and graphics drivers write to it from C++."""
+    sys.stdout, sys.stderr = (os.fdopen(os.dup(stream), "w", buffering=1) for stream in (1, 2))
+    with open(os.devnull, "w") as nothing:
+        for stream in (1, 2):
+            os.dup2(nothing.fileno(), stream)
+
+
+def main() -> int:
+    """Runs the node; argument: number of the open file that leads to the simulation.
+
+    Returns:
+        Exit code: 0.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    _keep_the_engine_off_the_terminal()
+    os.nice(_NICENESS)
+    arguments = rospy.myargv(sys.argv)
+    # Without simulated time: messages carry that of the simulation, and nothing here waits.
+    rospy.init_node(ros_names.CAMERAS_NODE, disable_rostime=True)
+    try:
+        serve(Connection(int(arguments[1])))
+    except (EOFError, ConnectionError):
+        rospy.logdebug("the simulation has ended")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the cameras of a `sensors_config.yaml` that has been loaded into parameters.
+
+A section is a camera when it has `data_topics`, or when the topics at the top level of the file are in a namespace
+called like its `frame_id`. That frame is the optical frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from modular_framework_simulation.models.poses import Pose, normalised_quaternion
+from modular_framework_simulation.sensors.cameras import Camera, CameraTopics, Pinhole
+
+FrameLocator = Callable[[str], str | None]
+"""Returns the entity of the world, "world" or "model::link", that a frame belongs to; None for an unknown frame."""
+
+DEFAULT_RATE_HZ = 10.0
+
+_TOP_LEVEL_TOPICS = {
+    "rgb": "rgb_image_topic_name",
+    "depth": "depth_image_topic_name",
+    "points": "pointcloud_topic_name",
+}
+_SECTION_TOPICS = {"rgb": "rgb_topic", "depth": "depth_map_topic", "points": "pointcloud_topic"}
+_CAMERA_KEYS = ("width", "height", "horizontal_fov", "near", "far", "rate")
+
+
+class _Fault(ValueError):
+    """A value of one section cannot be used."""
+
+
+def read_cameras(settings: Mapping[str, Any], where: str, locate: FrameLocator) -> tuple[list[Camera], list[str]]:
+    """Reads the cameras.
+
+    Args:
+        settings: The contents of the file.
+        where: Where they are, for the messages.
+        locate: Finds the origins of frames in the world.
+
+    Returns:
+        The usable cameras, and one sentence for each that is not usable.
+    """
+    cameras, faults = [], []
+    for name, section in settings.items():
+        if not isinstance(section, Mapping):
+            continue
+        try:
+            topics = _topics(settings, section)
+            if topics is not None:
+                cameras.append(_camera(name, section, topics, locate))
+        except ValueError as error:
+            faults.append(f"{where}/{name}/{error}; this camera is not simulated")
+    return cameras, faults
+
+
+def _camera(name: str, section: Mapping[str, Any], topics: CameraTopics, locate: FrameLocator) -> Camera:
+    origin, pose = _placement(section)
+    parent = locate(origin)
+    if parent is None:
+        raise _Fault(f"origin_frame_id: got '{origin}'; allowed: world, or a link of the robot in the simulation")
+    given = _mapping(section, "camera")
+    unknown = sorted(set(given) - set(_CAMERA_KEYS))
+    if unknown:
+        raise _Fault(f"camera: unknown key '{unknown[0]}'; allowed: {', '.join(_CAMERA_KEYS)}")
+    values = {key: _number(given, key, "camera/") for key in given}
+    rate = values.pop("rate", DEFAULT_RATE_HZ)
+    pinhole = Pinhole(int(values.pop("width", 640)), int(values.pop("height", 480)), **values)
+    try:
+        return Camera(name, _text(section, "frame_id"), parent, pose, rate, topics, pinhole)
+    except ValueError as error:
+        raise _Fault(f"camera/{error}") from error
+
+
+def _topics(settings: Mapping[str, Any], section: Mapping[str, Any]) -> CameraTopics | None:
+    if "data_topics" in section:
+        given = _mapping(section, "data_topics")
+        names = {kind: _text(given, key) for kind, key in _SECTION_TOPICS.items() if key in given}
+    else:
+        namespace = str(section.get("frame_id", "")).strip("/")
+        named = {kind: _text(settings, key) for kind, key in _TOP_LEVEL_TOPICS.items() if key in settings}
+        names = {kind: topic for kind, topic in named.items() if topic.strip("/").startswith(f"{namespace}/")}
+    if not any(names.values()):
+        return None
+    rgb, depth = names.get("rgb", ""), names.get("depth", "")
+    return CameraTopics(rgb, _info_beside(rgb), depth, _info_beside(depth), names.get("points", ""))
+
+
+def _info_beside(topic: str) -> str:
+    """Returns the name of the camera_info of an image, which is in the same namespace."""
+    return f"{topic.rpartition('/')[0]}/camera_info" if topic else ""
+
+
+def _placement(section: Mapping[str, Any]) -> tuple[str, Pose]:
+    """Returns the frame that the pose of a sensor is given in, and the pose."""
+    if "initial_pose" not in section:
+        x, y, z, roll, pitch, yaw = (
+            _number(section, f"frame_{key}") for key in ("x", "y", "z", "roll", "pitch", "yaw")
+        )
+        return _text(section, "origin_frame_id").strip("/"), Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
+    if not isinstance(section["initial_pose"], Mapping):
+        raise _Fault(
+            f"initial_pose: got '{section['initial_pose']}'; the simulation does not know the names of poses: "
+            "expected reference_frame, position and orientation"
+        )
+    pose = _mapping(section, "initial_pose")
+    position, orientation = _mapping(pose, "position"), _mapping(pose, "orientation")
+    x, y, z = (_number(position, key, "initial_pose/position/") for key in "xyz")
+    where = "initial_pose/orientation/"
+    frame = _text(pose, "reference_frame").strip("/")
+    if "w" in orientation:
+        a, b, c, w = (_number(orientation, key, where) for key in "xyzw")
+        return frame, Pose((x, y, z), normalised_quaternion((a, b, c, w)))
+    roll, pitch, yaw = (_number(orientation, key, where) for key in "rpy")
+    return frame, Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
+
+
+def _mapping(section: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    value = section.get(key, {})
+    if not isinstance(value, Mapping):
+        raise _Fault(f"{key}: got {value!r}; expected a mapping of keys to values")
+    return value
+
+
+def _text(section: Mapping[str, Any], key: str) -> str:
+    value = section.get(key)
+    if not isinstance(value, str) or not value:
+        raise _Fault(f"{key}: got {value!r}; expected a name")
+    return value
+
+
+def _number(section: Mapping[str, Any], key: str, where: str = "") -> float:
+    value = section.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise _Fault(f"{where}{key}: got {value!r}; expected a number")
+    return float(value)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Force-torque sensors: the load on a joint, as Gazebo's sensor measures it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from modular_framework_simulation.errors import UnknownEntityError
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.simulated_body import add, cross
+from modular_framework_urdf import xml_text
+from modular_framework_urdf.rotations import Vector3, rotate_vector
+from modular_framework_urdf.xml_text import Element
+
+DEFAULT_RATE_HZ = 100.0
+_PLUGIN = "gazebo_ros_ft_sensor"
+
+
+@dataclass(frozen=True, slots=True)
+class ForceTorqueSensor:
+    """A sensor in a joint of a robot.
+
+    Attributes:
+        joint: Name of the joint.
+        child_link: The link that the joint carries, in whose frame is measured.
+        topic: Where its measurements are published.
+        frame_id: For the headers of its messages.
+        rate_hz: Measurements in a second of simulated time.
+    """
+
+    joint: str
+    child_link: str
+    topic: str
+    frame_id: str
+    rate_hz: float = DEFAULT_RATE_HZ
+
+
+@dataclass(frozen=True, slots=True)
+class Wrench:
+    """Force [N] and torque [Nm]."""
+
+    force: Vector3
+    torque: Vector3
+
+
+def read_force_torque_sensors(text: str) -> tuple[list[ForceTorqueSensor], list[str]]:
+    """Reads the sensors of a robot's URDF: `<plugin filename="libgazebo_ros_ft_sensor.so">` in a `<gazebo>`.
+
+    Args:
+        text: URDF that the simulation has read before.
+
+    Returns:
+        The usable sensors, and one sentence for each that is not usable.
+    """
+    root = xml_text.parse(text, "robot_description")
+    # The engine's reaction on a slide differs from the weight it carries.
+    joints = [joint for joint in root.findall("joint") if joint.get("type") in ("fixed", "revolute", "continuous")]
+    children = {joint.get("name"): joint.find("child").get("link") for joint in joints}
+    sensors, faults = [], []
+    for plugin in root.iterfind("gazebo/plugin"):
+        if _PLUGIN not in plugin.get("filename", ""):
+            continue
+        try:
+            sensors.append(_sensor(plugin, children))
+        except ValueError as error:
+            where = f"robot_description:{plugin.sourceline}: <plugin name='{plugin.get('name', '')}'>"
+            faults.append(f"{where}: {error}; this sensor is not simulated")
+    return sensors, faults
+
+
+def _sensor(plugin: Element, children: dict[str, str]) -> ForceTorqueSensor:
+    def text(key: str, default: str) -> str:
+        return (plugin.findtext(key) or "").strip() or default
+
+    joint = text("jointName", "")
+    if joint not in children:
+        raise ValueError(
+            f"<jointName>: got '{joint}'; allowed are joints that are fixed or turn: {', '.join(children)}"
+        )
+    numbers = {}
+    for key in ("updateRate", "gaussianNoise"):
+        try:
+            numbers[key] = float(text(key, "0"))
+        except ValueError:
+            raise ValueError(f"<{key}>: got '{text(key, '')}'; expected a number") from None
+    if numbers["gaussianNoise"] != 0.0:
+        raise ValueError(f"<gaussianNoise>: got {numbers['gaussianNoise']:g}; allowed: 0, noise is not simulated")
+    namespace, topic, child = text("robotNamespace", "").rstrip("/"), text("topicName", "wrench"), children[joint]
+    name = topic if topic.startswith("/") or not namespace else f"{namespace}/{topic}"
+    return ForceTorqueSensor(joint, child, name, text("frameName", child), numbers["updateRate"] or DEFAULT_RATE_HZ)
+
+
+class JointLoad:
+    """Measures the load on a joint of a model.
+
+    Args:
+        world: Where the model is.
+        model: Its name.
+        sensor: The joint.
+
+    Raises:
+        UnknownEntityError: There is no such model or joint.
+    """
+
+    def __init__(self, world: PhysicsWorld, model: str, sensor: ForceTorqueSensor) -> None:
+        self._world, self._model, self._sensor = world, model, sensor
+        self._instance = -1
+        self._find()
+
+    def _find(self) -> None:
+        """Finds the joint in the engine; its axis there is given in the axes of its link's inertia."""
+        body = self._world.body(self._model)
+        infos = {info[1].decode(): info for info in self._world.engine.joint_infos(body.number)}
+        info = infos.get(self._sensor.joint)
+        if info is None:
+            raise UnknownEntityError("joint", f"{self._model}::{self._sensor.joint}", list(infos))
+        self._index, self._axis = info[0], info[13]
+        self._turns = info[2] == self._world.engine.api.JOINT_REVOLUTE
+
+    def start(self) -> None:
+        """Lets the engine measure from the next step on; to be called before each measurement."""
+        instance = self._world.instance(self._model)
+        if instance != self._instance:  # also after a restart, which makes the body anew
+            self._instance = instance
+            self._find()
+            body, engine = self._world.body(self._model), self._world.engine
+            engine.api.enableJointForceTorqueSensor(body.number, self._index, True, physicsClientId=engine.client)
+
+    def measure(self) -> Wrench:
+        """Returns the wrench with which the child link acts on its parent, in the last physics step.
+
+        It is given about the origin of the child link, which is that of the joint, and in its axes: Gazebo's defaults.
+        The engine gives what the parent does to the child, about the centre of mass of the child and in the axes of
+        its inertia, without what the motor does along the axis of the joint.
+        """
+        body, engine = self._world.body(self._model), self._world.engine
+        api, client = engine.api, engine.client
+        _, _, reaction, motor = api.getJointState(body.number, self._index, physicsClientId=client)
+        record = api.getLinkState(body.number, self._index, physicsClientId=client)
+        centre_in_link = Pose(record[2], record[3])
+        x, y, z = self._axis
+        along_axis = (motor * x, motor * y, motor * z)
+        force, torque = reaction[:3], reaction[3:]
+        if self._turns:
+            torque = add(torque, along_axis)
+        force, torque = (rotate_vector(centre_in_link.quaternion, each) for each in (force, torque))
+        about_origin = add(torque, cross(centre_in_link.position, force))
+        return Wrench(_negative(force), _negative(about_origin))
+
+
+def _negative(vector: Vector3) -> Vector3:
+    x, y, z = vector
+    return (-x, -y, -z)

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draws what cameras see with PyBullet's renderers, in an engine of its own in which nothing moves by itself."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from modular_framework_simulation.errors import DescriptionError, SimulationError
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.sensors.cameras import CameraImage, Pinhole
+from modular_framework_simulation.sensors.visible_scene import SceneUpdate
+from modular_framework_urdf.rotations import rotate_vector
+
+_PLANE_THICKNESS_M = 1e-3
+
+_OPENGL_IN_OPTICAL = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+"""OpenGL's camera looks along -z, with y upwards."""
+
+
+class Drawing(Enum):
+    """PyBullet's ways to draw without a window."""
+
+    EGL = "OpenGL through EGL"
+    TINY = "TinyRenderer"
+
+
+class Renderer:
+    """Visual shapes at their poses, and images of them.
+
+    Args:
+        drawing: How to draw.
+        meshes: Converts mesh files.
+        log: Takes lines of text about shapes that cannot be drawn.
+
+    Raises:
+        SimulationError: This machine cannot draw that way.
+    """
+
+    def __init__(self, drawing: Drawing, meshes: ConvexParts, log: Callable[[str], None]) -> None:
+        import pybullet  # prints its build date when loaded
+
+        self._api: Any = pybullet
+        self._meshes, self._log = meshes, log
+        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._flag = pybullet.ER_TINY_RENDERER
+        if drawing is Drawing.EGL:
+            self._load_egl()
+        self._bodies: dict[int, tuple[tuple[tuple[int, Pose], ...], ...]] = {}
+        self._poses: dict[int, tuple[Pose, ...]] = {}
+
+    def _load_egl(self) -> None:
+        plugin = importlib.util.find_spec("eglRenderer")
+        if plugin is None or plugin.origin is None:
+            raise SimulationError("PyBullet was built without its EGL renderer; use TinyRenderer")
+        if self._api.loadPlugin(plugin.origin, "_eglRendererPlugin", physicsClientId=self._client) < 0:
+            raise SimulationError("PyBullet's EGL renderer cannot be loaded here; use TinyRenderer")
+        self._flag = self._api.ER_BULLET_HARDWARE_OPENGL
+
+    def apply(self, update: SceneUpdate) -> None:
+        """Brings the shapes in step with the world."""
+        for number in update.removed:
+            for link in self._bodies.pop(number):
+                for body, _ in link:
+                    self._api.removeBody(body, physicsClientId=self._client)
+            self._poses.pop(number, None)
+        for number, links in update.added.items():
+            self._bodies[number] = tuple(tuple(self._add(link)) for link in links)
+        for number, poses in update.poses.items():
+            before = self._poses.get(number, (None,) * len(poses))
+            for link, pose, old in zip(self._bodies[number], poses, before, strict=True):
+                if pose != old:
+                    self._place(link, pose)
+            self._poses[number] = poses
+
+    def _place(self, link: tuple[tuple[int, Pose], ...], link_in_world: Pose) -> None:
+        for body, shape_in_link in link:
+            shape_in_world = link_in_world @ shape_in_link
+            self._api.resetBasePositionAndOrientation(
+                body, shape_in_world.position, shape_in_world.quaternion, physicsClientId=self._client
+            )
+
+    def _add(self, visuals: tuple[specs.Visual, ...]) -> list[tuple[int, Pose]]:
+        bodies = []
+        for visual in visuals:
+            try:
+                options, shift = self._shape(visual.geometry)
+                shape = self._api.createVisualShape(
+                    **options, rgbaColor=visual.colour, specularColor=(0.1, 0.1, 0.1), physicsClientId=self._client
+                )
+                body = self._api.createMultiBody(0, -1, shape, physicsClientId=self._client)
+            except (DescriptionError, self._api.error) as error:
+                self._log(f"the visual '{visual.name}' is not drawn: {error}")
+                continue
+            bodies.append((body, visual.pose @ shift))
+        return bodies
+
+    def _shape(self, geometry: specs.Geometry) -> tuple[dict[str, Any], Pose]:
+        api = self._api
+        match geometry:
+            case specs.Box(size=(x, y, z)):
+                return {"shapeType": api.GEOM_BOX, "halfExtents": (x / 2, y / 2, z / 2)}, Pose()
+            case specs.Cylinder(radius=radius, length=length):
+                return {"shapeType": api.GEOM_CYLINDER, "radius": radius, "length": length}, Pose()
+            case specs.Sphere(radius=radius):
+                return {"shapeType": api.GEOM_SPHERE, "radius": radius}, Pose()
+            case specs.Plane(normal=normal, size=(x, y)):
+                half = _PLANE_THICKNESS_M / 2
+                turn = _rotation_from_z(normal)
+                nx, ny, nz = normal
+                shift = Pose((-nx * half, -ny * half, -nz * half), turn)
+                return {"shapeType": api.GEOM_BOX, "halfExtents": (x / 2, y / 2, half)}, shift
+            case specs.Mesh():
+                return {"shapeType": api.GEOM_MESH, "fileName": str(self._meshes.exact(geometry))}, Pose()
+
+    def image(self, pinhole: Pinhole, optical_in_world: Pose) -> CameraImage:
+        """Draws what a camera sees.
+
+        Args:
+            pinhole: The geometry of the image.
+            optical_in_world: Where the camera is.
+        """
+        _, _, rgba, buffer, _ = self._api.getCameraImage(
+            pinhole.width,
+            pinhole.height,
+            _view_matrix(optical_in_world),
+            pinhole.opengl_projection(),
+            shadow=0,
+            renderer=self._flag,
+            flags=self._api.ER_NO_SEGMENTATION_MASK,
+            physicsClientId=self._client,
+        )
+        size = (pinhole.height, pinhole.width)
+        rgb = np.ascontiguousarray(np.asarray(rgba, np.uint8).reshape(*size, 4)[..., :3])
+        return CameraImage(rgb, pinhole.depth_from_buffer(np.asarray(buffer, np.float32).reshape(size)))
+
+    def close(self) -> None:
+        """Frees the engine; may be called twice."""
+        if self._client >= 0:
+            self._api.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+
+def _rotation_from_z(normal: tuple[float, float, float]) -> tuple[float, float, float, float]:
+    """Returns the shortest rotation that turns the z axis to a unit vector."""
+    x, y, z = normal
+    if z < -1 + 1e-9:
+        return (1.0, 0.0, 0.0, 0.0)
+    norm = float(np.sqrt(2 * (1 + z)))
+    return (-y / norm, x / norm, 0.0, norm / 2)
+
+
+def _view_matrix(optical_in_world: Pose) -> list[float]:
+    """Returns OpenGL's view matrix, column by column."""
+    world_in_camera = (optical_in_world @ _OPENGL_IN_OPTICAL).inverse()
+    columns = [rotate_vector(world_in_camera.quaternion, axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+    return [value for column in columns for value in (*column, 0.0)] + [*world_in_camera.position, 1.0]
