@@ -370,7 +370,8 @@ def test_a_reset_in_the_middle_of_a_motion_ends_it_with_that_reason(simulation: 
     until(lambda: client.get_state() == GoalStatus.ACTIVE, "the motion")
     time.sleep(0.5)
     call(f"/gazebo/{service}", Empty)
-    until(lambda: client.get_state() == GoalStatus.PREEMPTED, "the end of the motion")
+    assert client.wait_for_result(rospy.Duration(20)), "the status may be known before the result has come"
+    assert client.get_state() == GoalStatus.PREEMPTED
     assert client.get_goal_status_text() == client.get_result().error_string == reason
     rospy.sleep(0.5)
     joints = rospy.wait_for_message("/joint_states", JointState, 10.0)
