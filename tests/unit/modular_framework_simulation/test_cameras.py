@@ -6,6 +6,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from simulated_samples import solid
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs as specs
-from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 from modular_framework_simulation.sensors.cameras import OPTICAL_IN_BODY, Camera, CameraImage, CameraTopics, Pinhole
@@ -43,10 +44,10 @@ def camera(pose: Pose, parent: str = "world", pinhole: Pinhole | None = None) ->
 
 
 @pytest.fixture(params=list(Drawing), ids=lambda drawing: drawing.name)
-def renderer(request: pytest.FixtureRequest, convex_parts: ConvexParts) -> Iterator[Renderer]:
+def renderer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Renderer]:
     """A renderer of each kind."""
     try:
-        renderer = Renderer(request.param, convex_parts, print)
+        renderer = Renderer(request.param, VisualMeshes(tmp_path), print)
     except SimulationError as error:
         pytest.skip(str(error))
     yield renderer
@@ -153,6 +154,18 @@ def test_colours_are_those_of_the_shapes_and_their_points(empty: PhysicsWorld, r
     assert cloud["rgb"][row, left] >> 16 == image.rgb[row, left, 0] > 100
     assert cloud["rgb"][row, right] & 0xFF == image.rgb[row, right, 2] > 100
     assert cloud["x"][row, left] < 0 < cloud["x"][row, right]
+
+
+def test_a_mesh_is_drawn_in_its_size_and_colour(empty: PhysicsWorld, renderer: Renderer, tmp_path: Path) -> None:
+    import trimesh
+
+    file = tmp_path / "block.stl"
+    trimesh.creation.box((200.0, 200.0, 200.0)).export(file)
+    empty.spawn(visible("block", specs.Mesh(file, (0.001, 0.001, 0.001)), Pose(), (0.0, 0.0, 0.9, 1.0)))
+    image = look(empty, renderer, camera(Pose((0.0, 0.0, 1.0), LOOKING_DOWN)))
+    assert image.depth[240, 320] == pytest.approx(0.9, abs=0.002)
+    assert image.rgb[240, 320].argmax() == 2
+    assert np.sum(~np.isnan(image.depth[240])) == pytest.approx(0.2 / 0.9 * Pinhole().focal_length, abs=2)
 
 
 def test_what_moves_appears_and_goes_is_followed(empty: PhysicsWorld, renderer: Renderer) -> None:

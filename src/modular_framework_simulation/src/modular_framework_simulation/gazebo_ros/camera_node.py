@@ -13,7 +13,8 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
 from modular_framework_simulation.gazebo_ros import camera_messages, ros_names
-from modular_framework_simulation.models.mesh_files import ConvexParts, default_cache_folder
+from modular_framework_simulation.models.mesh_files import default_cache_folder
+from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_simulation.sensors.cameras import Camera
 from modular_framework_simulation.sensors.drawing_choice import fastest_drawing
 from modular_framework_simulation.sensors.renderer import Renderer
@@ -95,7 +96,7 @@ def serve(pipe: Connection) -> None:
         if update is None:
             return
         if renderer is None:
-            meshes = ConvexParts(default_cache_folder())
+            meshes = VisualMeshes(default_cache_folder())
             renderer = Renderer(fastest_drawing(rospy.loginfo), meshes, rospy.logwarn)
         renderer.apply(update)
         for each in publishers:

@@ -17,8 +17,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from modular_framework_simulation.models import sdf_specs as specs
-from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_simulation.sensors.cameras import Pinhole
 from modular_framework_simulation.sensors.renderer import Drawing, Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneUpdate
@@ -53,7 +53,7 @@ def image_time_s(drawing: Drawing) -> float:
         SimulationError: This machine cannot draw that way.
     """
     with tempfile.TemporaryDirectory() as folder:
-        renderer = Renderer(drawing, ConvexParts(Path(folder)), print)
+        renderer = Renderer(drawing, VisualMeshes(Path(folder)), print)
         floor = specs.Visual("floor", Pose(), specs.Plane((0.0, 0.0, 1.0), (10.0, 10.0)), (0.8, 0.8, 0.8, 1.0))
         box = specs.Visual("box", Pose(), specs.Box((0.2, 0.2, 0.2)), (0.8, 0.1, 0.1, 1.0))
         renderer.apply(SceneUpdate(0, {1: ((floor, box),)}, (), {1: (Pose(),)}, {}))

@@ -12,8 +12,8 @@ import numpy as np
 
 from modular_framework_simulation.errors import DescriptionError, SimulationError
 from modular_framework_simulation.models import sdf_specs as specs
-from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_simulation.sensors.cameras import CameraImage, Pinhole
 from modular_framework_simulation.sensors.visible_scene import SceneUpdate
 from modular_framework_urdf.rotations import rotate_vector
@@ -36,14 +36,14 @@ class Renderer:
 
     Args:
         drawing: How to draw.
-        meshes: Converts mesh files.
+        meshes: Converts mesh files and pictures.
         log: Takes lines of text about shapes that cannot be drawn.
 
     Raises:
         SimulationError: This machine cannot draw that way.
     """
 
-    def __init__(self, drawing: Drawing, meshes: ConvexParts, log: Callable[[str], None]) -> None:
+    def __init__(self, drawing: Drawing, meshes: VisualMeshes, log: Callable[[str], None]) -> None:
         import pybullet  # prints its build date when loaded
 
         self._api: Any = pybullet
@@ -90,18 +90,26 @@ class Renderer:
         bodies = []
         for visual in visuals:
             try:
-                options, shift = self._shape(visual.geometry)
-                shape = self._api.createVisualShape(
-                    **options, rgbaColor=visual.colour, specularColor=(0.1, 0.1, 0.1), physicsClientId=self._client
-                )
-                body = self._api.createMultiBody(0, -1, shape, physicsClientId=self._client)
+                for options, colour, shift in self._shapes(visual):
+                    shape = self._api.createVisualShape(
+                        **options, rgbaColor=colour, specularColor=(0.1, 0.1, 0.1), physicsClientId=self._client
+                    )
+                    body = self._api.createMultiBody(0, -1, shape, physicsClientId=self._client)
+                    bodies.append((body, visual.pose @ shift))
             except (DescriptionError, self._api.error) as error:
                 self._log(f"the visual '{visual.name}' is not drawn: {error}")
-                continue
-            bodies.append((body, visual.pose @ shift))
         return bodies
 
-    def _shape(self, geometry: specs.Geometry) -> tuple[dict[str, Any], Pose]:
+    def _shapes(self, visual: specs.Visual) -> list[tuple[dict[str, Any], specs.Colour, Pose]]:
+        """Returns the engine's options for the parts of a visual, with their colours and poses."""
+        if visual.texture is None and not isinstance(visual.geometry, specs.Mesh):
+            options, shift = self._shape(visual.geometry)
+            return [(options, visual.colour, shift)]
+        parts = self._meshes.parts(visual)
+        mesh = self._api.GEOM_MESH
+        return [({"shapeType": mesh, "fileName": str(part.file)}, part.colour, Pose()) for part in parts]
+
+    def _shape(self, geometry: specs.Box | specs.Cylinder | specs.Sphere | specs.Plane) -> tuple[dict[str, Any], Pose]:
         api = self._api
         match geometry:
             case specs.Box(size=(x, y, z)):
@@ -116,8 +124,6 @@ class Renderer:
                 nx, ny, nz = normal
                 shift = Pose((-nx * half, -ny * half, -nz * half), turn)
                 return {"shapeType": api.GEOM_BOX, "halfExtents": (x / 2, y / 2, half)}, shift
-            case specs.Mesh():
-                return {"shapeType": api.GEOM_MESH, "fileName": str(self._meshes.exact(geometry))}, Pose()
 
     def image(self, pinhole: Pinhole, optical_in_world: Pose) -> CameraImage:
         """Draws what a camera sees.

@@ -44,7 +44,8 @@ def read_robot_visuals(
                     log(f"robot_description:{placed.line}: a visual of link '{link.name}' is not drawn: {error}")
                     continue
                 name = f"{link.name}_{number}"
-                shapes.append(specs.Visual(name, pose, geometry, _colour(drawn, named, link.name, log)))
+                colour, plain = _colour(drawn, named, link.name, log), drawn.find("material") is None
+                shapes.append(specs.Visual(name, pose, geometry, colour, own_materials=plain))
         if shapes:
             visuals[link.name] = tuple(shapes)
     return visuals
