@@ -86,7 +86,8 @@ def test_the_usual_world_has_a_floor_and_what_has_no_effect_is_named(ros_session
             pub_clock_frequency="0",
         )
     )
-    ros_session.wait_for_service("/gazebo/get_physics_properties", 40.0)
+    for service in ("get_physics_properties", "get_world_properties"):
+        ros_session.wait_for_service(f"/gazebo/{service}", 40.0)
     assert rospy.ServiceProxy("/gazebo/get_physics_properties", GetPhysicsProperties)().pause
     assert rospy.ServiceProxy("/gazebo/get_world_properties", GetWorldProperties)().model_names == ["ground_plane"]
     until(lambda: "without effect in this simulation: " in launch.log(), "the warning")
@@ -97,7 +98,7 @@ def test_the_usual_world_has_a_floor_and_what_has_no_effect_is_named(ros_session
 
 def test_without_its_ros_network_there_is_only_the_clock(ros_session: Any) -> None:
     launch = ros_session.launch(with_arguments(gui="false", enable_ros_network="false"))
-    assert rospy.wait_for_message("/clock", Clock, 40.0).clock.to_sec() > 0
+    until(lambda: rospy.wait_for_message("/clock", Clock, 40.0).clock.to_sec() > 0, "simulated time")
     until(lambda: "simulation is running" in launch.log(), "the end of the start")
     assert not {"/gazebo/spawn_sdf_model", "/gazebo/set_parameters"} & set(rosservice.get_service_list())
     assert not [name for name, _ in rospy.get_published_topics("/gazebo")]
