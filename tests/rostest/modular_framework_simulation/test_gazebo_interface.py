@@ -609,7 +609,7 @@ def parameter_updates_topic() -> str:
     finally:
         done(set_physics(gravity=Vector3()))
         client.close()
-    return "every change, whoever made it, latched"
+    return "every change from any source, latched"
 
 
 def logged(name: str, kind: Any, message: Any) -> str:

@@ -195,7 +195,7 @@ def test_a_new_mass_counts_from_the_next_step_and_the_motion_goes_on(space: Phys
     assert space.names() == []
 
 
-def test_a_model_that_was_made_anew_keeps_its_name_and_place_among_the_others(space: PhysicsWorld) -> None:
+def test_a_model_that_was_created_again_keeps_its_name_and_place_among_the_others(space: PhysicsWorld) -> None:
     for name in ("cube", "other"):
         space.spawn(solid(name, CUBE, Pose((0, 0, 1))))
     instance = space.instance("cube")

@@ -31,6 +31,7 @@ from modular_framework_ros.node_handle import NodeHandle, join_names
 
 Detach = Callable[[], None]
 Attach = Callable[[str, Controller], Detach]
+RESET_REASON = "time went back, or the robot was put elsewhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +109,7 @@ class ControllerManager:
         time_s: float,
         period_s: float,
         reset_controllers: bool = False,
-        reset_reason: str = "time went back, or the robot was put elsewhere",
+        reset_reason: str = RESET_REASON,
     ) -> None:
         """Updates every running controller, then carries out a pending switch. Never raises, never waits.
 

@@ -29,7 +29,7 @@ from controller_manager_msgs.srv import (
 )
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
-from modular_framework_control.controller_manager.controller_manager import ControllerManager
+from modular_framework_control.controller_manager.controller_manager import RESET_REASON, ControllerManager
 from modular_framework_control.controller_manager.controller_types import ControllerTypes
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.realtime.loop_time import LoopTime
@@ -104,7 +104,7 @@ class RosControllerManager:
         time_s: float,
         period_s: float,
         reset_controllers: bool = False,
-        reset_reason: str = "time went back, or the robot was put elsewhere",
+        reset_reason: str = RESET_REASON,
     ) -> None:
         """One control cycle; see ControllerManager.update."""
         self.manager.update(time_s, period_s, reset_controllers, reset_reason)

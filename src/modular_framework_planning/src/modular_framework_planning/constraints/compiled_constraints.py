@@ -15,7 +15,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements, rotation_vector
+from modular_framework_planning.kinematics.compiled_kinematics import (
+    Tree,
+    damped_step,
+    joint_placements,
+    rotation_vector,
+)
 
 SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a region of no extent can be met
 TIGHT = 0.005  # [m] or [rad]; within smaller tolerances projections aim at the middle, also where others are violated
@@ -264,7 +269,7 @@ def first_violated(conditions, drive, states):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _edge_holds(conditions, drive, start, end, step, state, workspace):  # type: ignore[no-untyped-def]
-    """Whether the conditions hold along an edge, behind its start; its middle is looked at first."""
+    """Whether the conditions hold along an edge, behind its start; its middle is checked first."""
     widest = 0.0
     for joint in range(len(start)):
         widest = max(widest, abs(end[joint] - start[joint]))
@@ -447,36 +452,13 @@ def _add_gradients(conditions, drive, item, count, first, workspace, rates, want
 
 @njit(cache=True, nogil=True)
 def _write_step(rates, wanted, count, free, square, solved, step):  # type: ignore[no-untyped-def]
-    """Solves min |R step - wanted|^2 + damping |step|^2 over the free joints: Cholesky factor of R R^T + damping."""
-    width = rates.shape[1]
-    for row in range(count):
-        for column in range(row + 1):
-            value = DAMPING if row == column else 0.0
-            for joint in range(width):
-                if free[joint]:
-                    value += rates[row, joint] * rates[column, joint]
-            for inner in range(column):
-                value -= square[row, inner] * square[column, inner]
-            square[row, column] = np.sqrt(max(value, 1e-30)) if row == column else value / square[column, column]
-    for row in range(count):
-        value = wanted[row]
-        for inner in range(row):
-            value -= square[row, inner] * solved[inner]
-        solved[row] = value / square[row, row]
-    for row in range(count - 1, -1, -1):
-        value = solved[row]
-        for inner in range(row + 1, count):
-            value -= square[inner, row] * solved[inner]
-        solved[row] = value / square[row, row]
+    """Writes the least-squares step of the free joints, in which none goes farther than WIDEST_STEP."""
+    damped_step(rates, wanted, count, DAMPING, free, step, square, solved)
     widest = 1.0e-12
-    for joint in range(width):
-        step[joint] = 0.0
-        if free[joint]:
-            for row in range(count):
-                step[joint] += rates[row, joint] * solved[row]
+    for joint in range(len(step)):
         widest = max(widest, abs(step[joint]))
     share = min(1.0, WIDEST_STEP / widest)
-    for joint in range(width):
+    for joint in range(len(step)):
         step[joint] *= share
 
 

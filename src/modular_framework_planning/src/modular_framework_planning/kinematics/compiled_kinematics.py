@@ -191,12 +191,30 @@ def pose_error(
 
 
 @njit(cache=True, nogil=True)
-def _damped_step(
-    jacobian: Array, error: Array, damping: float, free: NDArray[np.bool_], step: Array, square: Array, solved: Array
+def damped_step(
+    jacobian: Array,
+    error: Array,
+    rows: int,
+    damping: float,
+    free: NDArray[np.bool_],
+    step: Array,
+    square: Array,
+    solved: Array,
 ) -> None:
-    """Solves min |J step - error|^2 + damping |step|^2 over the free joints by a Cholesky factor of J J^T + damping."""
+    """Solves min |J step - error|^2 + damping |step|^2 over the free joints by a Cholesky factor of J J^T + damping.
+
+    Args:
+        jacobian: J, shape (rows or more, joints).
+        error: shape (rows or more,).
+        rows: how many of them count.
+        damping: see above.
+        free: which joints may move, shape (joints,); the others get a step of 0.
+        step: filled, shape (joints,).
+        square: working memory, shape (rows or more, rows or more).
+        solved: working memory, shape (rows or more,).
+    """
     width = jacobian.shape[1]
-    for row in range(POSE_SIZE):
+    for row in range(rows):
         for column in range(row + 1):
             value = damping if row == column else 0.0
             for joint in range(width):
@@ -205,20 +223,20 @@ def _damped_step(
             for inner in range(column):
                 value -= square[row, inner] * square[column, inner]
             square[row, column] = np.sqrt(max(value, 1e-30)) if row == column else value / square[column, column]
-    for row in range(POSE_SIZE):
+    for row in range(rows):
         value = error[row]
         for inner in range(row):
             value -= square[row, inner] * solved[inner]
         solved[row] = value / square[row, row]
-    for row in range(POSE_SIZE - 1, -1, -1):
+    for row in range(rows - 1, -1, -1):
         value = solved[row]
-        for inner in range(row + 1, POSE_SIZE):
+        for inner in range(row + 1, rows):
             value -= square[inner, row] * solved[inner]
         solved[row] = value / square[row, row]
     for joint in range(width):
         step[joint] = 0.0
         if free[joint]:
-            for row in range(POSE_SIZE):
+            for row in range(rows):
                 step[joint] += jacobian[row, joint] * solved[row]
 
 
@@ -248,7 +266,7 @@ def converge(
         damping = min(1.0e-3, 0.1 * size * size) + 1.0e-14
         free[:] = True
         for _attempt in range(2):
-            _damped_step(jacobian, error, damping, free, step, square, solved)
+            damped_step(jacobian, error, POSE_SIZE, damping, free, step, square, solved)
             blocked = False
             for joint in range(width):
                 if free[joint] and (
@@ -337,7 +355,7 @@ def approach_seed(
             error[row] = 0.0
             for joint in range(width):
                 error[row] += jacobian[row, joint] * towards_seed[joint]
-        _damped_step(jacobian, error, 1.0e-9, free, back, square, solved)
+        damped_step(jacobian, error, POSE_SIZE, 1.0e-9, free, back, square, solved)
         trial = values.copy()
         widest = 0.0
         for joint in range(width):

@@ -53,7 +53,7 @@ class TrajectoryValidator:
                     ),
                     "",
                 )
-                text = text or _violation(problem, path)
+                text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
         if not text:
             self._passed[key] = problem.checker
         return text
@@ -97,11 +97,10 @@ def _require_time(problem: PlanningProblem) -> None:
         )
 
 
-def _violation(problem: PlanningProblem, path: PlannedPath) -> str:
-    if problem.constraints is None or path.trajectory is None:
+def _violation(problem: PlanningProblem, samples: Array) -> str:
+    if problem.constraints is None:
         return ""
-    samples = path.trajectory.curve(problem.settings.motion_step)
-    states = problem.motion.full_path(samples[_sample_at(samples, path, path.unconstrained) :])
+    states = problem.motion.full_path(samples)
     number = problem.constraints.first_violated(states)
     if number < 0:
         return ""

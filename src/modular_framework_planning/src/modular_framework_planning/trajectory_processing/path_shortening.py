@@ -12,7 +12,9 @@ import numpy as np
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 
+LEAST_GAIN = 0.01  # of a cut, as a share of the path's length
 EdgeTest = Callable[[Array, Array], bool]
+Join = Callable[[Array, Array, float], Array | None]
 
 
 def path_length(path: Array) -> float:
@@ -48,19 +50,19 @@ def _point_at(path: Array, lengths: list[float], position: float) -> tuple[int, 
     return number, path[number] + share * (path[number + 1] - path[number])
 
 
-def cut_corners(
+def cut_pieces(
     path: Array,
-    edge_is_free: EdgeTest,
+    join: Join,
     deadline: float,
     rng: np.random.Generator,
     attempts: int = 60,
     patience: int = 20,
 ) -> Array:
-    """Joins random pairs of points of the path directly where that is shorter and free.
+    """Joins random pairs of points of the path by shorter pieces.
 
     Args:
         path: polyline of shape (n, joints).
-        edge_is_free: whether the straight motion between two points is free.
+        join: gives a valid polyline between two points, both included, that is no longer than a length; or None.
         deadline: monotonic time [s] at which to stop.
         rng: source of the random choices.
         attempts: most tries.
@@ -73,13 +75,23 @@ def cut_corners(
         low, high = sorted(rng.uniform(0.0, lengths[-1], 2).tolist())
         first, start = _point_at(path, lengths, low)
         last, end = _point_at(path, lengths, high)
-        gain = (high - low) - float(np.linalg.norm(end - start))
-        if first == last or gain < 0.01 * lengths[-1] or not edge_is_free(start, end):
+        piece = None if first == last else join(start, end, high - low - LEAST_GAIN * lengths[-1])
+        if piece is None:
             failures += 1
             continue
-        path = np.vstack([path[: first + 1], start, end, path[last + 1 :]])
+        path = np.vstack([path[: first + 1], piece, path[last + 1 :]])
         failures, lengths = 0, _lengths(path)
-    return without_repeats(path)
+    return path
+
+
+def cut_corners(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator) -> Array:
+    """Joins random pairs of points of the path directly where that is shorter and free; see cut_pieces."""
+
+    def straight(start: Array, end: Array, longest: float) -> Array | None:
+        is_short = float(np.linalg.norm(end - start)) <= longest
+        return np.array([start, end]) if is_short and edge_is_free(start, end) else None
+
+    return without_repeats(cut_pieces(path, straight, deadline, rng))
 
 
 def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:

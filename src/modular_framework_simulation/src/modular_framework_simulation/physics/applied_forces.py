@@ -66,7 +66,7 @@ class JointEffort:
 class AppliedForces:
     """What acts on the world besides gravity, contacts and the drives of the robot; used by one thread.
 
-    The engine drops forces after each step, so they are applied anew before every one.
+    The engine drops forces after each step, so they are applied again before every one.
 
     Args:
         engine: Where they act.

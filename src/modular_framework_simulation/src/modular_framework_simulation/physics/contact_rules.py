@@ -23,7 +23,7 @@ import numpy as np
 _FRICTION_POINTER = "gCalculateCombinedFrictionCallback"
 _RESTITUTION_POINTER = "gCalculateCombinedRestitutionCallback"
 _EXPORTED = "b3ChangeDynamicsInfoSetLateralFriction"
-"""A function that the dynamic linker knows, too: it tells where the library was loaded."""
+"""A function that the dynamic linker knows, too: it shows where the library was loaded."""
 
 _ELF_64 = b"\x7fELF\x02"
 _SYMBOL_TABLE = 2

@@ -103,7 +103,7 @@ def set_inertial(world: PhysicsWorld, link: PartName, inertial: specs.Inertial, 
         else replace(each, inertial=present[each.name])
         for each in model.links
     )
-    _make_anew(world, replace(model, links=links))
+    _recreate(world, replace(model, links=links))
     return True
 
 
@@ -140,7 +140,7 @@ def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None
             else each
             for each in body.spec.joints
         )
-        _make_anew(world, replace(body.spec, joints=joints))
+        _recreate(world, replace(body.spec, joints=joints))
     apply_settings(world.engine, world.body(joint.model), joint.part, change.settings)
 
 
@@ -202,7 +202,7 @@ def _limited(joint: specs.Joint, lower: float, upper: float) -> specs.Joint:
     return replace(joint, kind=specs.JointType.REVOLUTE if turns else joint.kind, lower=lower, upper=upper)
 
 
-def _make_anew(world: PhysicsWorld, model: specs.Model) -> None:
+def _recreate(world: PhysicsWorld, model: specs.Model) -> None:
     settings = dict(world.body(model.name).joint_settings)
     world.replace(model, world.prepare(model))
     for joint, values in settings.items():

@@ -26,7 +26,7 @@ class PhysicsSettings:
         friction_erp: Share of a slip that is taken back in one step where surfaces stick. Friction alone only stops
             the velocity, and what the solver leaves of it adds up. Touches on fingers therefore remember where they
             began (friction anchors of the engine), and are drawn back there while the force is within the friction
-            cone. The engine keeps the normal of such a touch, too: in a hand that turns, it begins anew now and then.
+            cone. The engine keeps the normal of such a touch, too: in a hand that turns, it begins again now and then.
         contact_reach: How near surfaces are that may touch in the coming step, and how near two touches of the same
             surfaces are that count as one, as a share of the smaller body's radius. The engine's 0.02 joins touches
             that a cube in the hand makes at different places while it shakes: it creeps four times as far as with this.

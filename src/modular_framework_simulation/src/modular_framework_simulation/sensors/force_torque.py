@@ -121,7 +121,7 @@ class JointLoad:
     def start(self) -> None:
         """Lets the engine measure from the next step on; to be called before each measurement."""
         instance = self._world.instance(self._model)
-        if instance != self._instance:  # also after a restart, which makes the body anew
+        if instance != self._instance:  # also after a restart, which creates the body again
             self._instance = instance
             self._find()
             body, engine = self._world.body(self._model), self._world.engine
