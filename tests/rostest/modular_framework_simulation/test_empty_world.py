@@ -22,6 +22,8 @@ PUBLIC_ARGUMENTS = {
     "output", "world_name", "respawn_gazebo", "use_clock_frequency", "pub_clock_frequency", "enable_ros_network",
     "server_required", "gui_required",
 }  # fmt: skip
+STEPS = """<launch><arg name="time_step"/>
+  <include file="$(find modular_framework_simulation)/launch/simulation.launch" pass_all_args="true"/></launch>"""
 LAUNCH = """<launch><include file="$(find gazebo_ros)/launch/empty_world.launch">{}</include></launch>"""
 
 until = functools.partial(wait_until, timeout_s=30.0)
@@ -103,6 +105,17 @@ def test_without_its_ros_network_there_is_only_the_clock(ros_session: Any) -> No
     assert not {"/gazebo/spawn_sdf_model", "/gazebo/set_parameters"} & set(rosservice.get_service_list())
     assert not [name for name, _ in rospy.get_published_topics("/gazebo")]
     launch.stop()
+
+
+def test_the_time_step_is_chosen_and_a_wrong_one_is_refused(ros_session: Any) -> None:
+    launch = ros_session.launch(STEPS, time_step=0.005)
+    ros_session.wait_for_service("/gazebo/get_physics_properties", 40.0)
+    found = rospy.ServiceProxy("/gazebo/get_physics_properties", GetPhysicsProperties)()
+    assert (found.time_step, found.max_update_rate) == pytest.approx((0.005, 200.0))
+    launch.stop()
+    launch = ros_session.launch(STEPS, time_step=1)
+    launch.wait(60.0)
+    assert "parameter ~time_step: got 1 s; allowed: 0.0001 to 0.01 s" in launch.log()
 
 
 def test_a_required_window_that_cannot_be_is_an_error(ros_session: Any, monkeypatch: pytest.MonkeyPatch) -> None:

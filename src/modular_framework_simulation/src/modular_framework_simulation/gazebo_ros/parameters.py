@@ -11,6 +11,7 @@ import rospy
 
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
+from modular_framework_simulation.physics.physics_settings import LONGEST_STEP_NS, SHORTEST_STEP_NS, PhysicsSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,7 @@ class SimulationParameters:
         gui: `~gui`: whether to open a window (false).
         paused: `~paused`: whether to start with time standing still (false).
         real_time_factor: `~real_time_factor`: simulated over real time (1.0; 0 = as fast as possible).
+        time_step_ns: `~time_step`, in seconds there: one step of the physics and of the controllers [ns] (2,000,000).
         wait_for_planning: `/wait_for_planning`: whether nodes may hold time while they compute (false).
         state_digest: `~state_digest`: whether to hash the state of every physics step, for comparisons (false).
         clock_rate_hz: `~pub_clock_frequency`: of /clock, in simulated time; 0 is every step [Hz] (100).
@@ -43,6 +45,7 @@ class SimulationParameters:
     gui: bool
     paused: bool
     real_time_factor: float
+    time_step_ns: int = PhysicsSettings().time_step_ns
     wait_for_planning: bool = False
     state_digest: bool = False
     clock_rate_hz: float = 100.0
@@ -65,6 +68,10 @@ def read_parameters() -> SimulationParameters:
     clock_rate_hz = _read("~pub_clock_frequency", 100, (int, float))
     if not 0 <= clock_rate_hz < math.inf:
         raise ParameterError(f"parameter ~pub_clock_frequency: got {clock_rate_hz}; allowed: 0 (every step) or greater")
+    time_step_ns = _read("~time_step", PhysicsSettings().time_step_s, (int, float)) * 1e9
+    if not SHORTEST_STEP_NS <= time_step_ns <= LONGEST_STEP_NS:
+        allowed = f"{SHORTEST_STEP_NS * 1e-9:g} to {LONGEST_STEP_NS * 1e-9:g} s"
+        raise ParameterError(f"parameter ~time_step: got {time_step_ns * 1e-9:g} s; allowed: {allowed}")
     return SimulationParameters(
         robot_description=_read("/robot_description", "", (str,)),
         model_path=_read("/gazebo_model_path", "", (str,)),
@@ -74,6 +81,7 @@ def read_parameters() -> SimulationParameters:
         gui=_read("~gui", False, (bool,)),
         paused=_read("~paused", False, (bool,)),
         real_time_factor=float(factor),
+        time_step_ns=round(time_step_ns),
         wait_for_planning=_read("/wait_for_planning", False, (bool,)),
         state_digest=_read("~state_digest", False, (bool,)),
         clock_rate_hz=float(clock_rate_hz),

@@ -56,10 +56,10 @@ _SWITCH_INTERVAL_S = 0.0005
 _STOP_TIMEOUT_S = 5.0
 
 
-def _pacer(parameters: SimulationParameters) -> Pacer:
+def _pacer(parameters: SimulationParameters, requests: RequestQueue) -> Pacer:
     """Returns the pacer; between episodes simulated time leaves the processor to nodes that start or compute."""
-    factor = parameters.real_time_factor
-    return Pacer(factor, idle_limit=1.0 if parameters.wait_for_planning else None)
+    idle_limit = 1.0 if parameters.wait_for_planning else None
+    return Pacer(parameters.real_time_factor, sleep=requests.serve, idle_limit=idle_limit)
 
 
 def _resources(model_path: str) -> Resources:
@@ -91,17 +91,18 @@ class SimulationNode:
 
     def __init__(self, parameters: SimulationParameters) -> None:
         self._resources = _resources(parameters.model_path)
-        self._settings = PhysicsSettings()
+        self._settings = PhysicsSettings(parameters.time_step_ns)
         self._parts = ConvexParts(default_cache_folder(), rospy.loginfo)
         self._world = self._build_world(parameters)
         self._controllers: RosControllerManager | None = None
         actors = self._build_robot(parameters)
         self._clock = ClockTopic(self._world)
         self._topics = WorldTopics(self._world) if parameters.ros_network else None
+        requests = RequestQueue()
         self._loop = SimulationLoop(
             self._world,
-            _pacer(parameters),
-            RequestQueue(),
+            _pacer(parameters, requests),
+            requests,
             actors,
             self._on_paused_tick,
             TimeHolds(rospy.logwarn),

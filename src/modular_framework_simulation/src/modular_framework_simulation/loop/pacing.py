@@ -11,6 +11,10 @@ from dataclasses import dataclass
 _LARGEST_DEBT_S = 1.0
 """Longest lag that is caught up [s]; after a longer stall (a suspended machine) the rest is dropped."""
 
+_LEAD_S = 0.008
+"""How far simulated time runs ahead before the loop sleeps [s]: steps that follow each other find their data in the
+processor's caches, so that five steps of 2 ms and one sleep cost less than five of each."""
+
 
 @dataclass(frozen=True, slots=True)
 class PaceReport:
@@ -30,7 +34,7 @@ class PaceReport:
 class Pacer:
     """Sleeps as long as simulated time is ahead of real time.
 
-    A loop that fell behind runs without sleep until it has caught up, so that the average keeps the requested factor.
+    Simulated time is at most 8 ms and a step ahead. A loop that fell behind runs without sleep until it has caught up, so that the average keeps the requested factor.
 
     Args:
         real_time_factor: Simulated over real time; 0 is as fast as possible.
@@ -108,7 +112,7 @@ class Pacer:
         due = self._start_real_s + (simulated_s - self._start_simulated_s) / self._factor
         now = self._clock()
         ahead = due - now
-        if ahead > 0:
+        if ahead > _LEAD_S:
             self._sleep(ahead)
             self._slept_s += self._clock() - now
         elif ahead < -_LARGEST_DEBT_S:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -86,6 +87,13 @@ class RequestQueue:
             except queue.Empty:
                 return
             request.run()
+
+    def serve(self, duration_s: float) -> None:
+        """Carries out what arrives within that time [s]; called by the loop's thread instead of sleeping."""
+        end_s = time.monotonic() + duration_s
+        while (rest_s := end_s - time.monotonic()) > 0:
+            self._arrived.wait(rest_s)
+            self.run_pending()
 
     def wait(self, timeout_s: float) -> None:
         """Waits until something has arrived, at most that long [s]."""
