@@ -40,7 +40,7 @@ def test_the_pacer_holds_simulated_time_back_to_real_time_and_sleeps_seldom() ->
     for step in range(1, 601):
         time.now += 0.0005
         pacer.keep(step * 0.002)
-        assert 0.0 <= step * 0.002 - (time.now - 50.0) <= 0.008 + 1e-9
+        assert -1e-9 <= step * 0.002 - (time.now - 50.0) <= 0.008 + 1e-9
     assert len(sleeps) <= 600 / 5
     report = pacer.report(1.2)
     assert report.factor == pytest.approx(1.0)
@@ -58,7 +58,7 @@ def test_the_pacer_makes_good_a_short_stall_and_forgives_a_long_one() -> None:
     time.now += 60.0
     for step in range(1001, 2001):
         pacer.keep(step * 0.002)
-    assert time.now == pytest.approx(52.0 + 60.0 + 1.0, abs=0.01)
+    assert time.now == pytest.approx(52.0 + 60.0 + 1.0, abs=0.015)
 
 
 def test_a_factor_of_two_runs_twice_as_fast_and_zero_never_sleeps() -> None:

@@ -34,7 +34,8 @@ class PaceReport:
 class Pacer:
     """Sleeps as long as simulated time is ahead of real time.
 
-    Simulated time is at most 8 ms and a step ahead. A loop that fell behind runs without sleep until it has caught up, so that the average keeps the requested factor.
+    Simulated time is at most 8 ms ahead. A loop that fell behind runs without sleep until it has caught up, so that the
+    average keeps the requested factor.
 
     Args:
         real_time_factor: Simulated over real time; 0 is as fast as possible.
