@@ -12,6 +12,7 @@ import pytest
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.engine_choice import PYBULLET
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_urdf.rotations import Vector3
@@ -27,12 +28,18 @@ def convex_parts(tmp_path_factory: pytest.TempPathFactory) -> ConvexParts:
 
 
 @pytest.fixture
-def make_world(convex_parts: ConvexParts) -> Iterator[Callable[..., PhysicsWorld]]:
+def engine() -> str:
+    """The physics engine of the worlds; modules that test several have a fixture of their own."""
+    return PYBULLET
+
+
+@pytest.fixture
+def make_world(convex_parts: ConvexParts, engine: str) -> Iterator[Callable[..., PhysicsWorld]]:
     """Makes worlds with a floor at z = 0 and takes them down at the end."""
     worlds: list[PhysicsWorld] = []
 
     def make(time_step_ns: int = 2_000_000, gravity: Vector3 = (0.0, 0.0, -9.81)) -> PhysicsWorld:
-        world = PhysicsWorld(PhysicsSettings(time_step_ns), convex_parts, gravity)
+        world = PhysicsWorld(PhysicsSettings(time_step_ns), convex_parts, gravity, engine=engine)
         world.spawn(solid("floor", specs.Plane((0, 0, 1), (10, 10)), Pose(), static=True))
         worlds.append(world)
         return world

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 
@@ -29,9 +30,10 @@ def benchmark() -> ModuleType:
     return module
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("thing", ["cube_0.1", "cylinder_0.5", "ball_0.3"])
-def test_an_object_stays_in_a_swinging_hand(benchmark: Any, thing: str) -> None:
-    row = benchmark.measure("ur5_ezgripper", thing, 5.0, PhysicsSettings())
+def test_an_object_stays_in_a_swinging_hand(benchmark: Any, thing: str, engine: str) -> None:
+    row = benchmark.measure("ur5_ezgripper", thing, 5.0, PhysicsSettings(), engine)
     assert row.held
     assert row.worst_mm < 0.5
     assert thing.startswith("ball") or row.worst_deg < 1.0

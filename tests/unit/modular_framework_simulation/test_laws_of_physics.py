@@ -15,6 +15,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
@@ -26,6 +27,13 @@ BALL = specs.Sphere(0.03)
 STEPS_NS = (1_000_000, 2_000_000, 4_166_667)
 
 MakeWorld = Callable[..., PhysicsWorld]
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    """The laws are those of every engine."""
+    name: str = request.param
+    return name
 
 
 def surface(mu: float = 1.0, bounce: float = 0.0, kp: float | None = None) -> specs.Collision:
@@ -288,16 +296,14 @@ def test_a_time_step_out_of_range_is_refused(step_ns: int) -> None:
 def joint_state(world: PhysicsWorld, model: str, joint: str) -> tuple[float, float]:
     """Position and velocity of a joint, from the engine."""
     body = world.body(model)
-    state = world.engine.api.getJointState(body.number, body.joint_indices[joint], physicsClientId=world.engine.client)
-    return float(state[0]), float(state[1])
+    (state,) = world.engine.joint_states(body.number, [body.joint_indices[joint]])
+    return state.position, state.velocity
 
 
 def set_joint_velocity(world: PhysicsWorld, model: str, joint: str, velocity: float) -> None:
     """Gives a joint a velocity."""
     body = world.body(model)
-    world.engine.api.resetJointState(
-        body.number, body.joint_indices[joint], 0.0, velocity, physicsClientId=world.engine.client
-    )
+    world.engine.set_joint_state(body.number, body.joint_indices[joint], 0.0, velocity)
 
 
 def test_a_model_with_a_ball_joint_has_damped_joints_and_springs_too(world: PhysicsWorld) -> None:

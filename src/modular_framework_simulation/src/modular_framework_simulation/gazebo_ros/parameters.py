@@ -12,6 +12,7 @@ import rospy
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
 from modular_framework_simulation.physics.physics_settings import LONGEST_STEP_NS, SHORTEST_STEP_NS, PhysicsSettings
+from modular_framework_simulation.physics.engine_choice import ENGINES, PYBULLET
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,7 @@ class SimulationParameters:
         gui_required: `~gui_required`: whether to end without a window (false).
         verbose: `~verbose`: whether to log details too (false).
         unsupported: `~unsupported`: arguments of a launch file that have no effect here, for a warning.
+        physics_engine: `~physics_engine`: which engine moves the bodies [pybullet, mujoco] (pybullet).
     """
 
     robot_description: str
@@ -53,6 +55,7 @@ class SimulationParameters:
     gui_required: bool = False
     verbose: bool = False
     unsupported: str = ""
+    physics_engine: str = PYBULLET
 
 
 def read_parameters() -> SimulationParameters:
@@ -89,7 +92,17 @@ def read_parameters() -> SimulationParameters:
         gui_required=_read("~gui_required", False, (bool,)),
         verbose=_read("~verbose", False, (bool,)),
         unsupported=_read("~unsupported", "", (str,)),
+        physics_engine=_physics_engine(),
     )
+
+
+def _physics_engine() -> str:
+    name: str = _read("~physics_engine", PYBULLET, (str,))
+    if name not in ENGINES:
+        raise ParameterError(
+            f"parameter {rospy.resolve_name('~physics_engine')}: got '{name}'; allowed: {', '.join(ENGINES)}"
+        )
+    return name
 
 
 def _read(name: str, default: Any, kinds: tuple[type, ...]) -> Any:

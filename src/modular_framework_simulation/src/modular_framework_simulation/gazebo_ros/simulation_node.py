@@ -133,12 +133,14 @@ class SimulationNode:
             spec = read_world(file, self._resources)
             if spec.ignored:
                 rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))
-        world = PhysicsWorld(self._settings, self._parts, spec.gravity, parameters.gui, rospy.logwarn)
+        engine = parameters.physics_engine
+        world = PhysicsWorld(self._settings, self._parts, spec.gravity, parameters.gui, rospy.logwarn, engine)
         if parameters.gui_required and not world.engine.has_window:
             raise SimulationError("~gui_required is true and there is no window; set it to false to run without one")
         for model in spec.models:
             world.spawn(model, keep=True)
-        rospy.loginfo("world '%s' with %d models: %s", spec.name, len(spec.models), ", ".join(world.names()) or "none")
+        names = ", ".join(world.names()) or "none"
+        rospy.loginfo("world '%s' with %d models, physics engine %s: %s", spec.name, len(spec.models), engine, names)
         return world
 
     def _build_robot(self, parameters: SimulationParameters) -> Actors | None:

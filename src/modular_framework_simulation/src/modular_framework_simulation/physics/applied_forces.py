@@ -63,6 +63,14 @@ class JointEffort:
     interval: Interval
 
 
+@dataclass(frozen=True, slots=True)
+class SavedForces:
+    """A copy of what acts and will act."""
+
+    wrenches: tuple[LinkWrench, ...]
+    efforts: tuple[JointEffort, ...]
+
+
 class AppliedForces:
     """What acts on the world besides gravity, contacts and the drives of the robot; used by one thread.
 
@@ -100,6 +108,14 @@ class AppliedForces:
     def clear(self) -> None:
         """Ends all wrenches and efforts."""
         self._wrenches, self._efforts = [], []
+
+    def saved(self) -> SavedForces:
+        """Returns a copy of all wrenches and efforts."""
+        return SavedForces(tuple(self._wrenches), tuple(self._efforts))
+
+    def restore(self, saved: SavedForces) -> None:
+        """Continues with the wrenches and efforts of a copy."""
+        self._wrenches, self._efforts = list(saved.wrenches), list(saved.efforts)
 
     def forget_model(self, model: str) -> None:
         """Ends everything that has to do with a model that is gone."""

@@ -13,7 +13,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.physics.joint_resistance import inverse_mass_matrix
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX, PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
-from modular_framework_urdf.rotations import Vector3
+from modular_framework_urdf.rotations import Quaternion, Vector3
 
 _DECAY_STEP_S = 1e-3
 """A decay takes a share of the velocity in every step of Gazebo [s]; that is its default step."""
@@ -65,15 +65,14 @@ class _Spring:
     def apply(self, gravity: Vector3) -> None:
         """Pulls the joint towards its reference."""
         del gravity
-        api, client, step_s = self.engine.api, self.engine.client, self.engine.settings.time_step_s
-        index = self.body.joint_indices[self.joint]
-        position, velocity, *_ = api.getJointState(self.body.number, index, physicsClientId=client)
+        step_s, index = self.engine.settings.time_step_s, self.body.joint_indices[self.joint]
+        ((position, velocity, _),) = self.engine.joint_states(self.body.number, [index])
         stretch, stiffness = position - self.dynamics.spring_reference, self.dynamics.spring_stiffness
         # As it is at the start of the step the force keeps the energy of a vibration; a spring that is too stiff for
         # that (its vibration is not much slower than the steps) is taken as it will be at the end.
         stiff = stiffness * step_s * step_s * self.mobility
         force = -stiffness * (stretch if stiff < 1.0 else (stretch + step_s * velocity) / (1.0 + stiff))
-        api.setJointMotorControl2(self.body.number, index, api.TORQUE_CONTROL, force=force, physicsClientId=client)
+        self.engine.apply_effort(self.body.number, index, force)
 
 
 class _OnLink:
@@ -81,30 +80,24 @@ class _OnLink:
 
     def __init__(self, engine: PhysicsEngine, body: SimulatedBody, index: int) -> None:
         self._engine, self._body, self._index = engine, body, index
-        dynamics = engine.api.getDynamicsInfo(body.number, index, physicsClientId=engine.client)
-        self._mass, self._moments = float(dynamics[0]), np.array(dynamics[2])
+        present = engine.mass_properties(body.number, index)
+        self._mass, self._moments = float(present.mass), np.array(present.moments)
 
     def _motion(self) -> tuple[Vector3, np.ndarray, np.ndarray, np.ndarray]:
         """Returns position, axes, velocity and angular velocity of the centre of mass in the world."""
-        api, client, number = self._engine.api, self._engine.client, self._body.number
+        number = self._body.number
         if self._index == BASE_INDEX:
-            position, quaternion = api.getBasePositionAndOrientation(number, physicsClientId=client)
-            linear, angular = api.getBaseVelocity(number, physicsClientId=client)
+            centre = self._engine.base_centre(number)
+            linear, angular = self._engine.base_twist(number)
         else:
-            state = api.getLinkState(number, self._index, 1, 1, physicsClientId=client)
-            position, quaternion, linear, angular = state[0], state[1], state[6], state[7]
-        axes = np.array(api.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-        return position, axes, np.array(linear), np.array(angular)
+            centre, _, linear, angular = self._engine.link_motion(number, self._index)
+        return centre.position, _rotation_matrix(centre.quaternion), np.array(linear), np.array(angular)
 
     def _push(self, position: Vector3, force: np.ndarray) -> None:
-        api = self._engine.api
-        point, push = position, force.tolist()
-        api.applyExternalForce(
-            self._body.number, self._index, push, point, api.WORLD_FRAME, physicsClientId=self._engine.client
-        )
+        self._engine.apply_force(self._body.number, self._index, force.tolist(), position)
 
     def _turn(self, position: Vector3, torque: np.ndarray) -> None:
-        """Lets two forces turn the link: the engine's function for torques mistakes the frame of some links."""
+        """Lets two forces turn the link: PyBullet's function for torques mistakes the frame of some links."""
         size = float(np.linalg.norm(torque))
         if size > 0.0:
             arm = np.cross(torque, np.eye(3)[np.argmin(np.abs(torque))])
@@ -140,3 +133,20 @@ class _Buoyancy(_OnLink):
         """Pushes the link up."""
         position, *_ = self._motion()
         self._push(position, -self._mass * np.array(gravity))
+
+
+def _rotation_matrix(quaternion: Quaternion) -> np.ndarray:
+    """Returns the rotation of a quaternion (xyzw) of any length, 3 x 3."""
+    x, y, z, w = quaternion
+    scale = 2.0 / (x * x + y * y + z * z + w * w)
+    xs, ys, zs = x * scale, y * scale, z * scale
+    wx, wy, wz = w * xs, w * ys, w * zs
+    xx, xy, xz = x * xs, x * ys, x * zs
+    yy, yz, zz = y * ys, y * zs, z * zs
+    return np.array(
+        [
+            [1.0 - (yy + zz), xy - wz, xz + wy],
+            [xy + wz, 1.0 - (xx + zz), yz - wx],
+            [xz - wy, yz + wx, 1.0 - (xx + yy)],
+        ]
+    )

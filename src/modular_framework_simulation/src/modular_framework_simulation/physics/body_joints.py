@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from modular_framework_simulation.errors import UnknownEntityError
-from modular_framework_simulation.physics.physics_engine import PhysicsEngine
+from modular_framework_simulation.physics.physics_engine import JointKind, PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import JointSettings, SimulatedBody
 
 
@@ -56,29 +55,20 @@ def measured_joint(engine: PhysicsEngine, body: SimulatedBody, joint: str) -> Jo
     Raises:
         UnknownEntityError: The model has no such joint.
     """
-    api, tree = engine.api, tree_with_joint(body, joint)
+    tree = tree_with_joint(body, joint)
     index = tree.joint_indices[joint]
-    info = api.getJointInfo(tree.number, index, physicsClientId=engine.client)
-    state = api.getJointState(tree.number, index, physicsClientId=engine.client)
-    lower, upper = info[8], info[9]
-    if lower > upper:  # the engine's way to say that there are none
-        lower, upper = -math.inf, math.inf
+    info, (state,) = engine.joints(tree.number)[index], engine.joint_states(tree.number, [index])
     damping = body.joint_settings.get(joint, JointSettings()).damping or 0.0  # the engine has no way to say it
     if body.spec is not None:
         damping = next(each.dynamics.damping for each in body.spec.joints if each.name == joint)
-    return JointMeasurement(state[0], state[1], damping, lower, upper, info[2] == api.JOINT_PRISMATIC)
+    prismatic = info.kind is JointKind.PRISMATIC
+    return JointMeasurement(state.position, state.velocity, damping, info.lower, info.upper, prismatic)
 
 
 def apply_effort(engine: PhysicsEngine, body: SimulatedBody, joint: str, effort: float) -> None:
     """Lets an effort act on a joint in the coming physics step, besides that of its drive [Nm or N]."""
     tree = tree_with_joint(body, joint)
-    engine.api.setJointMotorControl2(
-        tree.number,
-        tree.joint_indices[joint],
-        engine.api.TORQUE_CONTROL,
-        force=effort,
-        physicsClientId=engine.client,
-    )
+    engine.apply_effort(tree.number, tree.joint_indices[joint], effort)
 
 
 def apply_settings(engine: PhysicsEngine, body: SimulatedBody, joint: str, settings: JointSettings) -> None:
@@ -90,7 +80,7 @@ def apply_settings(engine: PhysicsEngine, body: SimulatedBody, joint: str, setti
     tree = tree_with_joint(body, joint)
     number, index = tree.number, tree.joint_indices[joint]
     if settings.damping is not None and body.spec is None:  # of a model it is in the description
-        engine.api.changeDynamics(number, index, jointDamping=settings.damping, physicsClientId=engine.client)
+        engine.set_joint_damping(number, index, settings.damping)
     before = body.joint_settings.get(joint, JointSettings())
     merged = JointSettings(
         before.damping if settings.damping is None else settings.damping,
@@ -98,14 +88,7 @@ def apply_settings(engine: PhysicsEngine, body: SimulatedBody, joint: str, setti
         before.motor_effort if settings.motor_effort is None else settings.motor_effort,
     )
     if merged.motor_effort is not None:
-        engine.api.setJointMotorControl2(
-            number,
-            index,
-            engine.api.VELOCITY_CONTROL,
-            targetVelocity=merged.motor_velocity or 0.0,
-            force=merged.motor_effort,
-            physicsClientId=engine.client,
-        )
+        engine.set_velocity_motor(number, index, merged.motor_velocity or 0.0, merged.motor_effort)
     body.joint_settings[joint] = merged
 
 
@@ -114,12 +97,10 @@ def copy_joint_motion(engine: PhysicsEngine, source: SimulatedBody, target: Simu
 
     Joints that are then beyond a limit are put there, at rest.
     """
-    api, client = engine.api, engine.client
     for joint, index in target.joint_indices.items():
         was, bounds = measured_joint(engine, source, joint), measured_joint(engine, target, joint)
         position = min(max(was.position, bounds.lower), bounds.upper)
         velocity = was.velocity if position == was.position else 0.0
-        api.resetJointState(target.number, index, position, velocity, physicsClientId=client)
+        engine.set_joint_state(target.number, index, position, velocity)
     for index in target.ball_joint_indices:
-        turn, rate = api.getJointStateMultiDof(source.number, index, physicsClientId=client)[:2]
-        api.resetJointStateMultiDof(target.number, index, turn, rate, physicsClientId=client)
+        engine.set_ball_joint_state(target.number, index, *engine.ball_joint_state(source.number, index))

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from modular_framework_simulation.errors import UnknownEntityError
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import Inertial
-from modular_framework_simulation.physics.physics_engine import BASE_INDEX, PhysicsEngine
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX, MassProperties, PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody, cross
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
@@ -32,23 +31,18 @@ def centre_in_world(engine: PhysicsEngine, body: SimulatedBody, link: str) -> Po
     tree = tree_with_link(body, link)
     index = tree.link_indices[link]
     if index == BASE_INDEX:
-        return Pose(*engine.api.getBasePositionAndOrientation(tree.number, physicsClientId=engine.client))
-    record = engine.api.getLinkState(tree.number, index, 0, 1, physicsClientId=engine.client)
-    return Pose(record[0], record[1])
+        return engine.base_centre(tree.number)
+    return engine.link_motion(tree.number, index).centre
 
 
 def link_mass(engine: PhysicsEngine, body: SimulatedBody, link: str) -> float:
     """Returns the mass of a link [kg]; the engine has 0 for one that is fastened to the world."""
-    mass: float = _dynamics(engine, body, link)[0]
-    return mass
+    return _mass_properties(engine, body, link).mass
 
 
-def _dynamics(engine: PhysicsEngine, body: SimulatedBody, link: str) -> tuple[Any, ...]:
+def _mass_properties(engine: PhysicsEngine, body: SimulatedBody, link: str) -> MassProperties:
     tree = tree_with_link(body, link)
-    record: tuple[Any, ...] = engine.api.getDynamicsInfo(
-        tree.number, tree.link_indices[link], physicsClientId=engine.client
-    )
-    return record
+    return engine.mass_properties(tree.number, tree.link_indices[link])
 
 
 def measured_inertial(engine: PhysicsEngine, body: SimulatedBody, link: str) -> Inertial:
@@ -61,11 +55,11 @@ def measured_inertial(engine: PhysicsEngine, body: SimulatedBody, link: str) -> 
         described = next((each.inertial for each in body.spec.links if each.name == link), None)
     if body.static and body.spec is not None:
         return described or Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))  # SDF's defaults
-    record = _dynamics(engine, body, link)
-    if record[0] == 0.0 and described is not None:
+    present = _mass_properties(engine, body, link)
+    if present.mass == 0.0 and described is not None:
         return described
     centre = body.link_state(link).pose.inverse() @ centre_in_world(engine, body, link)
-    return Inertial(Pose(centre.position), record[0], _rotated(record[2], centre))
+    return Inertial(Pose(centre.position), present.mass, _rotated(present.moments, centre))
 
 
 def _rotated(moments: Vector3, axes: Pose) -> tuple[float, float, float, float, float, float]:
@@ -81,7 +75,7 @@ def _rotated(moments: Vector3, axes: Pose) -> tuple[float, float, float, float, 
 def apply_wrench(engine: PhysicsEngine, body: SimulatedBody, link: str, force: Vector3, torque: Vector3) -> None:
     """Lets a force and a torque act on a link in the coming physics step.
 
-    The engine's function for torques mistakes the frame of some links, so a torque is applied as two forces.
+    PyBullet's function for torques mistakes the frame of some links, so a torque is applied as two forces.
 
     Args:
         engine: Where the body lives.
@@ -96,9 +90,7 @@ def apply_wrench(engine: PhysicsEngine, body: SimulatedBody, link: str, force: V
         arm, pull = couple(torque)
         parts += [(_sum(centre, arm, 0.5), pull), (_sum(centre, arm, -0.5), (-pull[0], -pull[1], -pull[2]))]
     for point, push in parts:
-        engine.api.applyExternalForce(
-            tree.number, tree.link_indices[link], push, point, engine.api.WORLD_FRAME, physicsClientId=engine.client
-        )
+        engine.apply_force(tree.number, tree.link_indices[link], push, point)
 
 
 def couple(torque: Vector3) -> tuple[Vector3, Vector3]:

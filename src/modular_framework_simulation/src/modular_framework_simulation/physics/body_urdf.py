@@ -46,20 +46,21 @@ class BodyUrdf:
     further: tuple[BodyUrdf, ...] = ()
 
 
-def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: bool) -> BodyUrdf:
+def model_to_urdf(model: specs.Model, convex_parts: ConvexParts, with_visuals: bool, concave: bool = True) -> BodyUrdf:
     """Translates a model.
 
     Args:
         model: What to translate; its pose plays no role.
         convex_parts: Cuts meshes for the engine.
         with_visuals: Whether visual shapes are written, for a window.
+        concave: Whether meshes of a static model keep their shape; convex parts stand for them otherwise.
 
     Raises:
         DescriptionError: A mesh cannot be used.
     """
     writer = _Writer(convex_parts, with_visuals)
     if model.static:
-        shapes = [writer.shapes(link, link.pose, exact=True) for link in model.links]
+        shapes = [writer.shapes(link, link.pose, exact=concave) for link in model.links]
         body = f'<link name="{STATIC_LINK}">{"".join(shapes)}</link>'
         return BodyUrdf(_robot(model.name, [body]), Pose(), True, {})
     first, *further = [_tree_to_urdf(model, tree, writer) for tree in joint_trees(model)]

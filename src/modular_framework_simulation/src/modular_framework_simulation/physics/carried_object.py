@@ -36,17 +36,13 @@ class CarriedObject:
 
     def before_step(self) -> None:
         """Remembers where hand and object are."""
-        api, client = self._engine.api, self._engine.client
-        record = api.getLinkState(self._robot, self._palm, 0, 1, physicsClientId=client)
-        self._palm_before = Pose(record[0], record[1])
-        self._before = Pose(*api.getBasePositionAndOrientation(self._thing, physicsClientId=client))
+        self._palm_before = self._engine.link_motion(self._robot, self._palm).centre
+        self._before = self._engine.base_centre(self._thing)
         self._thing_in_palm = self._palm_before.inverse() @ self._before
 
     def after_step(self) -> None:
         """Moves the object by what the hand's motion differs from its tangent."""
-        api, client = self._engine.api, self._engine.client
-        record = api.getLinkState(self._robot, self._palm, 1, 1, physicsClientId=client)
-        palm, linear, angular = Pose(record[0], record[1]), record[6], record[7]
+        palm, _, linear, angular = self._engine.link_motion(self._robot, self._palm)
         carried = palm @ self._thing_in_palm
         lever = _difference(carried.position, palm.position)
         step_s = self._engine.settings.time_step_s
@@ -56,12 +52,11 @@ class CarriedObject:
         shift = _difference((tangent[0], tangent[1], tangent[2]), _difference(carried.position, self._before.position))
         turned = _rotation_vector((palm @ self._palm_before.inverse()).quaternion)
         turn = _difference((step_s * angular[0], step_s * angular[1], step_s * angular[2]), turned)
-        pose = Pose(*api.getBasePositionAndOrientation(self._thing, physicsClientId=client))
-        twist = api.getBaseVelocity(self._thing, physicsClientId=client)
+        pose, twist = self._engine.base_centre(self._thing), self._engine.base_twist(self._thing)
         x, y, z = (a + b for a, b in zip(pose.position, shift, strict=True))
         rotated = Pose((0.0, 0.0, 0.0), _small_rotation(turn)) @ Pose((0.0, 0.0, 0.0), pose.quaternion)
-        api.resetBasePositionAndOrientation(self._thing, (x, y, z), rotated.quaternion, physicsClientId=client)
-        api.resetBaseVelocity(self._thing, *twist, physicsClientId=client)  # the line above sets it to 0
+        self._engine.set_base_centre(self._thing, Pose((x, y, z), rotated.quaternion))
+        self._engine.set_base_twist(self._thing, *twist)  # the line above sets it to 0
 
 
 def _difference(a: Vector3, b: Vector3) -> Vector3:

@@ -29,19 +29,9 @@ def set_joint_resistance(engine: PhysicsEngine, body: SimulatedBody, dynamics: M
     wanted = {name: dynamics[name].damping for name in body.joint_indices if name in dynamics}
     damping = stable_damping(engine, body, wanted) if any(wanted.values()) else {}
     for name, index in body.joint_indices.items():
-        engine.api.changeDynamics(
-            body.number, index, jointDamping=damping.get(name, 0.0), physicsClientId=engine.client
-        )
-        # Coulomb friction is a motor that holds the joint as strongly as that. Without one, the engine's own would.
-        engine.api.setJointMotorControl2(
-            body.number,
-            index,
-            engine.api.VELOCITY_CONTROL,
-            targetVelocity=0.0,
-            velocityGain=1.0,
-            force=dynamics[name].friction if name in dynamics else 0.0,
-            physicsClientId=engine.client,
-        )
+        engine.set_joint_damping(body.number, index, damping.get(name, 0.0))
+        # Coulomb friction is a motor that holds the joint as strongly as that. Without one, PyBullet's own would.
+        engine.set_velocity_motor(body.number, index, 0.0, dynamics[name].friction if name in dynamics else 0.0)
 
 
 def stable_damping(engine: PhysicsEngine, body: SimulatedBody, damping: Mapping[str, float]) -> dict[str, float]:
@@ -75,8 +65,5 @@ def inverse_mass_matrix(engine: PhysicsEngine, body: SimulatedBody) -> npt.NDArr
     indices = list(body.joint_indices.values())
     if body.ball_joint_indices:
         return np.zeros((len(indices), len(indices)))
-    states = engine.api.getJointStates(body.number, indices, physicsClientId=engine.client)
-    positions = [state[0] for state in states]
-    matrix = np.array(engine.api.calculateMassMatrix(body.number, positions, physicsClientId=engine.client))
-    inverse: npt.NDArray[np.float64] = np.linalg.inv(matrix)[-len(indices) :, -len(indices) :]
-    return inverse
+    inverse: npt.NDArray[np.float64] = np.linalg.inv(engine.mass_matrix(body.number, indices)).astype(np.float64)
+    return inverse[-len(indices) :, -len(indices) :]

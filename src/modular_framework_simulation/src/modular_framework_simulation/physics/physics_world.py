@@ -9,22 +9,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
-from modular_framework_simulation.errors import DuplicateModelError, UnknownEntityError
+from modular_framework_simulation.errors import DuplicateModelError, SimulationError, UnknownEntityError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.physics.applied_forces import AppliedForces
+from modular_framework_simulation.physics.applied_forces import AppliedForces, SavedForces
 from modular_framework_simulation.physics.body_forces import BodyForce, forces_of
 from modular_framework_simulation.physics.body_joints import apply_settings, copy_joint_motion
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
 from modular_framework_simulation.physics.carried_object import CarriedObject
+from modular_framework_simulation.physics.engine_choice import PYBULLET, make_engine
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.part_names import SCOPE
-from modular_framework_simulation.physics.physics_engine import BASE_INDEX, Log, PhysicsEngine
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX, Log
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
-from modular_framework_simulation.physics.surfaces import set_surface, surface_of, take_damping_away
+from modular_framework_simulation.physics.surfaces import surface_of
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 WORLD_FRAMES = ("", "world", "map", "/map")
@@ -46,6 +48,25 @@ class Contact:
     distance: float
 
 
+@dataclass(frozen=True, slots=True)
+class WorldState:
+    """A saved state of the world.
+
+    Attributes:
+        engine: What the engine saved.
+        numbers: Its numbers of the bodies, by model.
+        steps: Physics steps until then.
+        time_ns: Simulated time [ns].
+        forces: Of requests.
+    """
+
+    engine: Any
+    numbers: dict[str, tuple[int, ...]]
+    steps: int
+    time_ns: int
+    forces: SavedForces
+
+
 class PhysicsWorld:
     """Models, a robot or two, and simulated time.
 
@@ -55,6 +76,10 @@ class PhysicsWorld:
         gravity: [m/s^2]
         gui: Whether to open a window, if there is a display.
         log: Takes lines of text about what was decided.
+        engine: Name of the physics engine, see `engine_choice`.
+
+    Raises:
+        SimulationError: There is no such engine, or it cannot be used.
     """
 
     def __init__(
@@ -64,10 +89,11 @@ class PhysicsWorld:
         gravity: Vector3 = (0.0, 0.0, -9.8),
         gui: bool = False,
         log: Log = print,
+        engine: str = PYBULLET,
     ) -> None:
         self.settings = settings
         self.gravity = gravity
-        self.engine = PhysicsEngine(settings, gravity, gui, log)
+        self.engine = make_engine(engine, settings, gravity, gui, log)
         self.forces = AppliedForces(self.engine)
         self._initial_physics = (settings, gravity)
         self._convex_parts = convex_parts
@@ -165,7 +191,8 @@ class PhysicsWorld:
         Raises:
             DescriptionError: A mesh cannot be used.
         """
-        return model_to_urdf(model, self._convex_parts, self.engine.has_window)
+        concave = self.engine.takes_concave_meshes
+        return model_to_urdf(model, self._convex_parts, self.engine.has_window, concave)
 
     def spawn(self, model: specs.Model, prepared: BodyUrdf | None = None, keep: bool = False) -> SimulatedBody:
         """Adds a model at its pose.
@@ -225,7 +252,7 @@ class PhysicsWorld:
 
     def _remove(self, body: SimulatedBody) -> None:
         for part in body.parts:
-            self.engine.api.removeBody(part.number, physicsClientId=self.engine.client)
+            self.engine.remove_body(part.number)
             del self._names_by_number[part.number]
             self._forces.pop(part.number, None)
         self._carried = {key: carried for key, carried in self._carried.items() if key[0] != body.name}
@@ -326,13 +353,10 @@ class PhysicsWorld:
 
     def contacts(self, body: SimulatedBody, link_index: int) -> list[Contact]:
         """Returns what touches a link, other links of its own body left out."""
-        points = self.engine.api.getContactPoints(
-            bodyA=body.number, linkIndexA=link_index, physicsClientId=self.engine.client
-        )
         return [
-            Contact(self._names_by_number[point[2]], point[9], point[8])
-            for point in points
-            if point[2] != body.number and point[2] in self._names_by_number
+            Contact(self._names_by_number[touch.other], touch.force, touch.distance)
+            for touch in self.engine.touches(body.number, link_index)
+            if touch.other in self._names_by_number
         ]
 
     def reset_poses(self) -> None:
@@ -370,6 +394,34 @@ class PhysicsWorld:
         self.reset_time()
         self.revision += 1
 
+    def save_state(self) -> WorldState:
+        """Returns the motion of everything, time and forces of requests, to continue from there once or more often.
+
+        Not part of it: controllers and their commands, and settings that requests changed.
+        """
+        forces = self.forces.saved()
+        return WorldState(self.engine.save_state(), self._numbers(), self._steps, self._time_ns, forces)
+
+    def restore_state(self, state: WorldState) -> None:
+        """Continues from a saved state, bit for bit as before.
+
+        Raises:
+            SimulationError: Models came, went or were made anew since.
+        """
+        if state.numbers != self._numbers():
+            raise SimulationError("the models have changed since the state was saved; restore it before they do")
+        self.engine.restore_state(state.engine)
+        self._steps, self._time_ns = state.steps, state.time_ns
+        self.forces.restore(state.forces)
+        self.revision += 1
+
+    def forget_state(self, state: WorldState) -> None:
+        """Frees a saved state, which cannot be restored any more."""
+        self.engine.forget_state(state.engine)
+
+    def _numbers(self) -> dict[str, tuple[int, ...]]:
+        return {name: tuple(part.number for part in body.parts) for name, body in self._bodies.items()}
+
     def reset_time(self) -> None:
         """Starts simulated time at 0 again."""
         self._steps = self._time_ns = 0
@@ -384,10 +436,9 @@ class PhysicsWorld:
         for link in model.links:
             index = body.link_indices.get(STATIC_LINK if model.static else link.name)
             if index is not None and link.collisions:
-                set_surface(engine, body.number, index, surface_of(link.collisions, engine.settings))
-                # The engine's default lets cylinders and meshes float a millimetre above what they stand on.
-                engine.api.changeDynamics(body.number, index, collisionMargin=0.0, physicsClientId=engine.client)
-        take_damping_away(engine, body.number)
+                engine.set_surface(body.number, index, surface_of(link.collisions, engine.settings))
+                engine.remove_margin(body.number, index)
+        engine.remove_velocity_damping(body.number)
         set_joint_resistance(engine, body, {joint.name: joint.dynamics for joint in model.joints})
         if forces := forces_of(engine, body, model):
             self._forces[body.number] = forces

@@ -9,7 +9,6 @@ that it gives way when an object presses against it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -18,9 +17,9 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import RobotDescription, RobotJoint
 from modular_framework_simulation.models.sdf_specs import JointDynamics
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
+from modular_framework_simulation.physics.physics_engine import Surface
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
-from modular_framework_simulation.physics.surfaces import Surface, set_surface, take_damping_away
 
 _POSITION_GAIN = 0.2
 """Share of a position error that a drive corrects within one physics step; velocities are fed forward in full."""
@@ -127,10 +126,10 @@ class RobotBody:
 
     def _load(self) -> None:
         engine = self.world.engine
-        number = engine.load_urdf(self.description.engine_urdf, self._name, True, engine.api.URDF_USE_SELF_COLLISION)
+        number = engine.load_urdf(self.description.engine_urdf, self._name, True, self_collision=True)
         self.body = SimulatedBody(engine, number, self._name, None, True, None)
         self._dynamics = {
-            info[1].decode(): JointDynamics(damping=info[6], friction=info[7]) for info in engine.joint_infos(number)
+            joint.name: JointDynamics(damping=joint.damping, friction=joint.friction) for joint in engine.joints(number)
         }
 
     def _set_up(self) -> None:
@@ -190,9 +189,8 @@ class RobotBody:
 
     def read(self) -> list[JointReading]:
         """Measures all joints; the result is in the order of `joint_names`."""
-        engine = self.world.engine
-        records = engine.api.getJointStates(self.body.number, self._indices, physicsClientId=engine.client)
-        self.readings = [JointReading(record[0], record[1], record[3]) for record in records]
+        records = self.world.engine.joint_states(self.body.number, self._indices)
+        self.readings = [JointReading(*record) for record in records]
         return self.readings
 
     def drive(self, drives: dict[str, Drive]) -> None:
@@ -228,34 +226,16 @@ class RobotBody:
             targets.append(max(position - behind, min(position + ahead, target)))
             velocities.append(velocity)
             efforts.append(effort)
-        self._set_motors(indices, targets, velocities, efforts)
-        self._apply_efforts(drives)
-
-    def _set_motors(
-        self, indices: list[int], targets: Sequence[float], velocities: Sequence[float], efforts: Sequence[float]
-    ) -> None:
         engine = self.world.engine
-        engine.api.setJointMotorControlArray(
-            self.body.number,
-            indices,
-            engine.api.POSITION_CONTROL,
-            targetPositions=targets,
-            targetVelocities=velocities,
-            forces=efforts,
-            positionGains=[_POSITION_GAIN] * len(indices),
-            velocityGains=[1.0] * len(indices),
-            physicsClientId=engine.client,
-        )
+        engine.set_position_motors(self.body.number, indices, targets, velocities, efforts, _POSITION_GAIN)
+        self._apply_efforts(drives)
 
     def _apply_efforts(self, drives: dict[str, Drive]) -> None:
         engine = self.world.engine
         for name, drive in drives.items():
             if drive.mode is Mode.EFFORT:
                 effort = max(-drive.effort_limit, min(drive.effort_limit, drive.command))
-                index = self.body.joint_indices[name]
-                engine.api.setJointMotorControl2(
-                    self.body.number, index, engine.api.TORQUE_CONTROL, force=effort, physicsClientId=engine.client
-                )
+                engine.apply_effort(self.body.number, self.body.joint_indices[name], effort)
 
     def _complete(self, positions: dict[str, float]) -> dict[str, float]:
         unknown = sorted(set(positions) - set(self._rank))
@@ -273,16 +253,11 @@ class RobotBody:
 
     def _limit_self_collisions(self) -> None:
         """Leaves collisions between fingers only: the planner checks the rest of the robot."""
-        engine, number = self.world.engine, self.body.number
-        every = sorted(self.body.link_indices.values())
         fingers = self.fingers
         allowed = {
             frozenset((a, b)) for one in fingers for other in fingers if one is not other for a in one for b in other
         }
-        for i, a in enumerate(every):
-            for b in every[i + 1 :]:
-                enable = int(frozenset((a, b)) in allowed)
-                engine.api.setCollisionFilterPair(number, number, a, b, enable, physicsClientId=engine.client)
+        self.world.engine.set_self_collisions(self.body.number, allowed)
 
     def _set_surfaces(self) -> None:
         engine, settings = self.world.engine, self.world.settings
@@ -294,8 +269,8 @@ class RobotBody:
             surface = pad if on_finger else other
             if link in self.description.frictions:
                 surface = replace(surface, lateral=self.description.frictions[link])
-            set_surface(engine, self.body.number, index, surface, anchored=on_finger)
-        take_damping_away(engine, self.body.number)
+            engine.set_surface(self.body.number, index, surface, anchored=on_finger)
+        engine.remove_velocity_damping(self.body.number)
 
 
 def _role(joint: RobotJoint, description: RobotDescription) -> Role:

@@ -9,7 +9,7 @@ from modular_framework_simulation.errors import UnknownEntityError
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_specs import Model
 from modular_framework_simulation.physics.body_urdf import BodyUrdf
-from modular_framework_simulation.physics.physics_engine import BASE_INDEX, PhysicsEngine
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX, JointKind, PhysicsEngine
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 
@@ -87,17 +87,14 @@ class SimulatedBody:
         frames = tree.frame_in_link if tree is not None else {}
         self._link_in_frame = {link: frame.inverse() for link, frame in frames.items()}
         self.joint_settings: dict[str, JointSettings] = {}
-        api, client = engine.api, engine.client
-        root_name = api.getBodyInfo(number, physicsClientId=client)[0].decode()
-        infos = engine.joint_infos(number)
-        self.link_indices: dict[str, int] = {root_name: BASE_INDEX}
-        self.link_indices.update({info[12].decode(): info[0] for info in infos})
+        joints = engine.joints(number)
+        self.link_indices: dict[str, int] = {engine.root_link(number): BASE_INDEX}
+        self.link_indices.update({joint.child_link: joint.index for joint in joints})
         self.joint_indices: dict[str, int] = {
-            info[1].decode(): info[0] for info in infos if info[2] in (api.JOINT_REVOLUTE, api.JOINT_PRISMATIC)
+            joint.name: joint.index for joint in joints if joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)
         }
-        self.ball_joint_indices = tuple(info[0] for info in infos if info[2] == api.JOINT_SPHERICAL)
-        dynamics = api.getDynamicsInfo(number, BASE_INDEX, physicsClientId=client)
-        self._centre_in_root = Pose(tuple(dynamics[3]), tuple(dynamics[4]))
+        self.ball_joint_indices = tuple(joint.index for joint in joints if joint.kind is JointKind.BALL)
+        self._centre_in_root = engine.mass_properties(number, BASE_INDEX).centre_in_link
         self._root_in_centre = self._centre_in_root.inverse()
 
     @property
@@ -146,11 +143,9 @@ class SimulatedBody:
             centre_in_world, twist = self._centre_state()
             link_in_world = centre_in_world @ self._root_in_centre
             return BodyState(link_in_world, twist_at(twist, centre_in_world, link_in_world))
-        api, client = self._engine.api, self._engine.client
-        record = api.getLinkState(self.number, index, 1, 1, physicsClientId=client)
-        centre_in_world, twist = Pose(record[0], record[1]), Twist(record[6], record[7])
-        link_in_world = Pose(record[4], record[5]) @ self._link_in_frame.get(link, Pose())
-        return BodyState(link_in_world, twist_at(twist, centre_in_world, link_in_world))
+        motion = self._engine.link_motion(self.number, index)
+        link_in_world = motion.frame @ self._link_in_frame.get(link, Pose())
+        return BodyState(link_in_world, twist_at(Twist(motion.linear, motion.angular), motion.centre, link_in_world))
 
     def set_state(self, state: BodyState) -> None:
         """Puts the model somewhere as one rigid body; its joints keep their positions.
@@ -162,29 +157,16 @@ class SimulatedBody:
         for part in self.further:
             part_in_world = state.pose @ model_in_world.inverse() @ part.state().pose
             part.set_state(BodyState(part_in_world, twist_at(state.twist, state.pose, part_in_world)))
-        api, client = self._engine.api, self._engine.client
         centre_in_world = state.pose @ self._root_in_model @ self._centre_in_root
-        api.resetBasePositionAndOrientation(
-            self.number, centre_in_world.position, centre_in_world.quaternion, physicsClientId=client
-        )
+        self._engine.set_base_centre(self.number, centre_in_world)
         if not self.static:
             twist = twist_at(state.twist, state.pose, centre_in_world)
-            api.resetBaseVelocity(self.number, twist.linear, twist.angular, physicsClientId=client)
+            self._engine.set_base_twist(self.number, twist.linear, twist.angular)
 
     def release_ball_joints(self) -> None:
         """Lets ball joints turn freely: the engine would otherwise brake them with a motor of its own."""
-        api, client = self._engine.api, self._engine.client
         for index in self.ball_joint_indices:
-            api.setJointMotorControlMultiDof(
-                self.number,
-                index,
-                api.POSITION_CONTROL,
-                targetPosition=[0.0, 0.0, 0.0, 1.0],
-                positionGain=0.0,
-                velocityGain=0.0,
-                force=[0.0, 0.0, 0.0],
-                physicsClientId=client,
-            )
+            self._engine.release_ball_joint(self.number, index)
 
     def put_together(self, pose: Pose) -> None:
         """Puts the model somewhere at rest, with its trees where its description has them.
@@ -202,32 +184,25 @@ class SimulatedBody:
         Raises:
             UnknownEntityError: The model has no such movable joint.
         """
-        api, client = self._engine.api, self._engine.client
         owners = {name: part for part in self.parts for name in part.joint_indices}
         unknown = sorted(set(positions) - set(owners))
         if unknown:
             raise UnknownEntityError("joint", f"{self.name}::{unknown[0]}", list(owners))
         for name, position in positions.items():
             index = owners[name].joint_indices[name]
-            api.resetJointState(owners[name].number, index, position, 0.0, physicsClientId=client)
+            self._engine.set_joint_state(owners[name].number, index, position, 0.0)
 
     def reset_joints(self, positions: dict[str, float]) -> None:
         """Puts joints at positions [rad or m], at rest; joints that are not named go to 0."""
         self.set_joints({name: positions.get(name, 0.0) for part in self.parts for name in part.joint_indices})
         for part in self.parts:
             for index in part.ball_joint_indices:
-                self._engine.api.resetJointStateMultiDof(
-                    part.number, index, [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0], physicsClientId=self._engine.client
-                )
+                self._engine.set_ball_joint_state(part.number, index, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 
     def _centre_state(self) -> tuple[Pose, Twist]:
         """Returns pose and velocity of the root link's centre of mass, in the world frame."""
-        api, client = self._engine.api, self._engine.client
-        position, quaternion = api.getBasePositionAndOrientation(self.number, physicsClientId=client)
-        if self.static:
-            return Pose(position, quaternion), Twist()
-        linear, angular = api.getBaseVelocity(self.number, physicsClientId=client)
-        return Pose(position, quaternion), Twist(linear, angular)
+        centre = self._engine.base_centre(self.number)
+        return centre, Twist() if self.static else Twist(*self._engine.base_twist(self.number))
 
 
 def twist_at(twist: Twist, from_in_world: Pose, to_in_world: Pose) -> Twist:

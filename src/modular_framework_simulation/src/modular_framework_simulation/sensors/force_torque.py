@@ -6,11 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from modular_framework_simulation.errors import UnknownEntityError
-from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.simulated_body import add, cross
 from modular_framework_urdf import xml_text
-from modular_framework_urdf.rotations import Vector3, rotate_vector
+from modular_framework_urdf.rotations import Vector3
 from modular_framework_urdf.xml_text import Element
 
 DEFAULT_RATE_HZ = 100.0
@@ -109,14 +107,12 @@ class JointLoad:
         self._find()
 
     def _find(self) -> None:
-        """Finds the joint in the engine; its axis there is given in the axes of its link's inertia."""
-        body = self._world.body(self._model)
-        infos = {info[1].decode(): info for info in self._world.engine.joint_infos(body.number)}
-        info = infos.get(self._sensor.joint)
-        if info is None:
-            raise UnknownEntityError("joint", f"{self._model}::{self._sensor.joint}", list(infos))
-        self._index, self._axis = info[0], info[13]
-        self._turns = info[2] == self._world.engine.api.JOINT_REVOLUTE
+        """Finds the joint in the engine."""
+        joints = {joint.name: joint for joint in self._world.engine.joints(self._world.body(self._model).number)}
+        joint = joints.get(self._sensor.joint)
+        if joint is None:
+            raise UnknownEntityError("joint", f"{self._model}::{self._sensor.joint}", list(joints))
+        self._index = joint.index
 
     def start(self) -> None:
         """Lets the engine measure from the next step on; to be called before each measurement."""
@@ -124,31 +120,11 @@ class JointLoad:
         if instance != self._instance:  # also after a restart, which creates the body again
             self._instance = instance
             self._find()
-            body, engine = self._world.body(self._model), self._world.engine
-            engine.api.enableJointForceTorqueSensor(body.number, self._index, True, physicsClientId=engine.client)
+            self._world.engine.measure_joint_load(self._world.body(self._model).number, self._index)
 
     def measure(self) -> Wrench:
         """Returns the wrench with which the child link acts on its parent, in the last physics step.
 
         It is given about the origin of the child link, which is that of the joint, and in its axes: Gazebo's defaults.
-        The engine gives what the parent does to the child, about the centre of mass of the child and in the axes of
-        its inertia, without what the motor does along the axis of the joint.
         """
-        body, engine = self._world.body(self._model), self._world.engine
-        api, client = engine.api, engine.client
-        _, _, reaction, motor = api.getJointState(body.number, self._index, physicsClientId=client)
-        record = api.getLinkState(body.number, self._index, physicsClientId=client)
-        centre_in_link = Pose(record[2], record[3])
-        x, y, z = self._axis
-        along_axis = (motor * x, motor * y, motor * z)
-        force, torque = reaction[:3], reaction[3:]
-        if self._turns:
-            torque = add(torque, along_axis)
-        force, torque = (rotate_vector(centre_in_link.quaternion, each) for each in (force, torque))
-        about_origin = add(torque, cross(centre_in_link.position, force))
-        return Wrench(_negative(force), _negative(about_origin))
-
-
-def _negative(vector: Vector3) -> Vector3:
-    x, y, z = vector
-    return (-x, -y, -z)
+        return Wrench(*self._world.engine.joint_load(self._world.body(self._model).number, self._index))

@@ -1,0 +1,356 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Bodies for MuJoCo, read from the same URDF that PyBullet loads.
+
+The frame of a root link is put into its centre of mass, with the axes of its inertia: a body that flies freely then
+turns about that point without an error of integration. All other links keep the frame of their joint.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+import trimesh
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_engine import (
+    BASE_INDEX,
+    EngineJoint,
+    JointKind,
+    Log,
+    MassProperties,
+)
+from modular_framework_urdf import xml_text
+from modular_framework_urdf.rotations import Quaternion, Vector3
+from modular_framework_urdf.xml_text import Element
+
+_KINDS = {
+    "fixed": JointKind.FIXED,
+    "revolute": JointKind.REVOLUTE,
+    "continuous": JointKind.REVOLUTE,
+    "prismatic": JointKind.PRISMATIC,
+    "spherical": JointKind.BALL,
+}
+_TYPES = {
+    JointKind.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
+    JointKind.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE,
+    JointKind.BALL: mujoco.mjtJoint.mjJNT_BALL,
+}
+HARDEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""Impedance of contacts, limits and motors: the hardest that MuJoCo has. What is left of it, forces of 0.01 % of those
+that would be needed to move the bodies as free ones, shows in no test."""
+
+_LEAST_IMBALANCE = 1e-9
+"""By which share a moment of inertia may be larger than the sum of the others, for rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A collision shape.
+
+    Attributes:
+        pose: In the frame of its link.
+        kind: Of MuJoCo.
+        size: As MuJoCo has it [m].
+        mesh: File with the points of a convex body, empty for others.
+        scale: Of those points.
+    """
+
+    pose: Pose
+    kind: int
+    size: Vector3
+    mesh: str = ""
+    scale: Vector3 = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A link.
+
+    Attributes:
+        name: In its description.
+        parent: Number of the link above it, -1: the root, None: it is the root.
+        pose: Of its frame in that of the link above.
+        mass: Its mass; 0 in a root that is fastened to the world.
+        shapes: That touch others.
+        joint: Above it; None for the root.
+        axis: Of that joint, in the frame of the link.
+    """
+
+    name: str
+    parent: int | None
+    pose: Pose
+    mass: MassProperties
+    shapes: tuple[Shape, ...]
+    joint: EngineJoint | None
+    axis: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class BodyTree:
+    """A body: its root first, then the links by number, so that link i is at i + 1."""
+
+    name: str
+    fixed: bool
+    links: tuple[Link, ...]
+
+
+def read_tree(text: str, name: str, fixed: bool, log: Log) -> BodyTree:
+    """Reads a body.
+
+    Args:
+        text: URDF with absolute mesh paths.
+        name: Named in errors.
+        fixed: Whether its root link is fastened to the world.
+        log: Takes a line about what is not as described.
+
+    Raises:
+        DescriptionError: It has what MuJoCo cannot represent.
+    """
+    root = xml_text.parse(text, f"model '{name}'")
+    elements = {element.get("name", ""): element for element in root.findall("link")}
+    below: dict[str, list[Element]] = {}
+    children = set()
+    for joint in root.findall("joint"):
+        below.setdefault(joint.find("parent").get("link"), []).append(joint)
+        children.add(joint.find("child").get("link"))
+    roots = [link for link in elements if link not in children]
+    if len(roots) != 1:
+        raise DescriptionError(f"model '{name}'", f"has {len(roots)} root links: {roots}", "a body has one")
+    links = [_link(elements[roots[0]], name, None, Pose(), None, (0.0, 0.0, 1.0), log)]
+    if fixed:
+        links[0] = replace(links[0], mass=links[0].mass._replace(mass=0.0))
+    ahead = [(joint, BASE_INDEX) for joint in reversed(below.get(roots[0], []))]
+    while ahead:
+        element, parent = ahead.pop()
+        child, index = element.find("child").get("link"), len(links) - 1
+        x, y, z = _numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        joint = _joint(element, index, name)
+        links.append(_link(elements[child], name, parent, _origin(element), joint, (x, y, z), log))
+        ahead += [(each, index) for each in reversed(below.get(child, []))]
+    return BodyTree(name, fixed, tuple(links))
+
+
+def _joint(element: Element, index: int, model: str) -> EngineJoint:
+    kind, name = _KINDS.get(element.get("type", "")), element.get("name", "")
+    if kind is None:
+        raise DescriptionError(
+            f"model '{model}', joint '{name}'",
+            f"is of type '{element.get('type')}'",
+            f"allowed with the physics engine mujoco: {', '.join(_KINDS)}",
+        )
+    limit, dynamics = element.find("limit"), element.find("dynamics")
+    lower, upper = -math.inf, math.inf
+    if limit is not None and element.get("type") in ("revolute", "prismatic"):
+        lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+        if lower > upper:
+            lower, upper = -math.inf, math.inf
+    damping, friction = (0.0 if dynamics is None else float(dynamics.get(key, "0")) for key in ("damping", "friction"))
+    child = element.find("child").get("link")
+    return EngineJoint(index, name, child, kind, lower, upper, damping, friction)
+
+
+def _link(
+    element: Element,
+    model: str,
+    parent: int | None,
+    pose: Pose,
+    joint: EngineJoint | None,
+    axis: Vector3,
+    log: Log,
+) -> Link:
+    name = element.get("name", "")
+    shapes = tuple(_shape(collision, model, name) for collision in element.findall("collision"))
+    mass = _mass(element.find("inertial"), f"model '{model}', link '{name}'", log)
+    return Link(name, parent, pose, mass, shapes, joint, axis)
+
+
+def _mass(inertial: Element | None, where: str, log: Log) -> MassProperties:
+    if inertial is None:  # only a root that is fastened to the world has none
+        return MassProperties(0.0, (0.0, 0.0, 0.0), Pose())
+    record = inertial.find("inertia")
+    xx, xy, xz, yy, yz, zz = (float(record.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    centre, moments = _origin(inertial), np.array([xx, yy, zz])
+    if (xy, xz, yz) != (0.0, 0.0, 0.0):
+        moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        if np.linalg.det(axes) < 0.0:
+            axes[:, 0] *= -1.0
+        centre = centre @ Pose((0.0, 0.0, 0.0), _quaternion(axes))
+    largest = int(np.argmax(moments))
+    if moments[largest] > (moments.sum() - moments[largest]) * (1.0 + _LEAST_IMBALANCE):
+        log(
+            f"{where}: no rigid body has the moments of inertia {[float(each) for each in moments]}: the largest is "
+            "above the sum of the others. MuJoCo refuses them; their mean stands for all three"
+        )
+        moments = np.full(3, moments.mean())
+    x, y, z = moments.tolist()
+    return MassProperties(float(inertial.find("mass").get("value")), (x, y, z), centre)
+
+
+def _shape(collision: Element, model: str, link: str) -> Shape:
+    pose, geometry = _origin(collision), collision.find("geometry")[0]
+    kinds = mujoco.mjtGeom
+    match geometry.tag:
+        case "box":
+            x, y, z = _numbers(geometry, "size", (0.0, 0.0, 0.0))
+            return Shape(pose, kinds.mjGEOM_BOX, (x / 2, y / 2, z / 2))
+        case "cylinder":
+            radius, length = float(geometry.get("radius")), float(geometry.get("length"))
+            return Shape(pose, kinds.mjGEOM_CYLINDER, (radius, length / 2, 0.0))
+        case "sphere":
+            return Shape(pose, kinds.mjGEOM_SPHERE, (float(geometry.get("radius")), 0.0, 0.0))
+        case "capsule":
+            radius, length = float(geometry.get("radius")), float(geometry.get("length"))
+            return Shape(pose, kinds.mjGEOM_CAPSULE, (radius, length / 2, 0.0))
+        case "plane":
+            normal = _numbers(geometry, "normal", (0.0, 0.0, 1.0))
+            return Shape(pose @ Pose((0.0, 0.0, 0.0), _rotation_to(normal)), kinds.mjGEOM_PLANE, (0.0, 0.0, 1.0))
+        case "mesh":
+            x, y, z = _numbers(geometry, "scale", (1.0, 1.0, 1.0))
+            return Shape(pose, kinds.mjGEOM_MESH, (0.0, 0.0, 0.0), geometry.get("filename"), (x, y, z))
+    raise DescriptionError(
+        f"model '{model}', link '{link}'",
+        f"has a collision shape <{geometry.tag}>",
+        "allowed with the physics engine mujoco: box, capsule, cylinder, mesh, plane, sphere",
+    )
+
+
+def _numbers(element: Element | None, key: str, default: tuple[float, ...]) -> tuple[float, ...]:
+    text = None if element is None else element.get(key)
+    return default if text is None else tuple(float(word) for word in text.split())
+
+
+def _origin(element: Element) -> Pose:
+    origin, zero = element.find("origin"), (0.0, 0.0, 0.0)
+    (x, y, z), (roll, pitch, yaw) = _numbers(origin, "xyz", zero), _numbers(origin, "rpy", zero)
+    return Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
+
+
+def _quaternion(matrix: np.ndarray) -> Quaternion:
+    result = np.zeros(4)
+    mujoco.mju_mat2Quat(result, np.ascontiguousarray(matrix).reshape(9))
+    w, x, y, z = result.tolist()
+    return (x, y, z, w)
+
+
+def _rotation_to(normal: Iterable[float]) -> Quaternion:
+    """Returns the rotation that takes the z axis to a direction."""
+    result = np.zeros(4)
+    mujoco.mju_quatZ2Vec(result, np.array(list(normal), dtype=float))
+    w, x, y, z = result.tolist()
+    return (x, y, z, w)
+
+
+def wxyz(quaternion: Quaternion) -> tuple[float, float, float, float]:
+    """Returns a quaternion as MuJoCo has it."""
+    x, y, z, w = quaternion
+    return (w, x, y, z)
+
+
+class SpecWriter:
+    """Writes bodies into a model of MuJoCo.
+
+    Args:
+        spec: The model.
+    """
+
+    def __init__(self, spec: mujoco.MjSpec) -> None:
+        self._spec = spec
+        self._meshes: dict[tuple[str, Vector3], str] = {}
+
+    def add(self, number: int, tree: BodyTree, centre_in_world: Pose, touching: frozenset[frozenset[int]]) -> None:
+        """Adds a body.
+
+        Args:
+            number: Of the body; part of the names.
+            tree: What it is made of.
+            centre_in_world: Of the root link.
+            touching: Pairs of its links that touch each other, by number; the others do not.
+        """
+        bodies: list[mujoco.MjsBody] = []
+        for rank, link in enumerate(tree.links):
+            above = self._spec.worldbody if link.parent is None else bodies[link.parent + 1]
+            bodies.append(self._add_link(above, link, body_name(number, rank - 1), number, tree, centre_in_world))
+        with_shapes = [rank - 1 for rank, link in enumerate(tree.links) if link.shapes]
+        for place, a in enumerate(with_shapes):
+            for b in with_shapes[place + 1 :]:
+                if frozenset((a, b)) not in touching:
+                    self._spec.add_exclude(bodyname1=body_name(number, a), bodyname2=body_name(number, b))
+
+    def _add_link(
+        self,
+        above: mujoco.MjsBody,
+        link: Link,
+        name: str,
+        number: int,
+        tree: BodyTree,
+        centre_in_world: Pose,
+    ) -> mujoco.MjsBody:
+        centre, pose = link.mass.centre_in_link, link.pose
+        shift = Pose()
+        if link.parent is None:
+            pose, shift, centre = centre_in_world, centre.inverse(), Pose()
+        elif link.parent < 0:
+            pose = tree.links[0].mass.centre_in_link.inverse() @ pose
+        body = above.add_body(name=name, pos=pose.position, quat=wxyz(pose.quaternion))
+        if link.mass.mass > 0.0:
+            body.explicitinertial = True
+            body.mass, body.inertia = link.mass.mass, link.mass.moments
+            body.ipos, body.iquat = centre.position, wxyz(centre.quaternion)
+        if link.parent is None and not tree.fixed:
+            body.add_freejoint(name=joint_name(number, -1))
+        if link.joint is not None and link.joint.kind is not JointKind.FIXED:
+            self._add_joint(body, link.joint, link.axis, joint_name(number, link.joint.index))
+        for shape in link.shapes:
+            self._add_shape(body, shape, shift)
+        return body
+
+    def _add_joint(self, body: mujoco.MjsBody, joint: EngineJoint, axis: Vector3, name: str) -> None:
+        limited = joint.kind is not JointKind.BALL and (math.isfinite(joint.lower) or math.isfinite(joint.upper))
+        far = 1e6
+        body.add_joint(
+            name=name,
+            type=_TYPES[joint.kind],
+            axis=axis,
+            limited=int(limited),
+            range=(max(joint.lower, -far), min(joint.upper, far)) if limited else (0.0, 0.0),
+            solimp_limit=HARDEST,
+            solimp_friction=HARDEST,
+        )
+
+    def _add_shape(self, body: mujoco.MjsBody, shape: Shape, shift: Pose) -> None:
+        pose = shift @ shape.pose
+        further = {"meshname": self._mesh(shape)} if shape.mesh else {"size": shape.size}
+        body.add_geom(
+            type=shape.kind,
+            pos=pose.position,
+            quat=wxyz(pose.quaternion),
+            condim=6,
+            solimp=HARDEST,
+            mass=0.0,
+            **further,
+        )
+
+    def _mesh(self, shape: Shape) -> str:
+        key = (shape.mesh, shape.scale)
+        if key not in self._meshes:
+            self._meshes[key] = f"mesh_{len(self._meshes)}"
+            mesh: Any = trimesh.load(shape.mesh, force="mesh", process=False)
+            points = np.asarray(mesh.vertices) * shape.scale
+            self._spec.add_mesh(name=self._meshes[key], uservert=points.astype(np.float32).ravel())
+        return self._meshes[key]
+
+
+def body_name(number: int, index: int) -> str:
+    """Returns MuJoCo's name of a link."""
+    return f"{number}:{index}"
+
+
+def joint_name(number: int, index: int) -> str:
+    """Returns MuJoCo's name of the joint above a link; -1 is that of a body that moves freely."""
+    return f"{number}:{index}"

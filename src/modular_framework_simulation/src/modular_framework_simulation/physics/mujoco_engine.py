@@ -1,0 +1,409 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""MuJoCo, the second engine: its model is made again whenever a body comes or goes, and what moves goes on moving."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from modular_framework_simulation.errors import DescriptionError
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.mujoco_bodies import (
+    BodyTree,
+    SpecWriter,
+    body_name,
+    joint_name,
+    read_tree,
+    wxyz,
+)
+from modular_framework_simulation.physics.mujoco_dynamics import MujocoDynamics, SavedDynamics
+from modular_framework_simulation.physics.physics_engine import (
+    BASE_INDEX,
+    SHOWN_CHARACTERS,
+    EngineJoint,
+    JointKind,
+    JointState,
+    LinkMotion,
+    Log,
+    MassProperties,
+    PhysicsEngine,
+    Surface,
+    Touch,
+    refuse_long_names,
+)
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.surfaces import softness_of
+from modular_framework_urdf.rotations import Quaternion, Vector3, rotate_vector
+
+_WIDTHS = {JointKind.FIXED: (0, 0), JointKind.BALL: (4, 3)}
+"""How many positions and velocities a joint has; others have one of each."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Span:
+    """Where the positions and velocities of a joint are in the state: begin and end."""
+
+    positions: slice
+    dofs: slice
+
+
+@dataclass(slots=True)
+class _Body:
+    """A body in the model.
+
+    Attributes:
+        tree: What it is made of.
+        pose: Of the root's centre in the world, where it is fastened there.
+        touching: Pairs of its links that touch each other.
+        surfaces: By link.
+        ids: MuJoCo's numbers of the root and of the links.
+        spans: Of the root's free joint and of the joints.
+    """
+
+    tree: BodyTree
+    pose: Pose = field(default_factory=Pose)
+    touching: frozenset[frozenset[int]] = frozenset()
+    surfaces: dict[int, Surface] = field(default_factory=dict)
+    ids: list[int] = field(default_factory=list)
+    spans: list[_Span] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """A saved state.
+
+    Attributes:
+        poses: Of the fixed bodies, by number of all bodies.
+        dynamics: All that moves.
+    """
+
+    poses: dict[int, Pose]
+    dynamics: SavedDynamics
+
+
+class MujocoEngine(PhysicsEngine):
+    """MuJoCo with nothing in it.
+
+    Args:
+        settings: Its numbers.
+        gravity: [m/s^2]
+        gui: Whether a window was asked for: there is none, and a log line says so.
+        log: Takes lines of text about what is not as a description says.
+    """
+
+    name = "mujoco"
+    has_window = False
+    takes_concave_meshes = False
+
+    def __init__(self, settings: PhysicsSettings, gravity: Vector3, gui: bool, log: Log) -> None:
+        if gui:
+            log("a window of the simulation was asked for; the physics engine mujoco has none here: running headless")
+        self.settings, self._gravity, self._log = settings, gravity, log
+        self._bodies: dict[int, _Body] = {}
+        self._last_number = -1
+        self._dynamics = MujocoDynamics(mujoco.MjSpec().compile(), settings, gravity)
+        self._number_of = np.full(1, -1)
+
+    def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
+        """Continues with other settings and gravity."""
+        self.settings, self._gravity = settings, gravity
+        self._dynamics.adjust(settings, gravity)
+
+    def restart(self, gravity: Vector3) -> None:
+        """Takes everything out."""
+        self._gravity = gravity
+        self._bodies = {}
+        self._compile(self._bodies)
+
+    def step(self) -> None:
+        """Advances the physics by one time step."""
+        self._dynamics.step()
+
+    def close(self) -> None:
+        """Does nothing: MuJoCo's memory is freed with this object."""
+
+    # Bodies
+
+    def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
+        """Loads a body."""
+        refuse_long_names(text, f"model '{name[:SHOWN_CHARACTERS]}'")
+        tree = read_tree(text, name, fixed, self._log)
+        number = self._last_number + 1
+        every = range(BASE_INDEX, len(tree.links) - 1)
+        touching = frozenset(frozenset((a, b)) for a in every for b in every if a < b and self_collision)
+        try:
+            self._compile(self._bodies | {number: _Body(tree, tree.links[0].mass.centre_in_link, touching)})
+        except ValueError as error:
+            problem = f"is refused by the physics engine mujoco ({' '.join(str(error).split())})"
+            raise DescriptionError(f"model '{name}'", problem, "check its shapes, masses and joints") from error
+        self._last_number = number
+        return number
+
+    def _compile(self, bodies: dict[int, _Body]) -> None:
+        """Makes MuJoCo's model of bodies; those that were there go on moving as they do.
+
+        Raises:
+            ValueError: MuJoCo refuses a body; nothing has changed then.
+        """
+        spec = mujoco.MjSpec()
+        spec.compiler.degree = False
+        writer = SpecWriter(spec)
+        for number, body in bodies.items():
+            writer.add(number, body.tree, body.pose, body.touching)
+        before, now = self._dynamics, MujocoDynamics(spec.compile(), self.settings, self._gravity)
+        now.measures_loads = before.measures_loads and bool(bodies)
+        self._number_of = np.full(now.model.nbody, -1)
+        for number, body in bodies.items():
+            ids, spans = _found(now.model, number, body.tree)
+            if body.ids:
+                _copy_motion(before, body, now, ids, spans)
+            body.ids, body.spans = ids, spans
+            self._number_of[ids] = number
+        self._dynamics, self._bodies = now, bodies
+        for body in bodies.values():
+            for index, surface in body.surfaces.items():
+                self._write_surface(body, index, surface)
+
+    def remove_body(self, number: int) -> None:
+        """Takes a body out."""
+        self._compile({each: body for each, body in self._bodies.items() if each != number})
+
+    def root_link(self, number: int) -> str:
+        """Returns the name of the root link."""
+        return self._bodies[number].tree.links[0].name
+
+    def joints(self, number: int) -> list[EngineJoint]:
+        """Returns every joint of a body."""
+        return [link.joint for link in self._bodies[number].tree.links if link.joint is not None]
+
+    def mass_properties(self, number: int, index: int) -> MassProperties:
+        """Returns the mass of a link and its distribution."""
+        return self._bodies[number].tree.links[index + 1].mass
+
+    def mass_matrix(self, number: int, indices: Sequence[int]) -> npt.NDArray[np.float64]:
+        """Returns the joint space inertia."""
+        model, data, body = self._dynamics.model, self._dynamics.data, self._bodies[number]
+        self._dynamics.locate()
+        mujoco.mj_makeM(model, data)
+        whole = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, whole)
+        spans = [body.spans[0], *(body.spans[index + 1] for index in indices)]
+        dofs = [dof for span in spans for dof in range(span.dofs.start, span.dofs.stop)]
+        return whole[np.ix_(dofs, dofs)]
+
+    def set_self_collisions(self, number: int, allowed: Collection[frozenset[int]]) -> None:
+        """Sets which pairs of links touch."""
+        self._bodies[number].touching = frozenset(allowed)
+        self._compile(self._bodies)
+
+    def set_surface(self, number: int, index: int, surface: Surface, anchored: bool = False) -> None:
+        """Sets friction, bounce and softness of a link; friction needs no anchors here."""
+        del anchored
+        body = self._bodies[number]
+        body.surfaces[index] = surface
+        self._write_surface(body, index, surface)
+
+    def remove_margin(self, number: int, index: int) -> None:
+        """Does nothing: MuJoCo's shapes touch where they are."""
+
+    def remove_velocity_damping(self, number: int) -> None:
+        """Does nothing: MuJoCo brakes no body."""
+
+    def _write_surface(self, body: _Body, index: int, surface: Surface) -> None:
+        shapes = self._dynamics.model.geom_bodyid == body.ids[index + 1]
+        yielding = correction = 0.0
+        if (softness := softness_of(surface, self.settings)) is not None:
+            kp, kd = softness
+            push = kp * self.settings.time_step_s
+            yielding, correction = 1.0 / kp, push / (push + kd)
+        row = (surface.lateral, surface.spinning, surface.rolling, surface.restitution, yielding, correction)
+        self._dynamics.coefficients[shapes] = row
+
+    # Motion
+
+    def base_centre(self, number: int) -> Pose:
+        """Returns the pose of the root link's centre."""
+        body = self._bodies[number]
+        if body.tree.fixed:
+            return body.pose
+        values = self._dynamics.data.qpos[body.spans[0].positions].tolist()
+        return Pose((values[0], values[1], values[2]), (values[4], values[5], values[6], values[3]))
+
+    def base_twist(self, number: int) -> tuple[Vector3, Vector3]:
+        """Returns the velocity of the root link's centre."""
+        body = self._bodies[number]
+        if body.tree.fixed:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        vx, vy, vz, wx, wy, wz = self._dynamics.data.qvel[body.spans[0].dofs].tolist()
+        return (vx, vy, vz), rotate_vector(self.base_centre(number).quaternion, (wx, wy, wz))
+
+    def set_base_centre(self, number: int, pose: Pose) -> None:
+        """Puts a body somewhere."""
+        body, model, data = self._bodies[number], self._dynamics.model, self._dynamics.data
+        if body.tree.fixed:
+            body.pose = pose
+            model.body_pos[body.ids[0]], model.body_quat[body.ids[0]] = pose.position, wxyz(pose.quaternion)
+        else:
+            data.qpos[body.spans[0].positions] = (*pose.position, *wxyz(pose.quaternion))
+            data.qvel[body.spans[0].dofs] = 0.0
+        self._dynamics.moved()
+
+    def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
+        """Sets the velocity of the root link's centre."""
+        body = self._bodies[number]
+        if not body.tree.fixed:
+            own = rotate_vector(self.base_centre(number).inverse().quaternion, angular)
+            self._dynamics.data.qvel[body.spans[0].dofs] = (*linear, *own)
+            self._dynamics.moved()
+
+    def link_motion(self, number: int, index: int) -> LinkMotion:
+        """Returns where a link is and how it moves."""
+        self._dynamics.locate()
+        model, data, body = self._dynamics.model, self._dynamics.data, self._bodies[number].ids[index + 1]
+        frame = _pose(data.xpos[body], data.xquat[body])
+        centre = frame @ _pose(model.body_ipos[body], model.body_iquat[body])
+        velocity = np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body, velocity, 0)
+        wx, wy, wz, vx, vy, vz = velocity.tolist()
+        return LinkMotion(centre, frame, (vx, vy, vz), (wx, wy, wz))
+
+    def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
+        """Lets a force act at a point of a link."""
+        self._dynamics.locate()
+        data, body = self._dynamics.data, self._bodies[number].ids[index + 1]
+        data.xfrc_applied[body, :3] += force
+        data.xfrc_applied[body, 3:] += np.cross(np.subtract(point, data.xipos[body]), force)
+
+    def touches(self, number: int, index: int) -> list[Touch]:
+        """Returns where a link touched others."""
+        bodies, forces, distances = self._dynamics.touches()
+        body, found = self._bodies[number].ids[index + 1], []
+        for one, other in ((0, 1), (1, 0)):
+            for row in np.flatnonzero(bodies[:, one] == body):
+                touched = int(self._number_of[bodies[row, other]])
+                if touched != number:
+                    found.append(Touch(touched, float(forces[row]), float(distances[row])))
+        return found
+
+    # Joints
+
+    def _span(self, number: int, index: int) -> _Span:
+        return self._bodies[number].spans[index + 1]
+
+    def joint_states(self, number: int, indices: Sequence[int]) -> list[JointState]:
+        """Returns the states of joints."""
+        spans, data = self._bodies[number].spans, self._dynamics.data
+        positions = [spans[index + 1].positions.start for index in indices]
+        dofs = [spans[index + 1].dofs.start for index in indices]
+        columns = (data.qpos[positions], data.qvel[dofs], self._dynamics.motor_efforts[dofs])
+        return [JointState(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+
+    def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
+        """Puts a joint somewhere."""
+        span, data = self._span(number, index), self._dynamics.data
+        data.qpos[span.positions], data.qvel[span.dofs] = position, velocity
+        self._dynamics.moved()
+
+    def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
+        """Returns rotation and velocity of a ball joint, the latter in the axes of the link below."""
+        span, data = self._span(number, index), self._dynamics.data
+        w, x, y, z = data.qpos[span.positions].tolist()
+        rx, ry, rz = data.qvel[span.dofs].tolist()
+        return (x, y, z, w), (rx, ry, rz)
+
+    def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
+        """Puts a ball joint somewhere."""
+        span, data = self._span(number, index), self._dynamics.data
+        data.qpos[span.positions], data.qvel[span.dofs] = wxyz(turn), rate
+        self._dynamics.moved()
+
+    def release_ball_joint(self, number: int, index: int) -> None:
+        """Does nothing: a ball joint has no motor."""
+
+    def set_joint_damping(self, number: int, index: int, damping: float) -> None:
+        """Sets the resistance of a joint per velocity."""
+        self._dynamics.model.dof_damping[self._span(number, index).dofs] = damping
+
+    def set_position_motors(
+        self,
+        number: int,
+        indices: Sequence[int],
+        targets: Sequence[float],
+        velocities: Sequence[float],
+        efforts: Sequence[float],
+        gain: float,
+    ) -> None:
+        """Lets motors move joints to positions."""
+        dofs = [self._span(number, index).dofs.start for index in indices]
+        dynamics = self._dynamics
+        dynamics.motor_targets[dofs], dynamics.motor_velocities[dofs] = targets, velocities
+        dynamics.motor_gains[dofs], dynamics.model.dof_frictionloss[dofs] = gain, efforts
+
+    def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
+        """Lets a motor bring a joint to a velocity."""
+        self.set_position_motors(number, [index], [0.0], [velocity], [effort], 0.0)
+
+    def apply_effort(self, number: int, index: int, effort: float) -> None:
+        """Lets an effort act on a joint."""
+        self._dynamics.data.qfrc_applied[self._span(number, index).dofs] += effort
+
+    def measure_joint_load(self, number: int, index: int) -> None:
+        """Lets the loads on all joints be computed."""
+        del number, index
+        self._dynamics.measures_loads = True
+
+    def joint_load(self, number: int, index: int) -> tuple[Vector3, Vector3]:
+        """Returns what the link below a joint did to the one above."""
+        return self._dynamics.load(self._bodies[number].ids[index + 1])
+
+    # Saved states
+
+    def save_state(self) -> _State:
+        """Copies the state."""
+        poses = {number: body.pose for number, body in self._bodies.items()}
+        return _State(poses, self._dynamics.state())
+
+    def restore_state(self, state: _State) -> None:
+        """Continues from a saved state; what touches is known again after the next step."""
+        for number, pose in state.poses.items():
+            if self._bodies[number].tree.fixed:
+                self.set_base_centre(number, pose)
+        self._dynamics.set_state(state.dynamics)
+
+    def forget_state(self, state: _State) -> None:
+        """Does nothing: a saved state is a copy."""
+
+
+def _found(model: mujoco.MjModel, number: int, tree: BodyTree) -> tuple[list[int], list[_Span]]:
+    """Returns MuJoCo's numbers of the links of a body, and where the state of its joints is."""
+    ids, spans = [], []
+    for rank, link in enumerate(tree.links):
+        ids.append(model.body(body_name(number, rank - 1)).id)
+        free = link.joint is None and not tree.fixed
+        kind = JointKind.FIXED if link.joint is None else link.joint.kind
+        positions, dofs = (7, 6) if free else _WIDTHS.get(kind, (1, 1))
+        begin = (0, 0)
+        if dofs:
+            joint = model.joint(joint_name(number, rank - 1)).id
+            begin = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+        spans.append(_Span(slice(begin[0], begin[0] + positions), slice(begin[1], begin[1] + dofs)))
+    return ids, spans
+
+
+def _copy_motion(old: MujocoDynamics, body: _Body, new: MujocoDynamics, ids: list[int], spans: list[_Span]) -> None:
+    """Lets a body of a new model move as it does in the old one."""
+    for was, now in zip(body.spans, spans, strict=True):
+        new.data.qpos[now.positions] = old.data.qpos[was.positions]
+        for target, source in zip(new.by_dof(), old.by_dof(), strict=True):
+            target[now.dofs] = source[was.dofs]
+    new.data.xfrc_applied[ids] = old.data.xfrc_applied[body.ids]
+
+
+def _pose(position: npt.NDArray[np.float64], quaternion: npt.NDArray[np.float64]) -> Pose:
+    px, py, pz = position.tolist()
+    w, x, y, z = quaternion.tolist()
+    return Pose((px, py, pz), (x, y, z, w))

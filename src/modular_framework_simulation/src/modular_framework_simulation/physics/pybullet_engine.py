@@ -1,0 +1,421 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""PyBullet, the default engine: one connection to it, set up the way this package needs it.
+
+Everything here must be called from one thread: the engine keeps global state.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import tempfile
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from modular_framework_simulation.errors import DescriptionError, SimulationError
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.contact_rules import let_smaller_coefficient_count
+from modular_framework_simulation.physics.physics_engine import (
+    BASE_INDEX,
+    SHOWN_CHARACTERS,
+    EngineJoint,
+    JointKind,
+    JointState,
+    LinkMotion,
+    Log,
+    MassProperties,
+    PhysicsEngine,
+    Surface,
+    Touch,
+    refuse_long_names,
+)
+from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.simulated_body import add, cross
+from modular_framework_simulation.physics.surfaces import softness_of
+from modular_framework_urdf.rotations import Quaternion, Vector3, rotate_vector
+
+_RIGID_DAMPING = 1e9
+"""Damping of a contact [N s/m] that does not give way, with which only the share of correction is chosen."""
+
+
+@contextlib.contextmanager
+def _silenced() -> Iterator[None]:
+    """Keeps the engine's C++ code from writing to the terminal; its problems come back as exceptions."""
+    saved = os.dup(1)
+    try:
+        with open(os.devnull, "w") as nothing:
+            os.dup2(nothing.fileno(), 1)
+            yield
+    finally:
+        os.dup2(saved, 1)
+        os.close(saved)
+
+
+class PyBulletEngine(PhysicsEngine):
+    """PyBullet with nothing in it.
+
+    Args:
+        settings: Numbers of the engine.
+        gravity: [m/s^2]
+        gui: Whether to open a window; without a display there is none, and a log line says so.
+        log: Takes a line of text about what was decided.
+    """
+
+    name = "pybullet"
+    takes_concave_meshes = True
+
+    def __init__(self, settings: PhysicsSettings, gravity: Vector3, gui: bool, log: Log) -> None:
+        with _silenced():
+            import pybullet  # prints its build date when loaded
+
+        self.api: Any = pybullet
+        self.settings = settings
+        self.client = -1
+        self.has_window = False
+        if gui:
+            self._open_window(log)
+        if self.client < 0:
+            self.client = self.api.connect(self.api.DIRECT)
+        if self.client < 0:
+            raise SimulationError("the physics engine accepts no further connection; end another simulation first")
+        self._smaller_counts = let_smaller_coefficient_count(self.api)
+        if not self._smaller_counts:
+            log(
+                "this build of the physics engine multiplies coefficients of friction and bounce: between two "
+                "different surfaces their geometric mean counts, not the smaller one"
+            )
+        self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
+        self._files_written = 0
+        self._configure(gravity)
+
+    def _open_window(self, log: Log) -> None:
+        if not os.environ.get("DISPLAY"):
+            log("a window of the simulation was asked for, but there is no display: running headless")
+            return
+        try:
+            self.client = self.api.connect(self.api.GUI)
+        except self.api.error as error:
+            log(f"no window of the simulation could be opened ({error}): running headless")
+        self.has_window = self.client >= 0
+
+    def _set_parameters(self, gravity: Vector3) -> None:
+        settings = self.settings
+        self.api.setGravity(*gravity, physicsClientId=self.client)
+        self.api.setPhysicsEngineParameter(
+            fixedTimeStep=settings.time_step_s,
+            numSolverIterations=settings.solver_iterations,
+            numSubSteps=0,
+            contactERP=settings.contact_erp,
+            frictionERP=settings.friction_erp,
+            contactBreakingThreshold=settings.contact_reach,
+            restitutionVelocityThreshold=settings.bounce_threshold,
+            enableConeFriction=1,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self.client,
+        )
+
+    def _configure(self, gravity: Vector3) -> None:
+        self._set_parameters(gravity)
+        if self.has_window:
+            # Side panels and shadows cost more than the physics where the graphics are drawn by software.
+            self.api.configureDebugVisualizer(self.api.COV_ENABLE_GUI, 0, physicsClientId=self.client)
+            self.api.configureDebugVisualizer(self.api.COV_ENABLE_SHADOWS, 0, physicsClientId=self.client)
+            distance_m, yaw_deg, pitch_deg, target = 1.8, 50.0, -30.0, (0.0, 0.4, 0.9)
+            self.api.resetDebugVisualizerCamera(distance_m, yaw_deg, pitch_deg, target, physicsClientId=self.client)
+
+    def adjust(self, settings: PhysicsSettings, gravity: Vector3) -> None:
+        """Continues with other settings.
+
+        Args:
+            settings: Numbers of the engine.
+            gravity: [m/s^2]
+        """
+        self.settings = settings
+        self._set_parameters(gravity)
+
+    def engine_coefficient(self, coefficient: float) -> float:
+        """Returns what to give a surface of the engine for a coefficient of friction or restitution."""
+        return coefficient if self._smaller_counts else math.sqrt(coefficient)
+
+    def restart(self, gravity: Vector3) -> None:
+        """Takes everything out, contacts and their caches too.
+
+        Args:
+            gravity: [m/s^2]
+        """
+        self.api.resetSimulation(physicsClientId=self.client)
+        self._configure(gravity)
+
+    def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
+        """Loads a body; see `PhysicsEngine`."""
+        flags = self.api.URDF_USE_SELF_COLLISION if self_collision else 0
+        refuse_long_names(text, f"model '{name[:SHOWN_CHARACTERS]}'")
+        # The engine remembers files by name, so each body needs a file of its own.
+        self._files_written += 1
+        file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"
+        file.write_text(text, encoding="utf-8")
+        try:
+            with _silenced():
+                body: int = self.api.loadURDF(
+                    str(file),
+                    useFixedBase=fixed,
+                    # With their faces known, boxes and hulls touch in up to four points at once, not in one.
+                    flags=flags | self.api.URDF_USE_INERTIA_FROM_FILE | self.api.URDF_INITIALIZE_SAT_FEATURES,
+                    physicsClientId=self.client,
+                )
+            file.unlink()
+        except self.api.error as error:
+            problem = f"is refused by the physics engine ({error})"
+            raise DescriptionError(f"model '{name}'", problem, "check its shapes and joints") from error
+        return body
+
+    def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
+        """Returns the engine's record of every joint of a body, in the order of the link numbers."""
+        count = self.api.getNumJoints(body, physicsClientId=self.client)
+        return [self.api.getJointInfo(body, index, physicsClientId=self.client) for index in range(count)]
+
+    def step(self) -> None:
+        """Advances the physics by one time step."""
+        self.api.stepSimulation(physicsClientId=self.client)
+
+    def close(self) -> None:
+        """Ends the connection; may be called twice."""
+        if self.client >= 0:
+            with contextlib.suppress(self.api.error):
+                self.api.disconnect(physicsClientId=self.client)
+            self.client = -1
+            self._urdf_folder.cleanup()
+
+    def save_state(self) -> int:
+        """Saves the state in the memory of the engine, contacts and their caches too."""
+        state: int = self.api.saveState(physicsClientId=self.client)
+        return state
+
+    def restore_state(self, state: int) -> None:
+        """Continues from a saved state."""
+        self.api.restoreState(state, physicsClientId=self.client)
+
+    def forget_state(self, state: int) -> None:
+        """Frees a saved state."""
+        self.api.removeState(state, physicsClientId=self.client)
+
+    def remove_body(self, number: int) -> None:
+        """Takes a body out."""
+        self.api.removeBody(number, physicsClientId=self.client)
+
+    def root_link(self, number: int) -> str:
+        """Returns the name of the root link."""
+        name: str = self.api.getBodyInfo(number, physicsClientId=self.client)[0].decode()
+        return name
+
+    def joints(self, number: int) -> list[EngineJoint]:
+        """Returns every joint of a body."""
+        return [self._joint(info) for info in self.joint_infos(number)]
+
+    def _joint(self, info: tuple[Any, ...]) -> EngineJoint:
+        kinds = {
+            self.api.JOINT_REVOLUTE: JointKind.REVOLUTE,
+            self.api.JOINT_PRISMATIC: JointKind.PRISMATIC,
+            self.api.JOINT_SPHERICAL: JointKind.BALL,
+            self.api.JOINT_FIXED: JointKind.FIXED,
+        }
+        lower, upper = info[8], info[9]
+        if lower > upper:  # the engine's way to say that there are none
+            lower, upper = -math.inf, math.inf
+        kind = kinds.get(info[2], JointKind.OTHER)
+        return EngineJoint(info[0], info[1].decode(), info[12].decode(), kind, lower, upper, info[6], info[7])
+
+    def mass_properties(self, number: int, index: int) -> MassProperties:
+        """Returns the mass of a link and its distribution."""
+        record = self.api.getDynamicsInfo(number, index, physicsClientId=self.client)
+        return MassProperties(record[0], record[2], Pose(tuple(record[3]), tuple(record[4])))
+
+    def mass_matrix(self, number: int, indices: Sequence[int]) -> npt.NDArray[np.float64]:
+        """Returns the joint space inertia."""
+        states = self.api.getJointStates(number, indices, physicsClientId=self.client)
+        positions = [state[0] for state in states]
+        return np.array(self.api.calculateMassMatrix(number, positions, physicsClientId=self.client))
+
+    def set_self_collisions(self, number: int, allowed: Collection[frozenset[int]]) -> None:
+        """Sets which pairs of links touch."""
+        every = range(BASE_INDEX, self.api.getNumJoints(number, physicsClientId=self.client))
+        for a in every:
+            for b in range(a + 1, every.stop):
+                enable = int(frozenset((a, b)) in allowed)
+                self.api.setCollisionFilterPair(number, number, a, b, enable, physicsClientId=self.client)
+
+    def set_surface(self, number: int, index: int, surface: Surface, anchored: bool = False) -> None:
+        """Sets friction, bounce and softness of a link."""
+        further: dict[str, float] = {}
+        softness = self._softness(surface)
+        if softness is not None:
+            further["contactStiffness"], further["contactDamping"] = softness
+        if surface.restitution > 0.0:
+            # The engine slows a body down just before it touches: an impact would begin with another velocity.
+            further["contactProcessingThreshold"] = 0.0
+        self.api.changeDynamics(
+            number,
+            index,
+            lateralFriction=self.engine_coefficient(surface.lateral),
+            spinningFriction=surface.spinning,
+            rollingFriction=surface.rolling,
+            restitution=self.engine_coefficient(surface.restitution),
+            frictionAnchor=int(anchored),
+            **further,
+            physicsClientId=self.client,
+        )
+
+    def _softness(self, surface: Surface) -> tuple[float, float] | None:
+        """Returns stiffness [N/m] and damping [N s/m] of a contact, or None for the engine's own."""
+        settings, step_s = self.settings, self.settings.time_step_s
+        if surface.restitution > 0.0:
+            erp = settings.bounce_erp
+            return erp / (1.0 - erp) * _RIGID_DAMPING / step_s, _RIGID_DAMPING
+        return softness_of(surface, settings)
+
+    def remove_margin(self, number: int, index: int) -> None:
+        """Takes the margin away: with the engine's default, cylinders and meshes float a millimetre above a table."""
+        self.api.changeDynamics(number, index, collisionMargin=0.0, physicsClientId=self.client)
+
+    def remove_velocity_damping(self, number: int) -> None:
+        """Lets a body spin and fly freely: the engine brakes every body by 4 % of its velocity a second."""
+        self.api.changeDynamics(number, BASE_INDEX, linearDamping=0.0, angularDamping=0.0, physicsClientId=self.client)
+
+    def base_centre(self, number: int) -> Pose:
+        """Returns the pose of the root link's centre."""
+        return Pose(*self.api.getBasePositionAndOrientation(number, physicsClientId=self.client))
+
+    def base_twist(self, number: int) -> tuple[Vector3, Vector3]:
+        """Returns the velocity of the root link's centre."""
+        linear, angular = self.api.getBaseVelocity(number, physicsClientId=self.client)
+        return linear, angular
+
+    def set_base_centre(self, number: int, pose: Pose) -> None:
+        """Puts a body somewhere."""
+        self.api.resetBasePositionAndOrientation(number, pose.position, pose.quaternion, physicsClientId=self.client)
+
+    def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
+        """Sets the velocity of the root link's centre."""
+        self.api.resetBaseVelocity(number, linear, angular, physicsClientId=self.client)
+
+    def link_motion(self, number: int, index: int) -> LinkMotion:
+        """Returns where a link is and how it moves."""
+        record = self.api.getLinkState(number, index, 1, 1, physicsClientId=self.client)
+        return LinkMotion(Pose(record[0], record[1]), Pose(record[4], record[5]), record[6], record[7])
+
+    def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
+        """Lets a force act at a point of a link."""
+        self.api.applyExternalForce(number, index, force, point, self.api.WORLD_FRAME, physicsClientId=self.client)
+
+    def touches(self, number: int, index: int) -> list[Touch]:
+        """Returns where a link touches others."""
+        points = self.api.getContactPoints(bodyA=number, linkIndexA=index, physicsClientId=self.client)
+        return [Touch(point[2], point[9], point[8]) for point in points if point[2] != number]
+
+    def joint_states(self, number: int, indices: Sequence[int]) -> list[JointState]:
+        """Returns the states of joints."""
+        records = self.api.getJointStates(number, indices, physicsClientId=self.client)
+        return [JointState(record[0], record[1], record[3]) for record in records]
+
+    def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
+        """Puts a joint somewhere."""
+        self.api.resetJointState(number, index, position, velocity, physicsClientId=self.client)
+
+    def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
+        """Returns rotation and velocity of a ball joint."""
+        turn, rate = self.api.getJointStateMultiDof(number, index, physicsClientId=self.client)[:2]
+        return turn, rate
+
+    def set_ball_joint_state(self, number: int, index: int, turn: Quaternion, rate: Vector3) -> None:
+        """Puts a ball joint somewhere."""
+        self.api.resetJointStateMultiDof(number, index, turn, rate, physicsClientId=self.client)
+
+    def release_ball_joint(self, number: int, index: int) -> None:
+        """Takes the engine's motor away from a ball joint."""
+        self.api.setJointMotorControlMultiDof(
+            number,
+            index,
+            self.api.POSITION_CONTROL,
+            targetPosition=[0.0, 0.0, 0.0, 1.0],
+            positionGain=0.0,
+            velocityGain=0.0,
+            force=[0.0, 0.0, 0.0],
+            physicsClientId=self.client,
+        )
+
+    def set_joint_damping(self, number: int, index: int, damping: float) -> None:
+        """Sets the resistance of a joint per velocity."""
+        self.api.changeDynamics(number, index, jointDamping=damping, physicsClientId=self.client)
+
+    def set_position_motors(
+        self,
+        number: int,
+        indices: Sequence[int],
+        targets: Sequence[float],
+        velocities: Sequence[float],
+        efforts: Sequence[float],
+        gain: float,
+    ) -> None:
+        """Lets motors move joints to positions."""
+        self.api.setJointMotorControlArray(
+            number,
+            indices,
+            self.api.POSITION_CONTROL,
+            targetPositions=targets,
+            targetVelocities=velocities,
+            forces=efforts,
+            positionGains=[gain] * len(indices),
+            velocityGains=[1.0] * len(indices),
+            physicsClientId=self.client,
+        )
+
+    def set_velocity_motor(self, number: int, index: int, velocity: float, effort: float) -> None:
+        """Lets a motor bring a joint to a velocity."""
+        self.api.setJointMotorControl2(
+            number,
+            index,
+            self.api.VELOCITY_CONTROL,
+            targetVelocity=velocity,
+            velocityGain=1.0,
+            force=effort,
+            physicsClientId=self.client,
+        )
+
+    def apply_effort(self, number: int, index: int, effort: float) -> None:
+        """Lets an effort act on a joint."""
+        self.api.setJointMotorControl2(
+            number, index, self.api.TORQUE_CONTROL, force=effort, physicsClientId=self.client
+        )
+
+    def measure_joint_load(self, number: int, index: int) -> None:
+        """Lets the engine measure the load on a joint."""
+        self.api.enableJointForceTorqueSensor(number, index, True, physicsClientId=self.client)
+
+    def joint_load(self, number: int, index: int) -> tuple[Vector3, Vector3]:
+        """Returns what the link below a joint does to the one above.
+
+        The engine gives what the parent does to the child, about the centre of mass of the child and in the axes of
+        its inertia, without what the motor does along the axis of the joint.
+        """
+        info = self.api.getJointInfo(number, index, physicsClientId=self.client)
+        _, _, reaction, motor = self.api.getJointState(number, index, physicsClientId=self.client)
+        record = self.api.getLinkState(number, index, physicsClientId=self.client)
+        centre_in_link = Pose(record[2], record[3])
+        x, y, z = info[13]  # in the axes of the link's inertia
+        along_axis = (motor * x, motor * y, motor * z)
+        force, torque = reaction[:3], reaction[3:]
+        if info[2] == self.api.JOINT_REVOLUTE:
+            torque = add(torque, along_axis)
+        force, torque = (rotate_vector(centre_in_link.quaternion, each) for each in (force, torque))
+        about_origin = add(torque, cross(centre_in_link.position, force))
+        return _negative(force), _negative(about_origin)
+
+
+def _negative(vector: Vector3) -> Vector3:
+    x, y, z = vector
+    return (-x, -y, -z)
