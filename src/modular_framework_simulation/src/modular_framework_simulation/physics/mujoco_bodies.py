@@ -45,6 +45,10 @@ HARDEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """Impedance of contacts, limits and motors: the hardest that MuJoCo has. What is left of it, forces of 0.01 % of those
 that would be needed to move the bodies as free ones, shows in no test."""
 
+REACH_M = 1e-3
+"""How far apart shapes are that may touch in the coming step [m]. A light finger whose motor pushes it crosses a tenth
+of this in a step; without a reach, it would hit what it holds again and again."""
+
 _LEAST_IMBALANCE = 1e-9
 """By which share a moment of inertia may be larger than the sum of the others, for rounding."""
 
@@ -331,6 +335,7 @@ class SpecWriter:
             pos=pose.position,
             quat=wxyz(pose.quaternion),
             condim=6,
+            margin=REACH_M,
             solimp=HARDEST,
             mass=0.0,
             **further,

@@ -35,8 +35,17 @@ _LIMIT, _MOTOR = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT), int(mujoco.mjtCo
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 """Joints with one degree of freedom."""
 
+_DISABLED = (
+    mujoco.mjtDisableBit.mjDSBL_EULERDAMP,
+    mujoco.mjtDisableBit.mjDSBL_ISLAND,
+    mujoco.mjtDisableBit.mjDSBL_NATIVECCD,
+)
+
 _NOSLIP_ITERATIONS = 3
 """Passes over the friction forces without the softness of the solver: with them, what is held does not creep."""
+
+_FREE = 1e3
+"""Loss of velocity in a step [m/s] that no contact has to prevent."""
 
 _LEAST_FRICTION = 1e-5
 """The least that MuJoCo divides by; where a coefficient is smaller, the contact has no such friction."""
@@ -88,7 +97,7 @@ class MujocoDynamics:
         options.cone, options.solver = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_NEWTON
         options.integrator = mujoco.mjtIntegrator.mjINT_EULER
         # Damping of joints is explicit, as `joint_resistance` computes it; islands would copy references too early.
-        options.disableflags = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP) | int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+        options.disableflags = sum(int(each) for each in _DISABLED)
 
     def moved(self) -> None:
         """Says that something was put elsewhere."""
@@ -171,7 +180,8 @@ class MujocoDynamics:
         shares[kinds == _LIMIT] = settings.hardest_erp
         if data.ncon:
             self._set_shares(shares)
-        wanted = -shares / step_s * np.minimum(data.efc_pos, 0.0)
+        # What is apart may come as near as to touch; of what is inside each other, a share comes out.
+        wanted = -np.where(data.efc_pos < 0.0, shares, 1.0) / step_s * data.efc_pos
         motors = np.flatnonzero(kinds == _MOTOR)
         positions = np.zeros(self.model.nv)
         positions[self._single_dofs] = data.qpos[self._single_positions]
@@ -213,7 +223,10 @@ class MujocoDynamics:
         shares = self._pairs(BOUNCING).min(axis=1)
         bouncing = np.flatnonzero((shares > 0.0) & (data.contact.efc_address >= 0))
         rows = data.contact.efc_address[bouncing]
+        apart = rows[data.efc_pos[rows] > 0.0]
+        wanted[apart] = data.efc_vel[apart] - _FREE  # the impact is to have the whole velocity
         fast = data.efc_vel[rows] < -self.settings.bounce_threshold
+        fast &= data.efc_pos[rows] <= 0.0
         wanted[rows[fast]] = -shares[bouncing[fast]] * data.efc_vel[rows[fast]]
 
     def _measure_loads(self) -> None:
