@@ -81,6 +81,7 @@ class MujocoDynamics:
         self.settings = settings
         self.adjust(settings, gravity)
         self.coefficients = np.zeros((model.ngeom, 6))
+        self._pairs = np.zeros((0, 2, 6))  # of both shapes of every contact
         self.motor_velocities, self.motor_targets, self.motor_gains, self.motor_efforts = np.zeros((4, model.nv))
         self.measures_loads = False
         self._forces, self._torques = np.zeros((2, model.nbody, 3))
@@ -122,6 +123,7 @@ class MujocoDynamics:
         mujoco.mj_makeM(model, data)
         mujoco.mj_factorM(model, data)
         mujoco.mj_collision(model, data)
+        self._pairs = self.coefficients[data.contact.geom] if data.ncon else np.zeros((0, 2, 6))
         self._set_frictions()
         mujoco.mj_makeConstraint(model, data)
         self._soften()
@@ -160,10 +162,9 @@ class MujocoDynamics:
 
         The latter is the rule of Bullet.
         """
-        contact = self.data.contact
+        contact, a, b = self.data.contact, self._pairs[:, 0], self._pairs[:, 1]
         if self.data.ncon == 0:
             return
-        a, b = self.coefficients[contact.geom[:, 0]], self.coefficients[contact.geom[:, 1]]
         slide = np.minimum(a[:, SLIDING], b[:, SLIDING])
         spin, roll = (a[:, each] * b[:, SLIDING] + b[:, each] * a[:, SLIDING] for each in (SPINNING, ROLLING))
         kinds = np.where(roll > _LEAST_FRICTION, 6, np.where(spin > _LEAST_FRICTION, 4, 3))
@@ -192,16 +193,12 @@ class MujocoDynamics:
         data.efc_aref[:] = (wanted - data.efc_vel) / step_s
         return motors
 
-    def _pairs(self, column: int) -> Array:
-        """Returns a coefficient of both shapes of every contact, n x 2."""
-        return self.coefficients[self.data.contact.geom, column]
-
     def _soften(self) -> None:
         """Lets contacts give way as their stiffness says: the springs of the two surfaces act one behind the other."""
         data, contact = self.data, self.data.contact
-        if data.ncon == 0:
+        if not self._pairs[:, :, YIELDING].any():
             return
-        yielding, share = self._pairs(YIELDING).sum(axis=1), self._pairs(CORRECTION).max(axis=1)
+        yielding, share = self._pairs[:, :, YIELDING].sum(axis=1), self._pairs[:, :, CORRECTION].max(axis=1)
         for each in np.flatnonzero((yielding > 0.0) & (contact.efc_address >= 0)):
             begin = contact.efc_address[each]
             rows = slice(begin, begin + contact.dim[each])
@@ -213,14 +210,16 @@ class MujocoDynamics:
         """Sets the share of its penetration that a contact which bounces or gives way corrects in one step."""
         present = self.data.contact.efc_address >= 0
         rows = self.data.contact.efc_address[present]
-        own = self._pairs(CORRECTION).max(axis=1)[present]
+        own = self._pairs[present, :, CORRECTION].max(axis=1)
         own[own == 0.0] = self.settings.contact_erp
-        shares[rows] = np.where(self._pairs(BOUNCING).min(axis=1)[present] > 0.0, self.settings.bounce_erp, own)
+        shares[rows] = np.where(self._pairs[present, :, BOUNCING].min(axis=1) > 0.0, self.settings.bounce_erp, own)
 
     def _let_bounce(self, wanted: Array) -> None:
         """Lets bouncing contacts leave with the share of the velocity with which they met."""
         data = self.data
-        shares = self._pairs(BOUNCING).min(axis=1)
+        shares = self._pairs[:, :, BOUNCING].min(axis=1)
+        if not shares.any():
+            return
         bouncing = np.flatnonzero((shares > 0.0) & (data.contact.efc_address >= 0))
         rows = data.contact.efc_address[bouncing]
         apart = rows[data.efc_pos[rows] > 0.0]

@@ -281,12 +281,11 @@ class MujocoEngine(PhysicsEngine):
     def touches(self, number: int, index: int) -> list[Touch]:
         """Returns where a link touched others."""
         bodies, forces, distances = self._dynamics.touches()
-        body, found = self._bodies[number].ids[index + 1], []
-        for one, other in ((0, 1), (1, 0)):
-            for row in np.flatnonzero(bodies[:, one] == body):
-                touched = int(self._number_of[bodies[row, other]])
-                if touched != number:
-                    found.append(Touch(touched, float(forces[row]), float(distances[row])))
+        found = []
+        for row, side in np.argwhere(bodies == self._bodies[number].ids[index + 1]).tolist():
+            other = int(self._number_of[bodies[row, 1 - side]])
+            if other != number:
+                found.append(Touch(other, float(forces[row]), float(distances[row])))
         return found
 
     # Joints
