@@ -11,8 +11,8 @@ import rospy
 
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_simulation.gazebo_ros.starting_pose import parse_starting_pose
-from modular_framework_simulation.physics.physics_settings import LONGEST_STEP_NS, SHORTEST_STEP_NS, PhysicsSettings
 from modular_framework_simulation.physics.engine_choice import ENGINES, PYBULLET
+from modular_framework_simulation.physics.physics_settings import LONGEST_STEP_NS, SHORTEST_STEP_NS, PhysicsSettings
 
 
 @dataclass(frozen=True, slots=True)
