@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from controller_manager_msgs.srv import ListControllers
 from gazebo_msgs.srv import ApplyBodyWrench, DeleteModel, GetModelState, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 from ros_session import until
@@ -52,6 +53,11 @@ def height(model: str) -> float:
     return float(state.pose.position.z)
 
 
+def running_controllers() -> list[str]:
+    listed = rospy.ServiceProxy("/controller_manager/list_controllers", ListControllers)()
+    return [controller.name for controller in listed.controller if controller.state == "running"]
+
+
 def test_the_log_says_which_engine_it_is(simulation: Any) -> None:
     until(lambda: "physics engine mujoco" in simulation.log(), "the line")
 
@@ -59,6 +65,7 @@ def test_the_log_says_which_engine_it_is(simulation: Any) -> None:
 def test_the_arm_follows_a_trajectory(simulation: Any) -> None:
     client = SteadyActionClient("/arm_trajectory_controller/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(60.0))
+    until(lambda: "arm_trajectory_controller" in running_controllers(), "the controller", timeout_s=60.0)
     positions = [1.8, -1.3, 1.3, -1.5, -1.4, 0.5]
     goal = FollowJointTrajectoryGoal()
     goal.trajectory.joint_names = ARM
