@@ -302,7 +302,7 @@ def test_all_options_of_spawn_model_have_their_effect(simulation: Any, ros_sessi
         assert spawn_model(*words)[0] == 1, "there is no package of that name"
         code, text = spawn_model(*words, "-package_to_model", "-robot_namespace", "/some", "-unpause")
         assert code == 0, text
-        assert "-robot_namespace /some has no effect" in text
+        assert "-robot_namespace /some counts for sensors only" in text
         assert not call("/gazebo/get_physics_properties", GetPhysicsProperties).pause
         bonded = subprocess.Popen(
             [*command, "-sdf", "-database", "cube", "-model", "bonded", "-b"], env=ros_session.env

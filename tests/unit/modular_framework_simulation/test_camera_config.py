@@ -11,8 +11,9 @@ import pytest
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.sensors.camera_config import read_cameras
 from modular_framework_simulation.sensors.cameras import CameraTopics
+from modular_framework_simulation.sensors.noise import NO_NOISE, Noise
 from modular_framework_simulation.sensors.robot_visuals import read_robot_visuals
-from modular_framework_simulation.sensors.urdf_cameras import read_urdf_cameras
+from modular_framework_simulation.sensors.sensor_reader import read_robot_sensors
 from modular_framework_urdf.rotations import rotate_vector
 
 OVERHEAD: dict[str, Any] = {
@@ -45,7 +46,7 @@ def changed(**keys: Any) -> dict[str, Any]:
 
 def test_the_overhead_camera_looks_down_under_the_topics_of_the_file() -> None:
     cameras, faults = read_cameras(OVERHEAD, "sensors", locate)
-    assert faults == []
+    assert not faults
     (camera,) = cameras
     info = "simulated_kinect2/camera_info"
     topics = (
@@ -78,7 +79,7 @@ def test_the_later_layout_and_settings_of_a_camera_are_read() -> None:
         "camera": {"width": 320, "height": 200, "horizontal_fov": 0.8, "near": 0.1, "far": 3.0, "rate": 5},
     }
     (camera,), faults = read_cameras({"eye": section}, "sensors", locate)
-    assert faults == []
+    assert not faults
     assert (camera.parent, camera.topics, camera.rate_hz) == ("robot::tool", CameraTopics(points="eye/cloud"), 5.0)
     assert camera.optical_in_parent.distance_to(Pose.from_xyz_rpy((0.1, 0, 0.2), (0, 0, math.pi / 2)))[1] < 1e-9
     assert (camera.pinhole.width, camera.pinhole.height, camera.pinhole.far) == (320, 200, 3.0)
@@ -95,6 +96,7 @@ def test_the_later_layout_and_settings_of_a_camera_are_read() -> None:
         ({"camera": {"zoom": 2}}, "camera: unknown key 'zoom'; allowed: width"),
         ({"camera": 3}, "camera: got 3; expected a mapping"),
         ({"camera": {"rate": 0}}, "camera/rate: got 0 Hz; allowed: more than 0"),
+        ({"camera": {"noise_stddev": -1}}, "camera/noise_stddev: got -1; allowed: 0 or more"),
         ({"data_topics": {"rgb_topic": 3}}, "rgb_topic: got 3; expected a name"),
     ],
 )
@@ -123,9 +125,15 @@ COLOUR = """<sensor type="camera" name="eye"><plugin name="k" filename="libgazeb
   <robotNamespace>/robot/</robotNamespace><updateRate>5.0</updateRate></plugin></sensor>"""
 
 
+def cameras_of(text: str) -> tuple[list[Any], list[str]]:
+    """The cameras of a robot, and what is wrong with the others."""
+    sensors = read_robot_sensors(text, "r", str)
+    return list(sensors.found), list(sensors.faults.values())
+
+
 def test_a_kinect_of_a_urdf_publishes_under_the_names_of_its_plugin() -> None:
-    (camera,), faults = read_urdf_cameras(urdf(KINECT), "r")
-    assert faults == []
+    (camera,), faults = cameras_of(urdf(KINECT))
+    assert not faults
     names = ("image_raw", "camera_info", "depth/raw", "depth/camera_info", "points")
     assert camera.topics == CameraTopics(*(f"kinect/{name}" for name in names))
     assert (camera.parent, camera.frame_id, camera.rate_hz) == ("r::head", "eye_optical", 15.0)
@@ -137,8 +145,8 @@ def test_a_kinect_of_a_urdf_publishes_under_the_names_of_its_plugin() -> None:
 
 
 def test_a_camera_of_a_urdf_has_no_depth() -> None:
-    (camera,), faults = read_urdf_cameras(urdf(COLOUR), "r")
-    assert faults == []
+    (camera,), faults = cameras_of(urdf(COLOUR))
+    assert not faults
     assert camera.topics == CameraTopics("robot/eye/image_raw", "robot/eye/camera_info")
     assert camera.rate_hz == 5.0
 
@@ -154,7 +162,7 @@ def test_a_camera_of_a_urdf_has_no_depth() -> None:
     ],
 )
 def test_a_fault_of_a_urdf_names_line_and_reason(text: str, found: str) -> None:
-    cameras, faults = read_urdf_cameras(text, "r")
+    cameras, faults = cameras_of(text)
     assert cameras == []
     assert len(faults) == 1
     assert found in faults[0]
@@ -171,3 +179,9 @@ def test_visuals_of_a_robot_have_their_material_and_what_is_missing_is_named() -
     assert (box.colour, box.pose.position) == ((0.0, 0.0, 1.0, 1.0), (0.0, 0.0, 1.0))
     assert len(lines) == 1
     assert "a visual of link 'head' is not drawn" in lines[0]
+
+
+def test_noise_of_a_camera_is_off_unless_its_section_has_a_deviation() -> None:
+    (plain,), _ = read_cameras(changed(), "sensors", locate, seed=3)
+    (noisy,), _ = read_cameras(changed(camera={"noise_stddev": 0.02}), "sensors", locate, seed=3)
+    assert (plain.noise, noisy.noise, noisy.seed) == (NO_NOISE, Noise(stddev=0.02), 3)

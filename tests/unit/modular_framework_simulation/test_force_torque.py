@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,8 +19,8 @@ from modular_framework_simulation.sensors.force_torque import (
     ForceTorqueSensor,
     JointLoad,
     Wrench,
-    read_force_torque_sensors,
 )
+from modular_framework_simulation.sensors.sensor_reader import read_robot_sensors
 from modular_framework_urdf.rotations import rotate_vector
 
 GRAVITY = 9.81
@@ -50,15 +51,23 @@ def urdf(kind: str, plugin: str = PLUGIN) -> str:
       {TRANSMISSION.format(joint="shoulder")}{wrist}{plugin}</robot>"""
 
 
+def sensors_of(text: str) -> tuple[list[ForceTorqueSensor], list[str]]:
+    """The force-torque sensors of a robot called arm, and what is wrong with others."""
+    sensors = read_robot_sensors(text, "arm", str)
+    return [each for each in sensors.found if isinstance(each, ForceTorqueSensor)], list(sensors.faults.values())
+
+
 def weighed(world: PhysicsWorld, robot: RobotBody, load: JointLoad) -> Wrench:
     """What the sensor says when the arm has come to rest."""
     targets = {"shoulder": 0.4, "wrist": 0.3}
-    load.start()
+    load.measure()
     for _ in range(750):
         robot.read()
         robot.drive({name: Drive(Mode.POSITION, targets[name], 0.0, 500.0) for name in robot.joint_names})
         world.step()
-    return load.measure()
+    wrench = load.measure()
+    assert wrench is not None
+    return wrench
 
 
 def expected_wrench(world: PhysicsWorld) -> tuple[np.ndarray, np.ndarray]:
@@ -80,8 +89,8 @@ def test_the_weight_on_a_joint_is_measured_within_a_percent(
 ) -> None:
     world = make_world()
     robot = RobotBody(world, read_robot(urdf(kind), str, convex_parts, False), "arm", Pose(), {"shoulder": 0.4})
-    (sensor,), _ = read_force_torque_sensors(urdf(kind))
-    load = JointLoad(world, "arm", sensor)
+    sensor = sensors_of(urdf(kind))[0][0]
+    load = JointLoad(world, sensor)
     wrench = weighed(world, robot, load)
     force, torque = expected_wrench(world)
     assert np.linalg.norm(wrench.force - force) < 0.01 * np.linalg.norm(force)
@@ -93,7 +102,7 @@ def test_a_sensor_measures_again_after_a_restart(
 ) -> None:
     world = make_world()
     robot = RobotBody(world, read_robot(urdf("revolute"), str, convex_parts, False), "arm", Pose(), {"shoulder": 0.4})
-    load = JointLoad(world, "arm", ForceTorqueSensor("wrist", "tool", "wrench", "tool"))
+    load = JointLoad(world, sensors_of(urdf("revolute"))[0][0])
     before = weighed(world, robot, load)
     world.restart()
     robot.reload()
@@ -104,16 +113,18 @@ def test_a_joint_that_is_not_there_is_named(make_world: Callable[[], PhysicsWorl
     world = make_world()
     RobotBody(world, read_robot(urdf("revolute"), str, convex_parts, False), "arm", Pose(), {})
     with pytest.raises(UnknownEntityError, match="arm::elbow"):
-        JointLoad(world, "arm", ForceTorqueSensor("elbow", "tool", "wrench", "tool"))
+        JointLoad(world, replace(sensors_of(urdf("revolute"))[0][0], joint="elbow"))
 
 
 def test_topic_frame_and_rate_are_those_of_the_plugin() -> None:
-    sensors, faults = read_force_torque_sensors(urdf("revolute"))
-    assert (sensors, faults) == ([ForceTorqueSensor("wrist", "tool", "wrist/wrench", "tool", 250.0)], [])
+    sensors, faults = sensors_of(urdf("revolute"))
+    expected = ("arm::ft", "arm::tool", "wrist", "upper", "wrist/wrench", "tool", 250.0)
+    found = [(s.name, s.parent, s.joint, s.parent_link, s.topic, s.frame_id, s.rate_hz) for s in sensors]
+    assert (found, faults) == ([expected], [])
 
 
 def test_a_sensor_in_a_slide_is_refused() -> None:
-    sensors, faults = read_force_torque_sensors(urdf("prismatic"))
+    sensors, faults = sensors_of(urdf("prismatic"))
     assert sensors == []
     assert "got 'wrist'; allowed are joints that are fixed or turn: shoulder, flange" in faults[0]
 
@@ -127,11 +138,15 @@ def test_a_sensor_in_a_slide_is_refused() -> None:
             "<jointName>: got 'elbow'; allowed are joints that are fixed or turn: shoulder, wrist, flange",
         ),
         ("250", "often", "<updateRate>: got 'often'; expected a number"),
-        ("<updateRate>", "<gaussianNoise>0.1</gaussianNoise><updateRate>", "<gaussianNoise>: got 0.1; allowed: 0"),
+        (
+            "<updateRate>",
+            "<gaussianNoise>-1</gaussianNoise><updateRate>",
+            "<gaussianNoise>: got -1; allowed: 0 or more",
+        ),
     ],
 )
 def test_a_sensor_that_cannot_be_is_named_with_the_reason(old: str, new: str, found: str) -> None:
-    sensors, faults = read_force_torque_sensors(urdf("revolute", PLUGIN.replace(old, new)))
+    sensors, faults = sensors_of(urdf("revolute", PLUGIN.replace(old, new)))
     assert sensors == []
     assert len(faults) == 1
     assert found in faults[0]

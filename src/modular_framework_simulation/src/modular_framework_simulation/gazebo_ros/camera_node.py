@@ -17,6 +17,7 @@ from modular_framework_simulation.models.mesh_files import default_cache_folder
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_simulation.sensors.cameras import Camera
 from modular_framework_simulation.sensors.drawing_choice import fastest_drawing
+from modular_framework_simulation.sensors.noise import NoiseSource
 from modular_framework_simulation.sensors.renderer import Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneReport, SceneUpdate
 
@@ -37,6 +38,7 @@ class CameraPublisher:
 
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
+        self._noise = NoiseSource(camera.seed, camera.name, (camera.noise,))
         topics = camera.topics
         self._image = _publisher(topics.image, Image)
         self._depth = _publisher(topics.depth, Image)
@@ -63,12 +65,19 @@ class CameraPublisher:
         if not self.draws:
             return
         image = renderer.image(camera.pinhole, update.cameras[camera.name]).within(camera.depth_range)
+        image = image.with_noise(self._noise, update.time_ns)
         if _subscribed(self._image):
             self._image.publish(camera_messages.rgb_image(image, head))
         if _subscribed(self._depth):
             self._depth.publish(camera_messages.depth_image(image, head))
         if _subscribed(self._points):
             self._points.publish(camera_messages.point_cloud(camera.pinhole, image, head))
+
+    def close(self) -> None:
+        """Ends the topics."""
+        for publisher in (self._image, self._depth, self._points, *self._infos):
+            if publisher is not None:
+                publisher.unregister()
 
 
 def _publisher(topic: str, kind: type) -> Any:
@@ -79,10 +88,21 @@ def _subscribed(publisher: Any) -> bool:
     return publisher is not None and publisher.get_num_connections() > 0
 
 
+def replaced(publishers: list[CameraPublisher], cameras: tuple[Camera, ...]) -> list[CameraPublisher]:
+    """Returns the publishers of other cameras; those of cameras that stay keep their subscribers."""
+    kept = {each.camera.name: each for each in publishers if each.camera in cameras}
+    for each in publishers:
+        if each.camera.name not in kept:
+            each.close()
+    return [kept.get(camera.name) or CameraPublisher(camera) for camera in cameras]
+
+
 def serve(pipe: Connection) -> None:
-    """Draws for the simulation at the other end of a pipe, until that sends None or is gone, or ROS shuts down."""
-    cameras: tuple[Camera, ...] = pipe.recv()
-    publishers = [CameraPublisher(camera) for camera in cameras]
+    """Draws what the simulation at the other end of a pipe asks for.
+
+    It sends the cameras, whenever they change, updates of the scene, and None at the end.
+    """
+    publishers: list[CameraPublisher] = []
     renderer: Renderer | None = None
     done, reported = 0, SceneReport(0, frozenset())
     while not rospy.is_shutdown():
@@ -92,9 +112,12 @@ def serve(pipe: Connection) -> None:
             reported = report
         if not pipe.poll(_POLL_S):
             continue
-        update: SceneUpdate | None = pipe.recv()
+        update: SceneUpdate | tuple[Camera, ...] | None = pipe.recv()
         if update is None:
             return
+        if isinstance(update, tuple):
+            publishers = replaced(publishers, update)
+            continue
         if renderer is None:
             meshes = VisualMeshes(default_cache_folder())
             renderer = Renderer(fastest_drawing(rospy.loginfo), meshes, rospy.logwarn)

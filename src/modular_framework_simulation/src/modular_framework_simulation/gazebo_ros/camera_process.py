@@ -7,61 +7,87 @@ import contextlib
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 
 import rospy
 
 from modular_framework_simulation.gazebo_ros import ros_names
-from modular_framework_simulation.physics.physics_world import WORLD_FRAMES, PhysicsWorld
+from modular_framework_simulation.physics.physics_world import WORLD_FRAMES
 from modular_framework_simulation.physics.robot_body import RobotBody
 from modular_framework_simulation.sensors.camera_config import read_cameras
 from modular_framework_simulation.sensors.cameras import Camera
-from modular_framework_simulation.sensors.robot_visuals import read_robot_visuals
-from modular_framework_simulation.sensors.urdf_cameras import read_urdf_cameras
-from modular_framework_simulation.sensors.visible_scene import LinkVisuals, SceneReport, SceneTracker
-from modular_framework_urdf.mesh_paths import PackageFinder
+from modular_framework_simulation.sensors.visible_scene import SceneReport, SceneTracker
 
 _END_TIMEOUT_S = 5.0
 
 
 class CameraProcess:
-    """Cameras that are drawn in another process.
+    """Cameras that are drawn in another process, which is started once there is a camera.
 
     Physics never waits for it: while an image is drawn, no other is asked for, and the next one is late.
 
     Args:
-        cameras: The cameras; without any, no process is started.
-        tracker: Describes what they see.
+        make_tracker: Makes what describes the things they see; called when there is a camera.
+        fixed: Cameras that stay.
     """
 
-    def __init__(self, cameras: Sequence[Camera], tracker: SceneTracker) -> None:
-        self._cameras = {camera.name: camera for camera in cameras}
-        self._tracker = tracker
-        self._due_ns = dict.fromkeys(self._cameras, 0)
+    def __init__(self, make_tracker: Callable[[], SceneTracker], fixed: Sequence[Camera] = ()) -> None:
+        self._make_tracker = make_tracker
+        self._tracker: SceneTracker | None = None
+        self._fixed = tuple(fixed)
+        self._cameras = {camera.name: camera for camera in fixed}
+        self._due_ns: dict[str, int] = {}
         self._sent = 0
         self._report = SceneReport(0, frozenset())
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
+        self._connected = False
 
     def connect(self) -> None:
-        """Starts the process."""
+        """Starts the process, now or with the first camera."""
+        self._connected = True
         if not self._cameras:
             return
+        self._tracker = self._make_tracker()
         self._pipe, other_end = Pipe()
         remappings = [each for each in sys.argv[1:] if ":=" in each and not each.startswith("__")]
         command = [sys.executable, "-m", "modular_framework_simulation.gazebo_ros.camera_node", str(other_end.fileno())]
         name = f"__name:={ros_names.CAMERAS_NODE}"
         self._process = subprocess.Popen([*command, name, *remappings], pass_fds=[other_end.fileno()])
         other_end.close()
-        self._pipe.send(tuple(self._cameras.values()))
         threading.Thread(target=self._listen, args=(self._pipe, self._process), name="cameras", daemon=True).start()
+        self._send_cameras(self._pipe)
+
+    def _send_cameras(self, pipe: Connection) -> None:
+        pipe.send(tuple(self._cameras.values()))
         for camera in self._cameras.values():
-            rospy.loginfo(
-                "camera '%s' on '%s': %d x %d at %g Hz", camera.name, camera.parent, camera.pinhole.width,
-                camera.pinhole.height, camera.rate_hz,
-            )  # fmt: skip
+            if camera.name not in self._due_ns:
+                self._due_ns[camera.name] = 0
+                rospy.loginfo(
+                    "camera '%s' on '%s': %d x %d at %g Hz", camera.name, camera.parent, camera.pinhole.width,
+                    camera.pinhole.height, camera.rate_hz,
+                )  # fmt: skip
+
+    def set_cameras(self, cameras: Sequence[Camera]) -> None:
+        """Takes the cameras of all models, which come and go; called by the loop's thread.
+
+        Args:
+            cameras: All of them, without those that stay.
+        """
+        wanted = {camera.name: camera for camera in (*self._fixed, *cameras)}
+        if wanted == self._cameras:
+            return
+        self._cameras = wanted
+        self._due_ns = {name: due_ns for name, due_ns in self._due_ns.items() if name in wanted}
+        if not self._connected:
+            return
+        if self._process is None:
+            self.connect()
+        elif self._pipe is not None:
+            with contextlib.suppress(OSError):  # it has ended, and the log says so
+                self._send_cameras(self._pipe)
 
     def _listen(self, pipe: Connection, process: subprocess.Popen[bytes]) -> None:
         try:
@@ -80,9 +106,10 @@ class CameraProcess:
             time_ns: Simulated time [ns].
         """
         report = self._report
-        if not report.wanted or report.images < self._sent or self._pipe is None:
+        if not report.wanted or report.images < self._sent or self._pipe is None or self._tracker is None:
             return
-        due = [self._cameras[name] for name in report.wanted if self._is_due(name, time_ns)]
+        wanted = (name for name in report.wanted if name in self._cameras)
+        due = [self._cameras[name] for name in wanted if self._is_due(name, time_ns)]
         if due:
             self._sent += 1
             try:
@@ -103,6 +130,7 @@ class CameraProcess:
 
     def close(self) -> None:
         """Ends the process; may be called twice."""
+        self._connected = False
         pipe, self._pipe = self._pipe, None
         if pipe is None or self._process is None:
             return
@@ -115,16 +143,12 @@ class CameraProcess:
             self._process.wait()
 
 
-def simulated_cameras(
-    world: PhysicsWorld, robot: RobotBody | None, description: str, find_package: PackageFinder
-) -> CameraProcess:
-    """Reads the cameras of parameter `~sensors` (a `sensors_config.yaml`) and of the robot's description.
+def configured_cameras(robot: RobotBody | None, seed: int) -> list[Camera]:
+    """Reads the cameras of parameter `~sensors` (a `sensors_config.yaml`); what cannot be used is logged.
 
     Args:
-        world: What is seen.
         robot: The robot, if there is one.
-        description: Its URDF.
-        find_package: Looks up the packages of package:// URIs.
+        seed: Of noise.
     """
     name = robot.body.name if robot is not None else ""
 
@@ -138,13 +162,7 @@ def simulated_cameras(
     if not isinstance(settings, Mapping):
         rospy.logwarn("parameter %s: got %r; expected the contents of a sensors_config.yaml", where, settings)
         settings = {}
-    cameras, faults = read_cameras(settings, f"parameter {where}", locate)
-    visuals: dict[str, LinkVisuals] = {}
-    if robot is not None:
-        more, more_faults = read_urdf_cameras(description, name)
-        cameras, faults = cameras + more, faults + more_faults
-        if cameras:
-            visuals[name] = read_robot_visuals(description, find_package, rospy.logwarn)
+    cameras, faults = read_cameras(settings, f"parameter {where}", locate, seed)
     for fault in faults:
         rospy.logwarn(fault)
-    return CameraProcess(cameras, SceneTracker(world, visuals))
+    return cameras

@@ -74,7 +74,8 @@ class ModelServices:
 
     def _spawn(self, service: str, request: Any, model: Model) -> Any:
         # Decomposing meshes may take seconds: it is done in this thread, while the loop continues.
-        model = dataclasses.replace(model, name=request.model_name or model.name)
+        name = request.model_name or model.name
+        model = dataclasses.replace(model, name=name, namespace=request.robot_namespace)
         if model.name in WORLD_FRAMES:
             raise ValueError(f"a model cannot have the name '{model.name}': it stands for the frame of the world")
         prepared = self._world.prepare(model)

@@ -18,11 +18,11 @@ from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
-from modular_framework_simulation.gazebo_ros.camera_process import simulated_cameras
-from modular_framework_simulation.gazebo_ros.force_torque_topics import force_torque_topics
+from modular_framework_simulation.gazebo_ros.camera_process import CameraProcess, configured_cameras
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
 from modular_framework_simulation.gazebo_ros.parameters import SimulationParameters, read_parameters
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
+from modular_framework_simulation.gazebo_ros.sensor_topics import SensorTopics, noise_seed
 from modular_framework_simulation.gazebo_ros.time_services import TimeServices
 from modular_framework_simulation.gazebo_ros.world_files import find_world_file
 from modular_framework_simulation.gazebo_ros.world_topics import ClockTopic, WorldTopics
@@ -43,6 +43,9 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
+from modular_framework_simulation.sensors.robot_visuals import read_robot_visuals
+from modular_framework_simulation.sensors.sensor_reader import read_robot_sensors
+from modular_framework_simulation.sensors.visible_scene import SceneTracker
 
 _PACKAGE = "modular_framework_simulation"
 _STATES_RATE_HZ = 50
@@ -78,7 +81,8 @@ class SimulationNode:
     """Builds the world from parameters and runs it.
 
     Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `GazeboServices`,
-    `TimeServices`, `PlanningScenePublisher`, `CameraPublisher` and, for the controllers, `RosControllerManager`.
+    `TimeServices`, `PlanningScenePublisher`, `SensorTopics`, `CameraPublisher` and, for the controllers,
+    `RosControllerManager`.
 
     Args:
         parameters: What to simulate and how.
@@ -115,12 +119,7 @@ class SimulationNode:
         self._time_services = TimeServices(
             self._loop, self._scene, self._snapshot, parameters.wait_for_planning, digest, self._services.refresh
         )
-        self._cameras = simulated_cameras(
-            self._world, actors.robot if actors else None, parameters.robot_description, self._resources.find_package
-        )
-        self._wrenches = force_torque_topics(
-            self._world, actors.robot.body.name if actors else "", parameters.robot_description
-        )
+        self._sensors, self._cameras = self._build_sensors(parameters.robot_description, actors)
         self._add_hooks(parameters.clock_rate_hz)
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
         self._failed = False
@@ -159,6 +158,17 @@ class SimulationNode:
         self._controllers = RosControllerManager(hardware)
         return Actors(robot, hardware, self._controllers)
 
+    def _build_sensors(self, description: str, actors: Actors | None) -> tuple[SensorTopics, CameraProcess]:
+        robot, find_package, seed = actors.robot if actors else None, self._resources.find_package, noise_seed()
+        robots = [read_robot_sensors(description, robot.body.name, find_package, seed)] if robot else []
+
+        def make_tracker() -> SceneTracker:
+            seen = {robot.body.name: read_robot_visuals(description, find_package, rospy.logwarn)} if robot else {}
+            return SceneTracker(self._world, seen)
+
+        cameras = CameraProcess(make_tracker, configured_cameras(robot, seed))
+        return SensorTopics(self._world, robots, seed, cameras.set_cameras), cameras
+
     def _add_hooks(self, clock_rate_hz: float) -> None:
         def every(rate_hz: float) -> int:
             return round(1e9 / rate_hz) if rate_hz else 0
@@ -170,8 +180,7 @@ class SimulationNode:
             self._loop.add_hook(Hook(every(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
         self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
         self._loop.add_hook(Hook(every(_CAMERA_RATE_HZ), lambda: self._cameras.tick(self._world.time_ns)))
-        for wrench in self._wrenches:
-            self._loop.add_hook(Hook(every(wrench.sensor.rate_hz), wrench.publish))
+        self._loop.add_hook(Hook(0, self._sensors.tick))
         self._loop.add_hook(Hook(every(_SNAPSHOT_RATE_HZ), self._show_snapshot))
         self._loop.add_hook(Hook(every(1 / _PACE_REPORT_S), self._report_pace))
 
@@ -190,6 +199,7 @@ class SimulationNode:
     def _on_paused_tick(self) -> None:
         """Publishes the state while time is paused, because models may be spawned, moved and deleted then."""
         self._clock.publish()
+        self._sensors.follow()
         self._show_snapshot()
 
     def _show_snapshot(self) -> None:
@@ -256,6 +266,7 @@ class SimulationNode:
             self._controllers.close()
             self._controllers = None
         if not self._thread.is_alive():
+            self._sensors.close()
             self._world.close()
 
 

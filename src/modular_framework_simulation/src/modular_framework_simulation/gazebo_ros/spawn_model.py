@@ -68,8 +68,8 @@ def _spawn(command: SpawnCommand) -> None:
         text = package_to_model(text, command.source_name or command.source.value)
     if command.namespace.strip("/"):
         rospy.logwarn(
-            "spawn_model: -robot_namespace %s has no effect: models of this simulation have no ROS interfaces of their "
-            "own, and controllers are those of the robot that it was started with",
+            "spawn_model: -robot_namespace %s counts for sensors only: controllers are those of the robot that the "
+            "simulation was started with",
             command.namespace,
         )
     name = ros_names.SPAWN_SDF_MODEL if command.format is Format.SDF else ros_names.SPAWN_URDF_MODEL

@@ -16,6 +16,7 @@ from modular_framework_simulation.models.sdf_joints import read_joint
 from modular_framework_simulation.models.sdf_resources import NEWEST_VERSION, OLDEST_VERSION, Resources, version_numbers
 from modular_framework_simulation.models.sdf_shapes import Reading, read_collisions, read_visuals
 from modular_framework_simulation.models.sdf_surface import read_velocity_decay
+from modular_framework_simulation.models.sensor_elements import sdf_sensor_elements
 from modular_framework_simulation.models.xml_nodes import XmlNode, read_xml
 
 _MAX_DEPTH = 16
@@ -147,9 +148,11 @@ class SdfModels:
         frames = FrameTree(node, {name: each.placed for name, each in inner.items()}, canonical)
         links = [_read_link(link, frames, static, reading) for link in own_links]
         joints = [read_joint(joint, frames, version) for joint in node.find_all("joint")]
+        sensors = list(sdf_sensor_elements(node, frames))
         for name, each in inner.items():
             _add_inner(name, each.spec, frames.pose_in_model(name), links, joints, fasten=not static)
             reading.notes.add_lines(each.spec.notes)
+            sensors += [_scoped_sensor(sensor, name) for sensor in each.spec.sensors]
         if not links:
             raise DescriptionError(node.where, "has no <link>", "a model needs at least one")
         _refuse_repeated(own_links + node.find_all("joint"))
@@ -163,6 +166,7 @@ class SdfModels:
             source=node.source,
             self_collide=self_collide.flag() if self_collide is not None else False,
             notes=reading.notes.lines,
+            sensors=tuple(sensors),
         )
         return LoadedModel(spec, InnerModel(frames, node.find("pose"), node.attributes.get("placement_frame", "")))
 
@@ -243,6 +247,12 @@ def _add_inner(
     for joint in inner.joints if not inner.static else ():
         parent, child = scoped(joint.parent), scoped(joint.child)
         joints.append(dataclasses.replace(joint, name=scoped(joint.name), parent=parent, child=child))
+
+
+def _scoped_sensor(sensor: specs.SensorElement, inner: str) -> specs.SensorElement:
+    """Returns a sensor of an inner model as one of the outer model."""
+    link, joint = (f"{inner}{SCOPE}{name}" if name else "" for name in (sensor.link, sensor.joint))
+    return dataclasses.replace(sensor, link=link, joint=joint, scope=f"{inner}{SCOPE}{sensor.scope}")
 
 
 def _refuse_repeated(nodes: list[XmlNode]) -> None:

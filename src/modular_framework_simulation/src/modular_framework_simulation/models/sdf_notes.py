@@ -6,10 +6,10 @@ from __future__ import annotations
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
 _READ: dict[str, tuple[str, ...]] = {
-    "model": ("pose", "static", "link", "joint", "frame", "model", "include", "self_collide"),
+    "model": ("pose", "static", "link", "joint", "frame", "model", "include", "self_collide", "plugin"),
     "include": ("uri", "name", "pose", "static", "placement_frame"),
     "link": (
-        *("pose", "inertial", "collision", "visual"),
+        *("pose", "inertial", "collision", "visual", "sensor"),
         *("velocity_decay", "gravity", "kinematic", "self_collide"),
     ),
     "inertial": ("pose", "mass", "inertia", "density"),
@@ -24,7 +24,7 @@ _READ: dict[str, tuple[str, ...]] = {
     "bounce": ("restitution_coefficient", "threshold"),
     "contact": ("ode", "collide_without_contact", "collide_bitmask"),
     "contact/ode": ("kp", "kd", "max_vel", "min_depth"),
-    "joint": ("parent", "child", "pose", "axis"),
+    "joint": ("parent", "child", "pose", "axis", "sensor"),
     "axis": ("xyz", "limit", "dynamics", "use_parent_model_frame"),
     "axis/limit": ("lower", "upper", "effort", "velocity"),
     "axis/dynamics": ("damping", "friction", "spring_reference", "spring_stiffness"),

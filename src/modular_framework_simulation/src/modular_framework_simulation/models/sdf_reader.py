@@ -3,8 +3,8 @@
 
 What is read: includes, poses in all frames, models inside models, links with inertia, shapes, looks, surfaces and
 damping, and fixed, revolute, continuous and prismatic joints. What an element means is taken from the version of its
-own file. Elements that have no effect here (sensors, plugins, lights, settings of other engines) are listed once a
-model; what would make a wrong world, such as a joint of another kind, is refused.
+own file. Sensors and plugins are passed on as they are. Elements that have no effect here (lights, settings of other
+engines) are listed once a model; what would make a wrong world, such as a joint of another kind, is refused.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from enum import Enum
 from pathlib import Path
 
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.xml_nodes import XmlNode
 from modular_framework_urdf.robot import Box as Box
 from modular_framework_urdf.robot import Cylinder as Cylinder
 from modular_framework_urdf.robot import Sphere as Sphere
@@ -255,6 +256,27 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorElement:
+    """A <sensor>, or a <plugin> of a model, which may be one, as the file has it.
+
+    Attributes:
+        node: The element.
+        link: The link it is in, or the child of its joint; empty for a <plugin>.
+        joint: The joint it is in; empty for one in a link.
+        pose: In the frame of the link; None: as its own <pose> says.
+        reference: What the <gazebo> of a URDF around it refers to.
+        scope: "inner::" for one of an inner model, whose names its own are below.
+    """
+
+    node: XmlNode
+    link: str = ""
+    joint: str = ""
+    pose: Pose | None = None
+    reference: str = ""
+    scope: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Model:
     """A named set of links.
 
@@ -267,6 +289,8 @@ class Model:
         source: File (or other origin) of the description.
         self_collide: Whether its links touch each other, unless a link says otherwise.
         notes: What has no effect here or was replaced, each as "file:line: what".
+        sensors: Elements that are or may be sensors.
+        namespace: Of the topics of its sensors, where they name none.
     """
 
     name: str
@@ -277,6 +301,8 @@ class Model:
     source: str
     self_collide: bool = False
     notes: tuple[str, ...] = ()
+    sensors: tuple[SensorElement, ...] = ()
+    namespace: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,8 @@ _OF_A_LINK = (
     *("selfCollide", "turnGravityOff", "gravity", "dampingFactor", "kinematic"),
 )
 _OF_A_JOINT = ("springStiffness", "springReference", "preserveFixedJoint", "disableFixedJointLumping")
+_SENSORS = ("sensor", "plugin")
+"""Read elsewhere."""
 _OF_THE_MODEL = ("static", "selfCollide", "self_collide")
 
 
@@ -38,6 +40,7 @@ class UrdfExtensions:
                 notes.add(node, f"refers to '{owner}', which is no link and no joint: it has no effect")
                 continue
             known = _OF_THE_MODEL if not owner else (*(_OF_A_LINK if owner in links else ()), *_OF_A_JOINT)
+            known = (*known, *_SENSORS)
             self._children.setdefault(owner, []).extend(node.children)
             for child in node.children:
                 if child.tag not in known:

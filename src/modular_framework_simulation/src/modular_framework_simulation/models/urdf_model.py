@@ -15,6 +15,7 @@ from modular_framework_simulation.models.sdf_inertial import usable
 from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_shapes import MissingMeshError
+from modular_framework_simulation.models.sensor_elements import urdf_sensor_elements
 from modular_framework_simulation.models.urdf_extensions import UrdfExtensions
 from modular_framework_simulation.models.xml_nodes import XmlNode, parse_numbers, parse_xml
 from modular_framework_urdf.lengths import LARGEST_LENGTH_M
@@ -74,7 +75,19 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     fastened = all(each.kind is specs.JointType.FIXED for each in joints) and any(j.parent == "world" for j in joints)
     static = fastened or extensions.flag("", "static") is True
     self_collide = extensions.flag("", "self_collide", "selfCollide") is True
-    return specs.Model(root.name(), Pose(), static, links, joints, source, self_collide, notes.lines)
+    sensors = urdf_sensor_elements(root)
+    return specs.Model(root.name(), Pose(), static, links, joints, source, self_collide, notes.lines, sensors)
+
+
+def collision_name(given: str, link: str, number: int) -> str:
+    """Returns the name of a <collision>: its own, or the one that Gazebo gives it.
+
+    Args:
+        given: Its own name, mostly empty.
+        link: The link it is in.
+        number: Which one of the link it is, from 0.
+    """
+    return given or (f"{link}_collision_{number}" if number else f"{link}_collision")
 
 
 def _refuse_two_parents(joints: list[XmlNode]) -> None:
@@ -140,7 +153,7 @@ def _read_link(
     friction, contact = extensions.friction(name), extensions.contact(name)
     collisions = tuple(
         specs.Collision(
-            child.attributes.get("name", f"{name}_collision_{number}"),
+            collision_name(child.attributes.get("name", ""), name, number),
             _origin(child),
             _geometry(child.require("geometry"), resources),
             friction,

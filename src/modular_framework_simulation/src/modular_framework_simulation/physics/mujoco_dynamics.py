@@ -157,6 +157,15 @@ class MujocoDynamics:
                 self._touches = self.model.geom_bodyid[contact.geom], forces, np.array(contact.dist)
         return self._touches
 
+    def contact(self, row: int) -> tuple[Vector3, Array, Array]:
+        """Returns a contact of the last step: position [m], and normal and force [N] on the second of its bodies."""
+        contact = self.data.contact[row]
+        force = np.zeros(6)
+        mujoco.mj_contactForce(self.model, self.data, row, force)
+        axes = contact.frame.reshape(3, 3)
+        x, y, z = contact.pos.tolist()
+        return (x, y, z), axes[0], force[:3] @ axes
+
     def _set_frictions(self) -> None:
         """Gives contacts the smaller coefficients; what resists spin and roll adds up, each times the other's friction.
 

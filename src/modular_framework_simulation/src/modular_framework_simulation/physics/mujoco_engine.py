@@ -24,6 +24,7 @@ from modular_framework_simulation.physics.mujoco_dynamics import MujocoDynamics,
 from modular_framework_simulation.physics.physics_engine import (
     BASE_INDEX,
     SHOWN_CHARACTERS,
+    EngineContact,
     EngineJoint,
     JointKind,
     JointState,
@@ -286,6 +287,22 @@ class MujocoEngine(PhysicsEngine):
             other = int(self._number_of[bodies[row, 1 - side]])
             if other != number:
                 found.append(Touch(other, float(forces[row]), float(distances[row])))
+        return found
+
+    def contact_points(self, number: int, index: int) -> list[EngineContact]:
+        """Returns where a link touched others."""
+        bodies, _, distances = self._dynamics.touches()
+        found = []
+        for row, side in np.argwhere(bodies == self._bodies[number].ids[index + 1]).tolist():
+            body, distance = int(bodies[row, 1 - side]), float(distances[row])
+            other = int(self._number_of[body])
+            position, normal, force = self._dynamics.contact(row)
+            if other < 0 or (distance > 0.0 and not any(force)):
+                continue
+            link = list(self._bodies[other].ids).index(body) - 1
+            sign = 1.0 if side else -1.0
+            (nx, ny, nz), (fx, fy, fz) = ((sign * each).tolist() for each in (normal, force))
+            found.append(EngineContact(other, link, position, (nx, ny, nz), distance, (fx, fy, fz)))
         return found
 
     # Joints

@@ -105,6 +105,27 @@ class Touch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
+class EngineContact:
+    """A point where two links touch, in the world.
+
+    Attributes:
+        number: Of the other body.
+        index: Of its link.
+        position: Half way between the two surfaces [m].
+        normal: Unit vector out of the other body.
+        distance: Negative when they are in each other [m].
+        force: On the first link, friction too [N].
+    """
+
+    number: int
+    index: int
+    position: Vector3
+    normal: Vector3
+    distance: float
+    force: Vector3
+
+
+@dataclass(frozen=True, slots=True)
 class Surface:
     """Coefficients of a link; see `specs.Friction`, `specs.Bounce` and `specs.SurfaceContact`."""
 
@@ -276,6 +297,10 @@ class PhysicsEngine(ABC):
     @abstractmethod
     def touches(self, number: int, index: int) -> list[Touch]:
         """Returns where a link touched others in the last step; also where it was just near, with force 0."""
+
+    @abstractmethod
+    def contact_points(self, number: int, index: int) -> list[EngineContact]:
+        """Returns where a link touched others in the last step, with the whole force; not where it was just near."""
 
     # Joints
 

@@ -18,6 +18,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.applied_forces import AppliedForces, SavedForces
 from modular_framework_simulation.physics.body_forces import BodyForce, forces_of
 from modular_framework_simulation.physics.body_joints import apply_settings, copy_joint_motion
+from modular_framework_simulation.physics.body_links import centre_in_world, tree_with_link
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
 from modular_framework_simulation.physics.carried_object import CarriedObject
 from modular_framework_simulation.physics.engine_choice import PYBULLET, make_engine
@@ -46,6 +47,27 @@ class Contact:
     model: str
     force: float
     distance: float
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPoint:
+    """A point where a link touches another one, in the world.
+
+    Attributes:
+        model: The other model.
+        other_link: Its link; of a static model, which is one body for the engine, any of its links.
+        position: Half way between the two surfaces [m].
+        normal: Unit vector out of the other model.
+        depth: How deep they are in each other [m].
+        force: On the link, friction too [N].
+    """
+
+    model: str
+    other_link: str
+    position: Vector3
+    normal: Vector3
+    depth: float
+    force: Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,6 +380,37 @@ class PhysicsWorld:
             for touch in self.engine.touches(body.number, link_index)
             if touch.other in self._names_by_number
         ]
+
+    def contact_points(self, model: str, link: str) -> list[ContactPoint]:
+        """Returns where a link touches others, as the last physics step had it.
+
+        Args:
+            model: The model.
+            link: Its link; for a static model, which is one body for the engine, any of its links.
+
+        Raises:
+            UnknownEntityError: There is no such model or link.
+        """
+        body = self.body(model)
+        tree = body if body.static and body.spec is not None else tree_with_link(body, link)
+        found = []
+        for point in self.engine.contact_points(tree.number, tree.link_indices.get(link, BASE_INDEX)):
+            name = self._names_by_number.get(point.number)
+            if name is not None:
+                other = self._bodies[name].link_of_number(point.number, point.index)
+                found.append(ContactPoint(name, other, point.position, point.normal, -point.distance, point.force))
+        return found
+
+    def centre_of_mass(self, model: str, link: str) -> Vector3:
+        """Returns the centre of mass of a link in the world [m]; the origin of a link that never moves.
+
+        Raises:
+            UnknownEntityError: There is no such model or link.
+        """
+        body = self.body(model)
+        if body.static and body.spec is not None:
+            return body.link_state(link).pose.position
+        return centre_in_world(self.engine, body, link).position
 
     def reset_poses(self) -> None:
         """Puts every model where it first appeared, at rest; joints of models go to 0; forces of requests end."""

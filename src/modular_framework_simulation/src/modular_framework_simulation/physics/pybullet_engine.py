@@ -23,6 +23,7 @@ from modular_framework_simulation.physics.contact_rules import let_smaller_coeff
 from modular_framework_simulation.physics.physics_engine import (
     BASE_INDEX,
     SHOWN_CHARACTERS,
+    EngineContact,
     EngineJoint,
     JointKind,
     JointState,
@@ -317,6 +318,11 @@ class PyBulletEngine(PhysicsEngine):
         points = self.api.getContactPoints(bodyA=number, linkIndexA=index, physicsClientId=self.client)
         return [Touch(point[2], point[9], point[8]) for point in points if point[2] != number]
 
+    def contact_points(self, number: int, index: int) -> list[EngineContact]:
+        """Returns where a link touches others."""
+        records = self.api.getContactPoints(bodyA=number, linkIndexA=index, physicsClientId=self.client)
+        return [_contact(record) for record in records if record[9] > 0.0 or record[8] <= 0.0]
+
     def joint_states(self, number: int, indices: Sequence[int]) -> list[JointState]:
         """Returns the states of joints."""
         records = self.api.getJointStates(number, indices, physicsClientId=self.client)
@@ -414,6 +420,15 @@ class PyBulletEngine(PhysicsEngine):
         force, torque = (rotate_vector(centre_in_link.quaternion, each) for each in (force, torque))
         about_origin = add(torque, cross(centre_in_link.position, force))
         return _negative(force), _negative(about_origin)
+
+
+def _contact(record: tuple[Any, ...]) -> EngineContact:
+    """Returns a record of the engine's contact points in our words."""
+    on_first, on_other, (nx, ny, nz) = record[5], record[6], record[7]
+    px, py, pz = ((a + b) / 2 for a, b in zip(on_first, on_other, strict=True))
+    pushes = ((record[9], record[7]), (record[10], record[11]), (record[12], record[13]))
+    fx, fy, fz = (sum(size * direction[axis] for size, direction in pushes) for axis in range(3))
+    return EngineContact(record[2], record[4], (px, py, pz), (nx, ny, nz), record[8], (fx, fy, fz))
 
 
 def _negative(vector: Vector3) -> Vector3:

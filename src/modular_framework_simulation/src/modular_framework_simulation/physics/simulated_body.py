@@ -106,6 +106,11 @@ class SimulatedBody:
         """Returns the tree that a link of the model belongs to; this one where there is no such link."""
         return next((part for part in self.parts if link in part.link_indices), self)
 
+    def link_of_number(self, number: int, link: int) -> str:
+        """Returns the name of a link by the engine's numbers of one of the trees and of the link; "" for none."""
+        part = next((each for each in self.parts if each.number == number), self)
+        return next((name for name, index in part.link_indices.items() if index == link), "")
+
     def link_names(self) -> list[str]:
         """Returns the names of the links as its description has them."""
         if self.spec is not None:

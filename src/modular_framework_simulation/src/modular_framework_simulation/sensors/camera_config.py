@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from modular_framework_simulation.models.poses import Pose, normalised_quaternion
 from modular_framework_simulation.sensors.cameras import Camera, CameraTopics, Pinhole
+from modular_framework_simulation.sensors.noise import Noise
 
 FrameLocator = Callable[[str], str | None]
 """Returns the entity of the world, "world" or "model::link", that a frame belongs to; None for an unknown frame."""
@@ -25,20 +27,23 @@ _TOP_LEVEL_TOPICS = {
     "points": "pointcloud_topic_name",
 }
 _SECTION_TOPICS = {"rgb": "rgb_topic", "depth": "depth_map_topic", "points": "pointcloud_topic"}
-_CAMERA_KEYS = ("width", "height", "horizontal_fov", "near", "far", "rate")
+_CAMERA_KEYS = ("width", "height", "horizontal_fov", "near", "far", "rate", "noise_stddev")
 
 
 class _Fault(ValueError):
     """A value of one section cannot be used."""
 
 
-def read_cameras(settings: Mapping[str, Any], where: str, locate: FrameLocator) -> tuple[list[Camera], list[str]]:
+def read_cameras(
+    settings: Mapping[str, Any], where: str, locate: FrameLocator, seed: int = 0
+) -> tuple[list[Camera], list[str]]:
     """Reads the cameras.
 
     Args:
         settings: The contents of the file.
         where: Where they are, for the messages.
         locate: Finds the origins of frames in the world.
+        seed: Of the simulation, for noise.
 
     Returns:
         The usable cameras, and one sentence for each that is not usable.
@@ -50,7 +55,7 @@ def read_cameras(settings: Mapping[str, Any], where: str, locate: FrameLocator) 
         try:
             topics = _topics(settings, section)
             if topics is not None:
-                cameras.append(_camera(name, section, topics, locate))
+                cameras.append(replace(_camera(name, section, topics, locate), seed=seed))
         except ValueError as error:
             faults.append(f"{where}/{name}/{error}; this camera is not simulated")
     return cameras, faults
@@ -66,10 +71,13 @@ def _camera(name: str, section: Mapping[str, Any], topics: CameraTopics, locate:
     if unknown:
         raise _Fault(f"camera: unknown key '{unknown[0]}'; allowed: {', '.join(_CAMERA_KEYS)}")
     values = {key: _number(given, key, "camera/") for key in given}
-    rate = values.pop("rate", DEFAULT_RATE_HZ)
+    rate, stddev = values.pop("rate", DEFAULT_RATE_HZ), values.pop("noise_stddev", 0.0)
+    if stddev < 0.0:
+        raise _Fault(f"camera/noise_stddev: got {stddev:g}; allowed: 0 or more")
     pinhole = Pinhole(int(values.pop("width", 640)), int(values.pop("height", 480)), **values)
     try:
-        return Camera(name, _text(section, "frame_id"), parent, pose, rate, topics, pinhole)
+        frame = _text(section, "frame_id")
+        return Camera(name, frame, parent, pose, rate, topics, pinhole, noise=Noise(stddev=stddev))
     except ValueError as error:
         raise _Fault(f"camera/{error}") from error
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.sensors.noise import NO_NOISE, Noise, NoiseSource
 
 OPTICAL_IN_BODY = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (-math.pi / 2, 0.0, -math.pi / 2))
 """Pose of the optical frame in the frame of a `<sensor>`, whose x axis points forwards."""
@@ -126,6 +127,8 @@ class Camera:
         topics: Where it publishes.
         pinhole: The geometry of its images.
         depth_range: Least and greatest depth that is measured [m].
+        noise: Of the colours, whose range is 0 to 1.
+        seed: Of the simulation.
     """
 
     name: str
@@ -136,6 +139,8 @@ class Camera:
     topics: CameraTopics
     pinhole: Pinhole = Pinhole()
     depth_range: tuple[float, float] = (0.0, math.inf)
+    noise: Noise = NO_NOISE
+    seed: int = 0
 
     def __post_init__(self) -> None:
         pinhole = self.pinhole
@@ -170,3 +175,15 @@ class CameraImage:
         with np.errstate(invalid="ignore"):
             kept = (self.depth >= low) & (self.depth <= high)
         return CameraImage(self.rgb, np.where(kept, self.depth, np.float32(np.nan)))
+
+    def with_noise(self, source: NoiseSource, time_ns: int) -> CameraImage:
+        """Returns the same image with noise on its colours.
+
+        Args:
+            source: The noise of the camera, of one channel.
+            time_ns: When it was taken [ns].
+        """
+        if not source.active:
+            return self
+        noisy = source.added_to(self.rgb.astype(np.float64)[None] / 255.0, time_ns)
+        return CameraImage(np.rint(np.clip(noisy[0], 0.0, 1.0) * 255.0).astype(np.uint8), self.depth)

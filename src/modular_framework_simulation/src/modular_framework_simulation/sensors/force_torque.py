@@ -5,33 +5,46 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modular_framework_simulation.errors import UnknownEntityError
-from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_urdf import xml_text
-from modular_framework_urdf.rotations import Vector3
-from modular_framework_urdf.xml_text import Element
+import numpy as np
 
+from modular_framework_simulation.errors import UnknownEntityError
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_specs import WORLD
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.sensors.noise import NO_NOISE, Noise, NoiseSource
+from modular_framework_simulation.sensors.sensor_xml import JointPart, Sensor, SensorXml, resolved
+from modular_framework_urdf.rotations import Vector3, rotate_vector
+
+TYPES = ("force_torque",)
+PLUGINS = ("gazebo_ros_ft_sensor",)
 DEFAULT_RATE_HZ = 100.0
-_PLUGIN = "gazebo_ros_ft_sensor"
+
+_MEASURED_JOINTS = ("fixed", "revolute", "continuous")
+"""The engine's reaction on a slide differs from the weight it carries."""
+_FRAMES = ("child", "parent", "sensor")
+_DIRECTIONS = ("child_to_parent", "parent_to_child")
+
+Noises = tuple[Noise, Noise, Noise, Noise, Noise, Noise]
+_QUIET: Noises = (NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE, NO_NOISE)
 
 
 @dataclass(frozen=True, slots=True)
-class ForceTorqueSensor:
-    """A sensor in a joint of a robot.
+class ForceTorqueSensor(Sensor):
+    """A sensor in a joint; its link is the child of the joint.
 
     Attributes:
         joint: Name of the joint.
-        child_link: The link that the joint carries, in whose frame is measured.
-        topic: Where its measurements are published.
-        frame_id: For the headers of its messages.
-        rate_hz: Measurements in a second of simulated time.
+        parent_link: The link that carries the joint.
+        in_frame: Whose axes the wrench is given in: "child", "parent" or "sensor".
+        of_child: Whether the wrench is that of the child on the parent, not the other way round.
+        noise: Of the force along each axis [N], and of the torque about each [Nm].
     """
 
-    joint: str
-    child_link: str
-    topic: str
-    frame_id: str
-    rate_hz: float = DEFAULT_RATE_HZ
+    joint: str = ""
+    parent_link: str = ""
+    in_frame: str = "child"
+    of_child: bool = True
+    noise: Noises = _QUIET
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,51 +55,50 @@ class Wrench:
     torque: Vector3
 
 
-def read_force_torque_sensors(text: str) -> tuple[list[ForceTorqueSensor], list[str]]:
-    """Reads the sensors of a robot's URDF: `<plugin filename="libgazebo_ros_ft_sensor.so">` in a `<gazebo>`.
+def read_force_torque(xml: SensorXml) -> ForceTorqueSensor:
+    """Reads a <sensor type="force_torque"> of a joint, or libgazebo_ros_ft_sensor.so.
 
-    Args:
-        text: URDF that the simulation has read before.
-
-    Returns:
-        The usable sensors, and one sentence for each that is not usable.
+    Raises:
+        ValueError: A value cannot be used.
     """
-    root = xml_text.parse(text, "robot_description")
-    # The engine's reaction on a slide differs from the weight it carries.
-    joints = [joint for joint in root.findall("joint") if joint.get("type") in ("fixed", "revolute", "continuous")]
-    children = {joint.get("name"): joint.find("child").get("link") for joint in joints}
-    sensors, faults = [], []
-    for plugin in root.iterfind("gazebo/plugin"):
-        if _PLUGIN not in plugin.get("filename", ""):
-            continue
-        try:
-            sensors.append(_sensor(plugin, children))
-        except ValueError as error:
-            where = f"robot_description:{plugin.sourceline}: <plugin name='{plugin.get('name', '')}'>"
-            faults.append(f"{where}: {error}; this sensor is not simulated")
-    return sensors, faults
+    in_plugin = xml.plugin is not None and not xml.joint
+    joint = f"{xml.scope}{xml.plugin.text('jointName')}" if in_plugin and xml.plugin else xml.joint
+    allowed = [name for name, part in xml.model.joints.items() if part.kind in _MEASURED_JOINTS]
+    if joint not in allowed:
+        key = "<jointName>: got" if in_plugin else "is in joint"
+        raise ValueError(f"{key} '{joint}'; allowed are joints that are fixed or turn: {', '.join(allowed)}")
+    part = xml.model.joints[joint]
+    if xml.plugin is None:
+        return _of_joint(xml, joint, part)
+    noise = Noise(stddev=xml.plugin.number("gaussianNoise", 0.0, 0.0))
+    return ForceTorqueSensor(
+        *(xml.name, xml.model.name, part.child, Pose()),
+        resolved(xml.namespace(), xml.plugin.text("topicName", "wrench")),
+        xml.plugin.text("frameName", part.child.rpartition("::")[2]),
+        xml.plugin.number("updateRate", 0.0, 0.0) or DEFAULT_RATE_HZ,
+        joint,
+        part.parent,
+        noise=(noise,) * 6,
+    )
 
 
-def _sensor(plugin: Element, children: dict[str, str]) -> ForceTorqueSensor:
-    def text(key: str, default: str) -> str:
-        return (plugin.findtext(key) or "").strip() or default
-
-    joint = text("jointName", "")
-    if joint not in children:
-        raise ValueError(
-            f"<jointName>: got '{joint}'; allowed are joints that are fixed or turn: {', '.join(children)}"
-        )
-    numbers = {}
-    for key in ("updateRate", "gaussianNoise"):
-        try:
-            numbers[key] = float(text(key, "0"))
-        except ValueError:
-            raise ValueError(f"<{key}>: got '{text(key, '')}'; expected a number") from None
-    if numbers["gaussianNoise"] != 0.0:
-        raise ValueError(f"<gaussianNoise>: got {numbers['gaussianNoise']:g}; allowed: 0, noise is not simulated")
-    namespace, topic, child = text("robotNamespace", "").rstrip("/"), text("topicName", "wrench"), children[joint]
-    name = topic if topic.startswith("/") or not namespace else f"{namespace}/{topic}"
-    return ForceTorqueSensor(joint, child, name, text("frameName", child), numbers["updateRate"] or DEFAULT_RATE_HZ)
+def _of_joint(xml: SensorXml, joint: str, part: JointPart) -> ForceTorqueSensor:
+    topic = xml.require_topic(f"{PLUGINS[0]}, of the model")
+    in_frame = xml.sensor.text("force_torque/frame", "child")
+    direction = xml.sensor.text("force_torque/measure_direction", "child_to_parent")
+    for key, value, allowed in (("frame", in_frame, _FRAMES), ("measure_direction", direction, _DIRECTIONS)):
+        if value not in allowed:
+            raise ValueError(f"<force_torque/{key}>: got '{value}'; allowed: {', '.join(allowed)}")
+    noises = [xml.sensor.noise(f"force_torque/{kind}/{axis}/noise") for kind in ("force", "torque") for axis in "xyz"]
+    return ForceTorqueSensor(
+        *(xml.name, xml.model.name, part.child, xml.pose, topic, part.child.rpartition("::")[2]),
+        xml.sensor.number("update_rate", 0.0, 0.0) or DEFAULT_RATE_HZ,
+        joint,
+        part.parent,
+        in_frame,
+        direction == "child_to_parent",
+        (noises[0], noises[1], noises[2], noises[3], noises[4], noises[5]),
+    )
 
 
 class JointLoad:
@@ -94,37 +106,81 @@ class JointLoad:
 
     Args:
         world: Where the model is.
-        model: Its name.
         sensor: The joint.
+        seed: Of the simulation.
 
     Raises:
         UnknownEntityError: There is no such model or joint.
     """
 
-    def __init__(self, world: PhysicsWorld, model: str, sensor: ForceTorqueSensor) -> None:
-        self._world, self._model, self._sensor = world, model, sensor
+    def __init__(self, world: PhysicsWorld, sensor: ForceTorqueSensor, seed: int = 0) -> None:
+        self._world, self._sensor = world, sensor
+        self._noise = NoiseSource(seed, sensor.name, sensor.noise)
         self._instance = -1
+        self._measures = False
         self._find()
 
     def _find(self) -> None:
         """Finds the joint in the engine."""
-        joints = {joint.name: joint for joint in self._world.engine.joints(self._world.body(self._model).number)}
-        joint = joints.get(self._sensor.joint)
-        if joint is None:
-            raise UnknownEntityError("joint", f"{self._model}::{self._sensor.joint}", list(joints))
-        self._index = joint.index
+        body = self._world.body(self._sensor.model)
+        known: list[str] = []
+        for tree in body.parts:
+            joints = {joint.name: joint.index for joint in self._world.engine.joints(tree.number)}
+            index = joints.get(self._sensor.joint)
+            if index is not None:
+                break
+            known += joints
+        else:
+            raise UnknownEntityError("joint", f"{self._sensor.model}::{self._sensor.joint}", known)
+        self._tree, self._index = tree, index
+        joints_of_spec = body.spec.joints if body.spec is not None else ()
+        self._joint_in_child = next((each.pose for each in joints_of_spec if each.name == self._sensor.joint), Pose())
 
-    def start(self) -> None:
-        """Lets the engine measure from the next step on; to be called before each measurement."""
-        instance = self._world.instance(self._model)
+    def rest(self) -> None:
+        """Forgets that the engine measures: the next call of `measure` begins again."""
+        self._measures = False
+
+    def measure(self) -> Wrench | None:
+        """Returns the wrench in the last physics step; None at first, when the engine has not measured it."""
+        instance = self._world.instance(self._sensor.model)
         if instance != self._instance:  # also after a restart, which creates the body again
-            self._instance = instance
+            self._instance, self._measures = instance, False
             self._find()
-            self._world.engine.measure_joint_load(self._world.body(self._model).number, self._index)
+            self._world.engine.measure_joint_load(self._tree.number, self._index)
+        measures, self._measures = self._measures, True
+        return self._noisy(self._wrench()) if measures else None
 
-    def measure(self) -> Wrench:
-        """Returns the wrench with which the child link acts on its parent, in the last physics step.
+    def _wrench(self) -> Wrench:
+        """Returns the wrench with which the child link acts on its parent, unless the sensor has it the other way.
 
-        It is given about the origin of the child link, which is that of the joint, and in its axes: Gazebo's defaults.
+        It is given about the origin of the joint, and in the axes of the child link: Gazebo's defaults.
         """
-        return Wrench(*self._world.engine.joint_load(self._world.body(self._model).number, self._index))
+        turn = self._axes_of_joint().quaternion
+        load = self._world.engine.joint_load(self._tree.number, self._index)
+        force, torque = (rotate_vector(turn, each) for each in load)
+        return Wrench(force, torque) if self._sensor.of_child else Wrench(_negative(force), _negative(torque))
+
+    def _axes_of_joint(self) -> Pose:
+        """Returns the pose of the joint in the frame whose axes the wrench is given in."""
+        sensor = self._sensor
+        match sensor.in_frame:
+            case "child":
+                return self._joint_in_child
+            case "sensor":
+                return sensor.pose.inverse() @ self._joint_in_child
+        body = self._world.body(sensor.model)
+        parent_in_world = body.link_state(sensor.parent_link).pose if sensor.parent_link != WORLD else Pose()
+        return parent_in_world.inverse() @ body.link_state(sensor.link).pose @ self._joint_in_child
+
+    def _noisy(self, wrench: Wrench) -> Wrench:
+        exact = np.array([*wrench.force, *wrench.torque])
+        noisy = self._noise.added_to(exact, self._world.time_ns)
+        if noisy is exact:
+            return wrench
+        fx, fy, fz, tx, ty, tz = noisy.tolist()
+        return Wrench((fx, fy, fz), (tx, ty, tz))
+
+
+def _negative(vector: Vector3) -> Vector3:
+    x, y, z = vector
+    return (-x, -y, -z)

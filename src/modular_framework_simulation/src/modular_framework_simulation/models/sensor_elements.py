@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds the elements of a description that are or may be sensors; what they mean is read elsewhere.
+
+In SDF a `<sensor>` is in a link or in a joint, in URDF in a `<gazebo reference="...">`. A `<plugin>` of the model may
+be a sensor too.
+"""
+
+from __future__ import annotations
+
+from modular_framework_simulation.models.sdf_frames import FrameTree, base_of
+from modular_framework_simulation.models.sdf_specs import SensorElement
+from modular_framework_simulation.models.xml_nodes import XmlNode
+
+
+def sdf_sensor_elements(model: XmlNode, frames: FrameTree) -> tuple[SensorElement, ...]:
+    """Returns the sensors of an SDF model, those of inner models left out.
+
+    Args:
+        model: The <model>.
+        frames: Its frames.
+
+    Raises:
+        DescriptionError: The frame that the pose of one is relative to is unknown.
+    """
+    elements = []
+    for link in model.find_all("link"):
+        name = link.name()
+        for node in link.find_all("sensor"):
+            pose = node.find("pose")
+            elsewhere = pose is not None and base_of(pose) not in ("", name)
+            elements.append(SensorElement(node, name, pose=frames.pose_in_link(name, pose) if elsewhere else None))
+    for joint in model.find_all("joint"):
+        for node in joint.find_all("sensor"):
+            elements.append(SensorElement(node, frames.link_of(joint.require("child")), joint.name()))
+    return (*elements, *(SensorElement(node) for node in model.find_all("plugin")))
+
+
+def urdf_sensor_elements(robot: XmlNode) -> tuple[SensorElement, ...]:
+    """Returns the sensors of a URDF; one that refers to nothing has no link.
+
+    Args:
+        robot: The root element.
+    """
+    links = {node.attributes.get("name", "") for node in robot.find_all("link")}
+    children = {
+        joint.attributes.get("name", ""): child.attributes.get("link", "")
+        for joint in robot.find_all("joint")
+        if (child := joint.find("child")) is not None
+    }
+    elements = []
+    for gazebo in robot.find_all("gazebo"):
+        owner = gazebo.attributes.get("reference", "")
+        joint = owner if owner not in links and owner in children else ""
+        link = children[joint] if joint else owner if owner in links else ""
+        elements += [SensorElement(node, link, joint, reference=owner) for node in gazebo.find_all("sensor")]
+        elements += [SensorElement(node) for node in gazebo.find_all("plugin")]
+    return tuple(elements)

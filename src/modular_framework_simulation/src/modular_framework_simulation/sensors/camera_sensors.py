@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the cameras of a model: a <sensor> of the type camera or depth with one of Gazebo's plugins for ROS."""
+
+from __future__ import annotations
+
+import math
+
+from modular_framework_simulation.sensors.cameras import OPTICAL_IN_BODY, Camera, CameraTopics, Pinhole
+from modular_framework_simulation.sensors.sensor_xml import SensorXml, prefixed, resolved
+
+TYPES = ("camera", "depth", "depth_camera", "rgbd_camera")
+PLUGINS = ("gazebo_ros_camera", "gazebo_ros_openni_kinect", "gazebo_ros_depth_camera")
+DEPTH_PLUGINS = PLUGINS[1:]
+
+_DEFAULT_RATE_HZ = 30.0
+
+
+def read_camera(xml: SensorXml, seed: int) -> Camera:
+    """Reads a <sensor> of one of `TYPES`.
+
+    Raises:
+        ValueError: A value cannot be used.
+    """
+    sensor, plugin = xml.sensor, xml.plugin
+    kinect = xml.file in DEPTH_PLUGINS or (plugin is None and sensor.node.attributes.get("type") != "camera")
+    depth_range = (0.0, math.inf)
+    if plugin is None:
+        topics = _below(xml.require_topic(", ".join(PLUGINS)), kinect)
+        frame, plugin_rate = xml.link, 0.0
+    else:
+        own = sensor.node.attributes.get("name", "camera")
+        namespace = xml.namespace()
+        base = resolved(namespace, plugin.text("cameraName", own)).lstrip("/")
+        topics = _of_plugin(xml, base, kinect)
+        frame = prefixed(namespace, plugin.text("frameName")) if plugin.text("frameName") else xml.link
+        plugin_rate = plugin.number("updateRate", 0.0, 0.0)
+        if kinect:
+            depth_range = (plugin.number("pointCloudCutoff", 0.4), plugin.number("pointCloudCutoffMax", 5.0))
+    pinhole = Pinhole(
+        width=int(sensor.number("camera/image/width", 320)),
+        height=int(sensor.number("camera/image/height", 240)),
+        horizontal_fov=sensor.number("camera/horizontal_fov", 1.047),
+        near=sensor.number("camera/clip/near", 0.1),
+        far=sensor.number("camera/clip/far", 100.0),
+    )
+    rate = plugin_rate or sensor.number("update_rate", 0.0, 0.0) or _DEFAULT_RATE_HZ
+    if sensor.text("camera/image/format", "R8G8B8") == "R8G8B8":
+        sensor.find("camera/image")
+    body_in_parent = xml.pose @ sensor.pose("camera/pose")
+    parent = f"{xml.model.name}::{xml.link}"
+    in_parent = body_in_parent @ OPTICAL_IN_BODY
+    noise = sensor.noise("camera/noise")
+    return Camera(xml.name, frame, parent, in_parent, rate, topics, pinhole, depth_range, noise, seed)
+
+
+def _below(base: str, kinect: bool) -> CameraTopics:
+    if not kinect:
+        return CameraTopics(base, f"{base.rpartition('/')[0]}/camera_info".lstrip("/"))
+    return CameraTopics(
+        f"{base}/image", f"{base}/camera_info", f"{base}/depth_image", f"{base}/camera_info", f"{base}/points"
+    )
+
+
+def _of_plugin(xml: SensorXml, base: str, kinect: bool) -> CameraTopics:
+    plugin = xml.plugin
+    assert plugin is not None
+
+    def topic(key: str, default: str) -> str:
+        return resolved(base, plugin.text(key, default)).lstrip("/")
+
+    image, info = topic("imageTopicName", "image_raw"), topic("cameraInfoTopicName", "camera_info")
+    if not kinect:
+        return CameraTopics(image, info)
+    return CameraTopics(
+        image,
+        info,
+        topic("depthImageTopicName", "depth/image_raw"),
+        topic("depthImageCameraInfoTopicName", "depth/camera_info"),
+        topic("pointCloudTopicName", "points"),
+    )
