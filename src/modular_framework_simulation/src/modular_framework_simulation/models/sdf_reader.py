@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads worlds and models written in SDF 1.2 to 1.11.
+"""Reads worlds and models written in SDF 1.0 to 1.11.
 
 What is read: includes, poses in all frames, models inside models, links with inertia, shapes, looks, surfaces and
 damping, and fixed, revolute, continuous and prismatic joints. What an element means is taken from the version of its
@@ -16,7 +16,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.joint_trees import refuse_loops
 from modular_framework_simulation.models.sdf_frames import FrameTree
-from modular_framework_simulation.models.sdf_models import LoadedModel, SdfModels, sdf_version
+from modular_framework_simulation.models.sdf_models import LoadedModel, SdfModels, converted_version
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_states import with_saved_state
 from modular_framework_simulation.models.xml_nodes import XmlNode, parse_xml, read_xml
@@ -48,7 +48,7 @@ def read_world(path: Path, resources: Resources) -> specs.World:
         DescriptionError: Something in the file, or in a file it includes, cannot be used.
     """
     root = read_xml(path)
-    version = sdf_version(root)
+    version = converted_version(root)
     world = root.require("world")
     loaded, ignored = _models_of(world, version, resources)
     frames = FrameTree(world, {name: each.placed for name, each in loaded.items()})
