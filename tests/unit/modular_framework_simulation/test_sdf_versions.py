@@ -301,3 +301,24 @@ def test_the_filename_of_a_mesh_is_its_address_in_old_files(tmp_path: Path) -> N
     assert read.links[0].collisions[0].geometry == specs.Mesh(tmp_path / "plate.stl")
     with pytest.raises(DescriptionError, match=r"'chair3/model/chair\.stl' does not exist"):
         read_model_text(text.format("chair3/model/chair.stl"), "test", Resources())
+
+
+def test_models_of_one_name_get_numbers_in_old_files_and_are_refused_in_new_ones(tmp_path: Path) -> None:
+    one = "<model name='box'><pose>{} 0 0 0 0 0</pose><static>1</static><link name='l'/></model>\n"
+    body = one.format(1) + one.format(2) + one.format(3).replace("'box'", "'box_0'") + one.format(4)
+    read = world(tmp_path, body, "1.5")
+    assert {model.name: model.pose.position[0] for model in read.models} == {
+        "box": 1,
+        "box_0": 2,
+        "box_0_0": 3,
+        "box_1": 4,
+    }
+    assert any("is a second model 'box', and is called 'box_1'" in note for note in read.models[3].notes)
+    with pytest.raises(DescriptionError, match=r"test\.world:4: <model name='box'>: is a second model 'box'"):
+        world(tmp_path, body, "1.7")
+
+
+def test_a_negative_correcting_velocity_is_none() -> None:
+    contact = "<surface><contact><ode><max_vel>-1</max_vel></ode></contact></surface>"
+    shape = f"<collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry>{contact}</collision>"
+    assert model(f"<link name='a'>{shape}</link>").links[0].collisions[0].contact.max_vel is None

@@ -10,6 +10,8 @@ model; what would make a wrong world, such as a joint of another kind, is refuse
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from collections.abc import Collection
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
@@ -27,6 +29,9 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.8)
 
 _GRAVITY_IN_PHYSICS_UNTIL = (1, 5)
 """Until this version <gravity> is a child of <physics>, later of <world>."""
+
+_NAMES_UNIQUE_FROM = (1, 7)
+"""Until then files with several models of one name were read: the later ones get a number, as Gazebo gives them."""
 
 _REFUSED_IN_WORLD = {
     "population": "place its models one by one",
@@ -81,12 +86,23 @@ def _models_of(
         elif child.tag in _REFUSED_IN_WORLD:
             raise DescriptionError(child.where, "is not simulated", _REFUSED_IN_WORLD[child.tag])
         if model is not None:
-            if model.spec.name in loaded:
+            if model.spec.name in loaded and version >= _NAMES_UNIQUE_FROM:
                 raise DescriptionError(child.where, f"is a second model '{model.spec.name}'", "give each its own name")
+            model = _with_free_name(model, loaded, f"{child.source}:{child.line}")
             loaded[model.spec.name] = model
         elif child.tag not in ("gravity", "frame", "state"):
             ignored.append(f"{child.source}:{child.line}: <{child.tag}>")
     return loaded, ignored
+
+
+def _with_free_name(model: LoadedModel, taken: Collection[str], where: str) -> LoadedModel:
+    """Returns a model with a number behind its name and a note of that, if its name is taken."""
+    name = model.spec.name
+    if name not in taken:
+        return model
+    free = next(numbered for number in itertools.count() if (numbered := f"{name}_{number}") not in taken)
+    notes = (*model.spec.notes, f"{where}: is a second model '{name}', and is called '{free}'")
+    return dataclasses.replace(model, spec=dataclasses.replace(model.spec, name=free, notes=notes))
 
 
 def read_model_text(text: str, source: str, resources: Resources) -> specs.Model:
