@@ -181,7 +181,7 @@ def test_a_static_model_may_have_loose_links() -> None:
 def test_broken_documents_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"text:1: .*well-formed"):
         read_model_text("<sdf version='1.6'><model>", "text", Resources())
-    with pytest.raises(DescriptionError, match=r"'2\.0'; allowed: 1\.2 to 1\.11"):
+    with pytest.raises(DescriptionError, match=r"'2\.0'; allowed: 1\.0 to 1\.11"):
         read_model_text("<sdf version='2.0'/>", "text", Resources())
     with pytest.raises(DescriptionError, match="holds no <model>"):
         read_model_text("<sdf version='1.6'/>", "text", Resources())
