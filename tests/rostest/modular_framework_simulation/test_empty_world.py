@@ -26,6 +26,10 @@ STEPS = """<launch><arg name="time_step"/>
   <include file="$(find modular_framework_simulation)/launch/simulation.launch" pass_all_args="true"/></launch>"""
 LAUNCH = """<launch><include file="$(find gazebo_ros)/launch/empty_world.launch">{}</include></launch>"""
 
+FIXED_ROBOT = """<robot name="stand"><link name="world"/>
+  <link name="plate"><collision><geometry><box size="0.4 0.4 0.02"/></geometry></collision></link>
+  <joint name="screwed" type="fixed"><parent link="world"/><child link="plate"/></joint></robot>"""
+
 until = functools.partial(wait_until, timeout_s=30.0)
 
 
@@ -130,3 +134,17 @@ def test_a_world_that_is_nowhere_is_named_with_the_places_looked_at(ros_session:
     launch.wait(60.0)
     assert "worlds/moon.world: cannot be read" in launch.log()
     assert "GAZEBO_RESOURCE_PATH" in launch.log()
+
+
+def test_a_robot_without_movable_joints_is_simulated(ros_session: Any) -> None:
+    rospy.set_param("robot_description", FIXED_ROBOT)
+    try:
+        launch = ros_session.launch(with_arguments(gui="false"))
+        until(lambda: rospy.wait_for_message("/clock", Clock, 40.0).clock.to_sec() > 1.0, "simulated time")
+        ros_session.wait_for_service("/gazebo/get_world_properties", 40.0)
+        names = rospy.ServiceProxy("/gazebo/get_world_properties", GetWorldProperties)().model_names
+        assert "stand" in names
+        assert launch.alive() and "the simulation loop ended" not in launch.log()
+        launch.stop()
+    finally:
+        rospy.delete_param("robot_description")

@@ -6,7 +6,7 @@ from __future__ import annotations
 import functools
 import signal
 import subprocess
-import threading
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -30,13 +30,6 @@ from gazebo_msgs.srv import (
     SpawnModel,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
-from moveit_msgs.msg import CollisionObject
-from moveit_msgs.srv import (
-    ApplyPlanningScene,
-    ApplyPlanningSceneResponse,
-    GetPlanningScene,
-    GetPlanningSceneResponse,
-)
 from ros_session import executable
 from ros_session import until as wait_until
 from rosgraph_msgs.msg import Clock
@@ -46,6 +39,9 @@ from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
+
+sys.path.insert(0, str(Path(__file__).parent))
+from fake_planning_scene import FakePlanningScene  # noqa: E402
 
 LAUNCH = """<launch>
   <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>
@@ -72,50 +68,6 @@ BOMB = (
 )
 
 until = functools.partial(wait_until, timeout_s=10.0)
-
-
-class FakePlanningScene:
-    """A fake of move_group that stores what it receives."""
-
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.objects: dict[str, Any] = {}
-        self.poses: dict[str, Any] = {}
-        self.colours: dict[str, Any] = {}
-        self.refuse = False
-        self.services = [
-            rospy.Service("/apply_planning_scene", ApplyPlanningScene, self.apply),
-            rospy.Service("/get_planning_scene", GetPlanningScene, self.read),
-        ]
-
-    def apply(self, request: Any) -> ApplyPlanningSceneResponse:
-        if self.refuse:
-            return ApplyPlanningSceneResponse(False)
-        with self.lock:
-            self.colours |= {item.id: item.color for item in request.scene.object_colors}
-            for item in request.scene.world.collision_objects:
-                if item.operation == CollisionObject.REMOVE:
-                    self.objects.pop(item.id, None)
-                    continue
-                if item.operation == CollisionObject.ADD:
-                    self.objects[item.id] = item
-                self.poses[item.id] = item.pose.position
-        return ApplyPlanningSceneResponse(True)
-
-    def read(self, _request: Any) -> GetPlanningSceneResponse:
-        answer = GetPlanningSceneResponse()
-        with self.lock:
-            answer.scene.world.collision_objects = [CollisionObject(id=name) for name in self.objects]
-        return answer
-
-    def clear(self) -> None:
-        """What a REMOVE with an empty id does."""
-        with self.lock:
-            self.objects.clear()
-
-    def shutdown(self) -> None:
-        for service in self.services:
-            service.shutdown("test")
 
 
 def call(name: str, kind: Any, *values: Any, **fields: Any) -> Any:

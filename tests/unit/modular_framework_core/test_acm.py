@@ -203,3 +203,17 @@ def test_a_permission_ends_with_its_object_and_with_a_new_beginning() -> None:
     assert made.permissions() == {frozenset(("finger_1", "finger_2"))}
     made.reinitialise()
     assert made.permissions() == frozenset()
+
+
+def test_an_object_that_left_the_simulation_takes_its_permissions_along() -> None:
+    made = manager()
+    made.add_object("box")
+    made.add_object("outer::can__link")
+    assert made.follow(["table"]) == [], "not spawned yet"
+    assert made.follow(["table", "box", "outer::can"]) == []
+    made.allow_object_collision(["box"], True)
+    assert made.follow(["table", "outer::can"]) == ["box__link"]
+    assert made.objects == ("outer::can__link",)
+    assert made.permissions() == frozenset()
+    made.add_object("box")
+    assert not made.current().matrix.allowed("palm", "box__link")

@@ -107,3 +107,17 @@ def test_an_object_name_is_taken_until_it_is_deleted() -> None:
             ask("a")
     with pytest.raises(ObjectTypeError, match="needs a name"):
         types.add("", "box")
+
+
+def test_types_follow_the_simulation_but_keep_what_is_about_to_be_spawned() -> None:
+    types = ObjectTypes()
+    types.add("cup", "mug")
+    assert types.follow(["table"]) == []
+    assert types.follow(["table", "cup"]) == []
+    types.add("ball_1", "ball")
+    assert types.follow(["table"]) == ["cup"]
+    with pytest.raises(ObjectTypeError, match=r"Registered: ball_1"):
+        types.get("cup")
+    types.add("cup", "can")
+    assert types.follow([]) == []
+    assert types.get("cup") == "can"

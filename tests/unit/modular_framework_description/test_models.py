@@ -12,6 +12,7 @@ import pytest
 import trimesh
 
 from modular_framework_description.catalogue import FURNITURE, GRASPABLE
+from modular_framework_description.household import HOUSEHOLD
 from modular_framework_description.model_writer import write_model
 
 NAMES = [body.name for body in GRASPABLE]
@@ -53,7 +54,7 @@ def test_there_are_boxes_cylinders_a_sphere_and_something_that_is_not_convex(pac
     assert any(not collision_mesh(sdf(package, name)).is_convex for name in ("l_bracket", "mug"))
 
 
-@pytest.mark.parametrize("folder", [*NAMES, *(body.name for body in FURNITURE), "ground_plane"])
+@pytest.mark.parametrize("folder", [*NAMES, *(body.name for body in (*HOUSEHOLD, *FURNITURE)), "ground_plane"])
 def test_the_files_of_a_model_name_each_other(package: Path, folder: str) -> None:
     config = ElementTree.parse(package / "models" / folder / "model.config").getroot()
     assert config.findtext("name") == folder
@@ -108,7 +109,7 @@ def test_the_visual_mesh_is_the_collision_shape(package: Path, name: str) -> Non
 
 
 def test_the_committed_models_are_what_the_generator_writes(package: Path, tmp_path: Path) -> None:
-    for body in (*GRASPABLE, *FURNITURE):
+    for body in (*GRASPABLE, *HOUSEHOLD, *FURNITURE):
         write_model(body, tmp_path)
         for name in ("model.sdf", "model.config"):
             written, committed = ((root / body.name / name).read_text() for root in (tmp_path, package / "models"))

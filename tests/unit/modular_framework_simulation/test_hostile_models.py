@@ -98,7 +98,7 @@ def test_a_broken_model_is_refused_with_its_line(name: str) -> None:
         ("", ":1: not an XML document"),
         ("\x00\x01", ":1: not an XML document"),
         ("<sdf/>", ":1: <sdf>: got version ''"),
-        ("<sdf version='9.9'/>", ":1: <sdf>: got version '9.9'; allowed: 1.2 to 1.11"),
+        ("<sdf version='9.9'/>", ":1: <sdf>: got version '9.9'; allowed: 1.0 to 1.11"),
         ("<html/>", ":1: <html>: the root element is <html>"),
         ("<sdf version='1.6'>" + "<model name='m'>" * 40 + "</model>" * 40 + "</sdf>", "break the circle"),
         ("<sdf version='1.6'>" + "<a>" * 5000 + "</a>" * 5000 + "</sdf>", "not an XML document"),

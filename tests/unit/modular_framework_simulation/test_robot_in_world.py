@@ -399,3 +399,32 @@ def test_each_gripper_of_a_robot_holds_an_object_of_its_own(world: PhysicsWorld,
     assert held == {"one": "palm_a", "other": "palm_b"}
     close("b")
     assert {each.model: each.touch_links[0] for each in loop.held_objects()} == {"other": "palm_b"}
+
+
+FIXED_PLATE = """<robot name="stand"><link name="world"/>
+  <link name="plate"><inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+    </inertial><collision><geometry><box size="0.4 0.4 0.02"/></geometry></collision></link>
+  <joint name="screwed" type="fixed"><parent link="world"/><child link="plate"/><origin xyz="0 0 0.5"/></joint>
+</robot>"""
+ONE_LINK = """<robot name="stand"><link name="plate"><collision><origin xyz="0 0 0.5"/>
+  <geometry><box size="0.4 0.4 0.02"/></geometry></collision></link></robot>"""
+
+
+@pytest.mark.parametrize("urdf", [FIXED_PLATE, ONE_LINK])
+def test_a_robot_without_movable_joints_stands_in_the_world_and_carries_things(
+    world: PhysicsWorld, convex_parts: ConvexParts, urdf: str
+) -> None:
+    robot = RobotBody(world, read_robot(urdf, no_packages, convex_parts, False), "stand", Pose(), {})
+    hardware = PyBulletRobotHW(robot)
+    assert hardware.init(MappingNodeHandle({"robot_description": urdf}), MappingNodeHandle())
+    loop = SimulationLoop(world, Pacer(0.0), RequestQueue(), Actors(robot, hardware, Commander()))
+    world.spawn(solid("cube", specs.Box((0.05, 0.05, 0.05)), Pose((0, 0, 0.6))))
+    for _ in range(500):
+        loop.step()
+        loop.watch_grasps()
+    assert world.entity_state("cube").pose.position[2] == pytest.approx(0.535, abs=1e-3)
+    assert robot.read() == [] and hardware.get(JointStateInterface).names == []
+    loop.reset_all()
+    loop.restart()
+    loop.step()
+    assert world.names() == ["stand"]

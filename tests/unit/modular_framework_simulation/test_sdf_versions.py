@@ -238,3 +238,85 @@ def test_a_capsule_is_a_cylinder_with_two_balls() -> None:
     shapes = model(f"<link name='l'><collision name='c'>{shape}</collision></link>").links[0].collisions
     assert [each.geometry for each in shapes] == [specs.Cylinder(1, 4), specs.Sphere(1), specs.Sphere(1)]
     assert [each.pose.position[2] for each in shapes] == [0, 2, -2]
+
+
+WORLD_1_0 = """<gazebo version="1.0"><world name="old">
+  <physics type="ode" update_rate="1000"><gravity xyz="0 0 -3.7"/></physics>
+  <model name="arm" static="false"><origin pose="0 0 2.1 0.5 0 0"/>
+    <link name="bar" self_collide="true" gravity="false" kinematic="false"><origin pose="0 0 0.1 0 0 0"/>
+      <inertial mass="10"><origin pose="0 0 -0.5 0 0 0"/><inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/>
+      </inertial>
+      <visual name="v" cast_shadows="true" transparency="0.5"><geometry><box size="1 2 3"/></geometry>
+        <material script="Gazebo/Green"/></visual>
+      <collision name="c"><origin pose="0 0 -0.4 0 0 0"/><geometry><cylinder radius="0.1" length="1.5"/></geometry>
+        <surface><friction><ode mu="0.5" mu2="0.2" fdir1="1 0 0"/></friction>
+          <bounce restitution_coefficient="0.3" threshold="1"/>
+          <contact><ode kp="1e5" kd="1e3" max_vel="100" min_depth="0.0001"/></contact></surface></collision></link>
+    <joint name="hinge" type="revolute"><parent link="world"/><child link="bar"/><origin pose="0 0 0.2 0 0 0"/>
+      <axis xyz="0 1 0"><limit lower="-1" upper="2" effort="30" velocity="4"/><dynamics damping="1.5" friction="0.1"/>
+      </axis></joint>
+    <plugin name="p" filename="libsomething.so"><link mass="3"/></plugin></model>
+  <model name="floor" static="true"><link name="l"><collision name="c"><geometry><plane normal="0 0 1"/></geometry>
+    </collision></link></model>
+</world></gazebo>"""
+
+
+def test_values_in_attributes_of_sdf_1_0_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "old.world"
+    path.write_text(WORLD_1_0)
+    world = read_world(path, Resources())
+    assert world.gravity == (0, 0, -3.7)
+    arm, floor = world.models
+    assert (arm.static, floor.static) == (False, True)
+    assert arm.pose.position == (0, 0, 2.1)
+    bar, shape, hinge = arm.links[0], arm.links[0].collisions[0], arm.joints[0]
+    assert (bar.gravity, bar.self_collide, bar.pose.position) == (False, True, (0, 0, 0.1))
+    assert bar.inertial is not None
+    assert (bar.inertial.mass, bar.inertial.inertia) == (10, (1, 0, 0, 2, 0, 3))
+    assert bar.inertial.pose.position == (0, 0, -0.5)
+    assert (shape.geometry, shape.pose.position) == (specs.Cylinder(0.1, 1.5), (0, 0, -0.4))
+    assert shape.friction == specs.Friction(0.5, mu2=0.2)
+    assert shape.bounce == specs.Bounce(0.3, 1.0)
+    assert (shape.contact.kp, shape.contact.kd) == (1e5, 1e3)
+    assert bar.visuals[0].colour == (0, 1, 0, 0.5)
+    assert (hinge.parent, hinge.child, hinge.lower, hinge.upper, hinge.effort) == ("world", "bar", -1, 2, 30)
+    assert (hinge.dynamics.damping, hinge.dynamics.friction) == (1.5, 0.1)
+    assert hinge.pose.position == pytest.approx((0, 0, 0.2))
+
+
+def test_a_fault_in_a_file_of_sdf_1_0_is_named_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "old.world"
+    path.write_text(WORLD_1_0.replace('radius="0.1"', 'radius="-0.1"'))
+    with pytest.raises(DescriptionError, match=r"old\.world:9: <radius>: got '-0.1'"):
+        read_world(path, Resources())
+
+
+def test_the_filename_of_a_mesh_is_its_address_in_old_files(tmp_path: Path) -> None:
+    (tmp_path / "plate.stl").write_bytes(b"solid")
+    text = """<sdf version='1.3'><model name='m'><link name='a'><collision name='c'><geometry><mesh>
+        <filename>{}</filename></mesh></geometry></collision></link></model></sdf>"""
+    read = read_model_text(text.format(tmp_path / "plate.stl"), "test", Resources())
+    assert read.links[0].collisions[0].geometry == specs.Mesh(tmp_path / "plate.stl")
+    with pytest.raises(DescriptionError, match=r"'chair3/model/chair\.stl' does not exist"):
+        read_model_text(text.format("chair3/model/chair.stl"), "test", Resources())
+
+
+def test_models_of_one_name_get_numbers_in_old_files_and_are_refused_in_new_ones(tmp_path: Path) -> None:
+    one = "<model name='box'><pose>{} 0 0 0 0 0</pose><static>1</static><link name='l'/></model>\n"
+    body = one.format(1) + one.format(2) + one.format(3).replace("'box'", "'box_0'") + one.format(4)
+    read = world(tmp_path, body, "1.5")
+    assert {model.name: model.pose.position[0] for model in read.models} == {
+        "box": 1,
+        "box_0": 2,
+        "box_0_0": 3,
+        "box_1": 4,
+    }
+    assert any("is a second model 'box', and is called 'box_1'" in note for note in read.models[3].notes)
+    with pytest.raises(DescriptionError, match=r"test\.world:4: <model name='box'>: is a second model 'box'"):
+        world(tmp_path, body, "1.7")
+
+
+def test_a_negative_correcting_velocity_is_none() -> None:
+    contact = "<surface><contact><ode><max_vel>-1</max_vel></ode></contact></surface>"
+    shape = f"<collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry>{contact}</collision>"
+    assert model(f"<link name='a'>{shape}</link>").links[0].collisions[0].contact.max_vel is None

@@ -10,6 +10,10 @@ from modular_framework_description.solids import Body, Part, ring_of_boxes
 _TABLE_HEIGHT = 0.84
 _TABLE_TOP = 0.03
 
+_SHELF_WIDTH, _SHELF_DEPTH, _BOARD = 0.90, 0.35, 0.02
+_SHELF_TOPS = (0.40, _TABLE_HEIGHT, 1.40)
+_BIN, _BIN_WALL = (0.40, 0.30, 0.12), 0.01
+
 _BRACKET = (
     Part("box", (0.08, 0.03, 0.02), (0.0, 0.0, -0.03)),
     Part("box", (0.02, 0.03, 0.06), (-0.03, 0.0, 0.01)),
@@ -102,6 +106,41 @@ FURNITURE = (
             ),
         ),
         colour=(0.80, 0.74, 0.64),
+    ),
+    Body(
+        "shelf",
+        "A shelf of 0.9 x 0.35 m with boards whose tops are 0.40, 0.84 and 1.40 m above the floor; open in front (-y).",
+        0.0,
+        (
+            *(Part("box", (_SHELF_WIDTH, _SHELF_DEPTH, _BOARD), (0.0, 0.0, top - _BOARD / 2.0)) for top in _SHELF_TOPS),
+            *(
+                Part("box", (_BOARD, _SHELF_DEPTH, _SHELF_TOPS[-1]), (x, 0.0, _SHELF_TOPS[-1] / 2.0))
+                for x in (-(_SHELF_WIDTH + _BOARD) / 2.0, (_SHELF_WIDTH + _BOARD) / 2.0)
+            ),
+            Part(
+                "box",
+                (_SHELF_WIDTH, _BOARD, _SHELF_TOPS[-1]),
+                (0.0, (_SHELF_DEPTH + _BOARD) / 2.0, _SHELF_TOPS[-1] / 2.0),
+            ),
+        ),
+        colour=(0.85, 0.82, 0.75),
+    ),
+    Body(
+        "bin",
+        "An open bin, 0.40 x 0.30 m and 0.12 m high inside; its walls are 10 mm thick. Its frame is under its floor.",
+        0.0,
+        (
+            Part("box", (_BIN[0] + 2.0 * _BIN_WALL, _BIN[1] + 2.0 * _BIN_WALL, _BIN_WALL), (0.0, 0.0, _BIN_WALL / 2.0)),
+            *(
+                Part("box", (_BIN_WALL, _BIN[1], _BIN[2]), (x, 0.0, _BIN_WALL + _BIN[2] / 2.0))
+                for x in (-(_BIN[0] + _BIN_WALL) / 2.0, (_BIN[0] + _BIN_WALL) / 2.0)
+            ),
+            *(
+                Part("box", (_BIN[0] + 2.0 * _BIN_WALL, _BIN_WALL, _BIN[2]), (0.0, y, _BIN_WALL + _BIN[2] / 2.0))
+                for y in (-(_BIN[1] + _BIN_WALL) / 2.0, (_BIN[1] + _BIN_WALL) / 2.0)
+            ),
+        ),
+        colour=(0.25, 0.35, 0.55),
     ),
     Body(
         "robot_pedestal",

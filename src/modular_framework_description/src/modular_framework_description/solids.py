@@ -75,6 +75,7 @@ class Body:
         rolling_friction: resistance to rolling [m]; 0 for shapes that do not roll.
         colour: red, green, blue in [0, 1].
         mesh_name: file name of a visual mesh of the whole body, "" to show the parts themselves.
+        centre_offset: how far the centre of mass is from where even filling puts it [m]; the inertia about it stays.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Body:
     rolling_friction: float = 0.0
     colour: tuple[float, float, float] = field(default=(0.7, 0.7, 0.7))
     mesh_name: str = ""
+    centre_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def mesh(self) -> trimesh.Trimesh:
         """Return the outer surface of all parts together."""
@@ -93,12 +95,14 @@ class Body:
 
     def mass_properties(self) -> MassProperties:
         """Return mass properties: closed form for one part, integrals over the joined surface for several."""
-        if len(self.parts) == 1 and self.parts[0].rpy == (0.0, 0.0, 0.0):
-            part = self.parts[0]
-            return MassProperties(self.mass, np.array(part.xyz), self.mass * unit_inertia(part))
+        if len(self.parts) == 1:
+            part, rotation = self.parts[0], rotation_from_rpy(self.parts[0].rpy)
+            inertia = self.mass * rotation @ unit_inertia(part) @ rotation.T
+            return MassProperties(self.mass, np.array(part.xyz) + self.centre_offset, inertia)
         surface = self.mesh()
         surface.density = self.mass / surface.volume
-        return MassProperties(self.mass, np.asarray(surface.center_mass), np.asarray(surface.moment_inertia))
+        centre = np.asarray(surface.center_mass) + self.centre_offset
+        return MassProperties(self.mass, centre, np.asarray(surface.moment_inertia))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ be allowed to touch itself or some objects. Forbidding again restores the refere
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from modular_framework_core.files.faults import nearest
@@ -42,6 +42,7 @@ class AcmManager:
     _initial: CollisionMatrix | None = None
     _table: MutableMatrix | None = None
     _objects: list[str] = field(default_factory=list)
+    _simulated: set[str] = field(default_factory=set)
     _manipulator_links: tuple[str, ...] = ()
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
@@ -104,6 +105,22 @@ class AcmManager:
             if self._table is not None and name not in self._table.names:
                 self._table.add(name)
             return ""
+
+    def follow(self, models: Collection[str]) -> list[str]:
+        """Removes the objects that were in the simulation and are not any more.
+
+        Args:
+            models: Names of the models that are in the simulation now.
+
+        Returns:
+            Ids of the objects that were removed.
+        """
+        with self._lock:
+            gone = [name for name in self._objects if name in self._simulated and _model_of(name) not in models]
+            for name in gone:
+                self.delete_object(name)
+            self._simulated = {name for name in self._objects if _model_of(name) in models}
+            return gone
 
     def delete_object(self, entry_name: str) -> str:
         """Removes an object.
@@ -238,6 +255,10 @@ class AcmManager:
         return CollisionMatrix(
             tuple(table.names), tuple(tuple(row) for row in table.rows), initial.default_names, initial.default_values
         )
+
+
+def _model_of(object_name: str) -> str:
+    return object_name.rpartition(LINK_SEPARATOR)[0]
 
 
 def object_id(entry_name: str) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Collection
 
 
 class ObjectTypeError(LookupError):
@@ -15,7 +16,26 @@ class ObjectTypes:
 
     def __init__(self) -> None:
         self._types: dict[str, str] = {}
+        self._simulated: set[str] = set()
         self._lock = threading.Lock()
+
+    def follow(self, models: Collection[str]) -> list[str]:
+        """Forgets the objects that were in the simulation and are not any more.
+
+        An object that was never there stays: it may be about to be spawned.
+
+        Args:
+            models: Names of the models that are in the simulation now.
+
+        Returns:
+            Names of the objects that were forgotten.
+        """
+        with self._lock:
+            gone = sorted(self._simulated.difference(models))
+            for name in gone:
+                del self._types[name]
+            self._simulated = self._types.keys() & set(models)
+            return gone
 
     def add(self, object_name: str, object_type: str) -> None:
         """Registers an object.
@@ -50,6 +70,7 @@ class ObjectTypes:
         """
         with self._lock:
             del self._types[self._known(object_name)]
+            self._simulated.discard(object_name)
 
     def _known(self, object_name: str) -> str:
         if object_name not in self._types:

@@ -12,7 +12,7 @@ from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 from modular_framework_core.managers.acm import AcmAnswer, AcmManager
 from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix
 from modular_framework_core.managers.ros_manager_services import ManagerServices
-from modular_framework_core.managers.ros_simulated_objects import new_movable_objects
+from modular_framework_core.managers.ros_simulated_objects import new_movable_objects, simulated_models
 from modular_framework_core.srv import (
     GetModifiedACM,
     GetModifiedACMRequest,
@@ -80,13 +80,15 @@ class AcmServices(ManagerServices):
         ``manipulator_prefix`` (string): texts in the names of the manipulator's links; used without the indices.
         Both are read each time a reference matrix is set.
         ``~grip_interfaces`` (bool, false): serves ``update_acm_entry`` with GRIP's type, which has a field ``publish``.
-        ``simulation`` (bool): True adds the movable objects of the simulation before a request about objects is served.
+        ``simulation`` (bool): True adds the movable objects of the simulation before a request about objects is served,
+            and removes those that were deleted from it before any request.
 
     Services:
         ``set_init_acm`` (SetInitACM), ``update_acm_entry`` (UpdateACMEntry), ``get_modified_acm`` (GetModifiedACM):
         of the manipulator. ``modify_acm`` (ModifyACM): of any links.
     Services called: ``apply_planning_scene`` when ``modify_acm`` asks for it, and when ``update_acm_entry`` takes a
-        permission back; in simulation ``get_planning_scene`` and ``gazebo/get_model_properties``.
+        permission back; in simulation ``get_planning_scene``, ``gazebo/get_model_properties`` and
+        ``gazebo/get_world_properties``.
     """
 
     def __init__(self) -> None:
@@ -122,11 +124,13 @@ class AcmServices(ManagerServices):
 
     def _update_entry(self, request: Any) -> Any:
         before, publish = self.manager.permissions(), bool(getattr(request, "publish", False))
+        self._follow_simulation()
         response = (
             UpdateACMEntryResponse if isinstance(request, UpdateACMEntryRequest) else (UpdateAndPublishACMEntryResponse)
         )
         try:
             warning = self._apply_update(request.action, request.entry_name)
+            self._follow_simulation()
             if publish or before - self.manager.permissions():
                 apply_matrix(matrix_to_message(self.manager.current().matrix), APPLY_TIMEOUT_S)
         except AcmError as error:
@@ -154,6 +158,7 @@ class AcmServices(ManagerServices):
                 raise AcmError(f"got action {action}, allowed are ADD_ENTRY=0, DELETE_ENTRY=1, REINIT=2")
 
     def _get_modified(self, request: Any) -> GetModifiedACMResponse:
+        self._follow_simulation()
         try:
             answer = self._modify(request)
         except AcmError as error:
@@ -179,6 +184,7 @@ class AcmServices(ManagerServices):
                 )
 
     def _modify_links(self, request: Any) -> ModifyACMResponse:
+        self._follow_simulation()
         try:
             answer = self._modified(request)
             if request.publish:
@@ -204,6 +210,17 @@ class AcmServices(ManagerServices):
                     f"got modification {request.modification}, allowed are ROBOT_SELF_COLLISION=0, "
                     "ROBOT_OBJECT_COLLISION=1"
                 )
+
+    def _follow_simulation(self) -> None:
+        """Removes objects that somebody else deleted from the simulation."""
+        try:
+            models = simulated_models()
+        except CallError as error:
+            rospy.logwarn("collision matrix: the models of the simulation cannot be looked up: %s", error)
+            return
+        if models is not None:
+            for name in self.manager.follow(models):
+                rospy.loginfo("collision matrix: '%s' is not in the simulation any more and was removed", name)
 
     def _add_simulated_objects(self) -> None:
         """Adds objects that a world file or another node has put into the simulation since the last request."""

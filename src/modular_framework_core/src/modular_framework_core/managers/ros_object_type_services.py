@@ -9,6 +9,7 @@ import rospy
 
 from modular_framework_core.managers.object_types import ObjectTypeError, ObjectTypes
 from modular_framework_core.managers.ros_manager_services import ManagerServices
+from modular_framework_core.managers.ros_simulated_objects import simulated_models
 from modular_framework_core.srv import (
     AddGazeboMapping,
     AddGazeboMappingResponse,
@@ -17,14 +18,19 @@ from modular_framework_core.srv import (
     GetGazeboType,
     GetGazeboTypeResponse,
 )
+from modular_framework_ros.calls import CallError
 
 
 class ObjectTypeServices(ManagerServices):
     """The object types behind their services.
 
+    Parameters:
+        ``simulation`` (bool): True forgets objects that were deleted from the simulation before a request is served.
+
     Services:
         ``add_gazebo_mapping`` (AddGazeboMapping), ``get_object_type`` (GetGazeboType),
         ``delete_gazebo_mapping`` (DeleteGazeboMapping).
+    Services called: in simulation ``gazebo/get_world_properties``.
     """
 
     def __init__(self) -> None:
@@ -40,7 +46,19 @@ class ObjectTypeServices(ManagerServices):
             rospy.Service("delete_gazebo_mapping", DeleteGazeboMapping, self._delete),
         ]
 
+    def _follow_simulation(self) -> None:
+        """Forgets objects that somebody else deleted from the simulation."""
+        try:
+            models = simulated_models()
+        except CallError as error:
+            rospy.logwarn("object types: the models of the simulation cannot be looked up: %s", error)
+            return
+        if models is not None:
+            for name in self.types.follow(models):
+                rospy.loginfo("object types: '%s' is not in the simulation any more and was forgotten", name)
+
     def _add(self, request: Any) -> AddGazeboMappingResponse:
+        self._follow_simulation()
         try:
             self.types.add(request.object_name, request.object_type)
             return AddGazeboMappingResponse(success=True)
@@ -49,6 +67,7 @@ class ObjectTypeServices(ManagerServices):
             return AddGazeboMappingResponse(success=False)
 
     def _get(self, request: Any) -> GetGazeboTypeResponse:
+        self._follow_simulation()
         try:
             return GetGazeboTypeResponse(object_type=self.types.get(request.object_name), success=True)
         except ObjectTypeError as error:

@@ -1,20 +1,40 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the movable objects of a simulation, so that a world file's objects need not be added to the matrix by hand."""
+"""Asks the simulation for its models: managers know the objects of a world file, and forget those that were deleted."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 
 import rospy
-from gazebo_msgs.srv import GetModelProperties, GetModelPropertiesRequest
+from gazebo_msgs.srv import (
+    GetModelProperties,
+    GetModelPropertiesRequest,
+    GetWorldProperties,
+    GetWorldPropertiesRequest,
+)
 from moveit_msgs.msg import PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
 from modular_framework_core.managers.acm import LINK_SEPARATOR
-from modular_framework_ros.calls import call_service, wait_for_service
+from modular_framework_ros.calls import CallError, call_service, request_service, wait_for_service
 
 SIMULATION_PARAMETER = "simulation"
 SERVICE_TIMEOUT_S = 3.0
+
+
+def simulated_models() -> list[str] | None:
+    """Returns the names of all models in the simulation; None without one (parameter ``simulation`` not true).
+
+    Raises:
+        CallError: The simulation does not answer.
+    """
+    if rospy.get_param(SIMULATION_PARAMETER, False) is not True:
+        return None
+    name = "gazebo/get_world_properties"
+    answer = request_service(name, GetWorldProperties, GetWorldPropertiesRequest(), SERVICE_TIMEOUT_S)
+    if not answer.success:
+        raise CallError(f"service '{rospy.resolve_name(name)}' refused: {answer.status_message}")
+    return list(answer.model_names)
 
 
 def new_movable_objects(known: Collection[str]) -> list[str]:

@@ -73,6 +73,7 @@ def spawn(request: ObjectRequest) -> None:
         {
             "add_gazebo_mapping": srv.AddGazeboMapping,
             "gazebo/spawn_sdf_model": SpawnModel,
+            "get_object_type": srv.GetGazeboType,
             "update_acm_entry": srv.UpdateACMEntry,
         }
     )
@@ -96,6 +97,8 @@ def spawn(request: ObjectRequest) -> None:
             ),
         )
         try:
+            # The map of types learns that the simulation has the object, and forgets it when it is deleted there.
+            ask("get_object_type", srv.GetGazeboType, srv.GetGazeboTypeRequest(object_name=request.name))
             call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.ADD_ENTRY, request.name))
         except RefusedError:
             _undo("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
@@ -126,8 +129,8 @@ def delete(request: ObjectRequest) -> None:
     mapping = srv.GetGazeboTypeRequest(object_name=request.name)
     was_spawned_here = ask("get_object_type", srv.GetGazeboType, mapping).success
     call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
-    if was_spawned_here:
-        call("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
+    if was_spawned_here:  # the map may have noticed by itself that the object is gone
+        ask("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
     call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.DELETE_ENTRY, request.name))
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_conversion import CONVERTED_VERSION, convert
 from modular_framework_simulation.models.sdf_frames import SCOPE, FrameTree, InnerModel
 from modular_framework_simulation.models.sdf_inertial import read_inertial
 from modular_framework_simulation.models.sdf_joints import read_joint
@@ -49,8 +50,20 @@ def sdf_version(root: XmlNode) -> tuple[int, ...]:
     text = root.attributes.get("version", "")
     version = version_numbers(text)
     if not OLDEST_VERSION <= version <= NEWEST_VERSION:
-        allowed = f"allowed: {span}; Gazebo's tool converts older files: gz sdf -p FILE"
-        raise DescriptionError(root.where, f"got version '{text}'", allowed)
+        raise DescriptionError(root.where, f"got version '{text}'", f"allowed: {span}")
+    return version
+
+
+def converted_version(root: XmlNode) -> tuple[int, ...]:
+    """Returns the version of a document, after converting it if it is of one before the oldest that is read as it is.
+
+    Raises:
+        DescriptionError: It is no SDF, or of a version that is not read.
+    """
+    version = sdf_version(root)
+    if version < CONVERTED_VERSION:
+        convert(root)
+        return CONVERTED_VERSION
     return version
 
 
@@ -84,7 +97,7 @@ class SdfModels:
         Raises:
             DescriptionError: It holds nothing at all, or something that cannot be used.
         """
-        version = sdf_version(root)
+        version = converted_version(root)
         holder = root.find("world") or root
         model = holder.find("model")
         if model is not None:

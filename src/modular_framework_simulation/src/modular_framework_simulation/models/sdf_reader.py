@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads worlds and models written in SDF 1.2 to 1.11.
+"""Reads worlds and models written in SDF 1.0 to 1.11.
 
 What is read: includes, poses in all frames, models inside models, links with inertia, shapes, looks, surfaces and
 damping, and fixed, revolute, continuous and prismatic joints. What an element means is taken from the version of its
@@ -10,13 +10,15 @@ engines) are listed once a model; what would make a wrong world, such as a joint
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from collections.abc import Collection
 from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.joint_trees import refuse_loops
 from modular_framework_simulation.models.sdf_frames import FrameTree
-from modular_framework_simulation.models.sdf_models import LoadedModel, SdfModels, sdf_version
+from modular_framework_simulation.models.sdf_models import LoadedModel, SdfModels, converted_version
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_states import with_saved_state
 from modular_framework_simulation.models.xml_nodes import XmlNode, parse_xml, read_xml
@@ -27,6 +29,9 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.8)
 
 _GRAVITY_IN_PHYSICS_UNTIL = (1, 5)
 """Until this version <gravity> is a child of <physics>, later of <world>."""
+
+_NAMES_UNIQUE_FROM = (1, 7)
+"""Until then files with several models of one name were read: the later ones get a number, as Gazebo gives them."""
 
 _REFUSED_IN_WORLD = {
     "population": "place its models one by one",
@@ -48,7 +53,7 @@ def read_world(path: Path, resources: Resources) -> specs.World:
         DescriptionError: Something in the file, or in a file it includes, cannot be used.
     """
     root = read_xml(path)
-    version = sdf_version(root)
+    version = converted_version(root)
     world = root.require("world")
     loaded, ignored = _models_of(world, version, resources)
     frames = FrameTree(world, {name: each.placed for name, each in loaded.items()})
@@ -81,12 +86,23 @@ def _models_of(
         elif child.tag in _REFUSED_IN_WORLD:
             raise DescriptionError(child.where, "is not simulated", _REFUSED_IN_WORLD[child.tag])
         if model is not None:
-            if model.spec.name in loaded:
+            if model.spec.name in loaded and version >= _NAMES_UNIQUE_FROM:
                 raise DescriptionError(child.where, f"is a second model '{model.spec.name}'", "give each its own name")
+            model = _with_free_name(model, loaded, f"{child.source}:{child.line}")
             loaded[model.spec.name] = model
         elif child.tag not in ("gravity", "frame", "state"):
             ignored.append(f"{child.source}:{child.line}: <{child.tag}>")
     return loaded, ignored
+
+
+def _with_free_name(model: LoadedModel, taken: Collection[str], where: str) -> LoadedModel:
+    """Returns a model with a number behind its name and a note of that, if its name is taken."""
+    name = model.spec.name
+    if name not in taken:
+        return model
+    free = next(numbered for number in itertools.count() if (numbered := f"{name}_{number}") not in taken)
+    notes = (*model.spec.notes, f"{where}: is a second model '{name}', and is called '{free}'")
+    return dataclasses.replace(model, spec=dataclasses.replace(model.spec, name=free, notes=notes))
 
 
 def read_model_text(text: str, source: str, resources: Resources) -> specs.Model:

@@ -20,7 +20,7 @@ _MOST_NAMED = 4
 """Folders that a message names."""
 
 NEWEST_VERSION = (1, 11)
-OLDEST_VERSION = (1, 2)
+OLDEST_VERSION = (1, 0)
 
 
 def no_packages(name: str) -> str:

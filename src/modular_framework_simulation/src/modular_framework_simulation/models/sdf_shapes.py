@@ -159,7 +159,7 @@ def _read_plane(node: XmlNode) -> specs.Plane:
 
 
 def _read_mesh(node: XmlNode, resources: Resources) -> specs.Mesh:
-    uri = node.require("uri")
+    uri = node.find("uri") or node.find("filename") or node.require("uri")  # <filename> until SDF 1.3
     try:
         path = resources.resolve(uri, uri.text.strip())
     except DescriptionError as error:

@@ -80,12 +80,14 @@ def read_surface_contact(collision: XmlNode) -> specs.SurfaceContact:
         DescriptionError: A value is negative, or no number.
     """
     contact = collision.find_path("surface", "contact")
+    largest_node = contact.find_path("ode", "max_vel") if contact is not None else None
+    largest = largest_node.number() if largest_node is not None else None  # negative: none
     without = contact.find("collide_without_contact") if contact is not None else None
     mask = contact.find("collide_bitmask") if contact is not None else None
     return specs.SurfaceContact(
         non_negative(contact, "ode", "kp"),
         non_negative(contact, "ode", "kd"),
-        non_negative(contact, "ode", "max_vel"),
+        largest if largest is None or largest >= 0 else None,
         non_negative(contact, "ode", "min_depth"),
         without.flag() if without is not None else False,
         specs.SurfaceContact().collide_bitmask if mask is None else _bitmask(mask),

@@ -189,6 +189,8 @@ class RobotBody:
 
     def read(self) -> list[JointReading]:
         """Measures all joints; the result is in the order of `joint_names`."""
+        if not self._indices:  # the engine answers for no joints with nothing at all
+            return self.readings
         records = self.world.engine.joint_states(self.body.number, self._indices)
         self.readings = [JointReading(*record) for record in records]
         return self.readings
@@ -199,6 +201,8 @@ class RobotBody:
         Args:
             drives: Commands of the driven joints by name; joints that are not named are free.
         """
+        if not self._indices:
+            return
         step_s = self.world.settings.time_step_s
         indices: list[int] = []
         targets: list[float] = []
