@@ -21,6 +21,7 @@ from modular_framework_planning.collision_detection.bounding_geometry import (
 from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     CELLS,
+    CHECK_COUNTS,
     FIELD,
     UNKNOWN,
     World,
@@ -363,6 +364,9 @@ def _arrays(
         table_joints=np.zeros((0, 2), dtype=np.int64),
         table_of=np.full(len(pairs), -1, dtype=np.int64),
         watched=np.arange(len(pairs)),
+        represented=np.zeros((0, 0), dtype=np.int64),
+        counts=np.zeros(CHECK_COUNTS, dtype=np.int64),
+        refusals=np.zeros(len(pairs), dtype=np.int64),
         field=_field(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)), 0.0),
     )
 
@@ -402,6 +406,8 @@ def _with_field(world: World) -> tuple[World, list[list[int]]]:
         excess=np.concatenate([world.excess, excess]),
         table_of=np.concatenate([world.table_of, np.full(len(rows), -1)]),
         watched=np.concatenate([np.setdiff1d(np.arange(count), left_out), count + np.arange(len(rows))]),
+        represented=np.array(replaced, dtype=np.int64),
+        refusals=np.zeros(count + len(rows), dtype=np.int64),
         field=field,
     )
     return world, replaced

@@ -73,13 +73,13 @@ class ExactCollision:
         coal.collide(*self._placed(pair.first), *self._placed(pair.second), request, result)
         return result
 
-    def touches(self, positions: Array, numbers: Iterable[int]) -> bool:
-        """Whether any of the pairs touches at these positions (of the whole robot)."""
+    def touching_pair(self, positions: Array, numbers: Iterable[int]) -> int:
+        """Returns the first of the pairs that touches at these positions (of the whole robot), or -1."""
         self._update_poses(positions)
-        return any(
-            not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
-            for number in numbers
-        )
+        return next((number for number in numbers if self._touches(number)), -1)
+
+    def _touches(self, number: int) -> bool:
+        return not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
 
     def contacts(self, positions: Array, numbers: Iterable[int]) -> list[tuple[int, Contact]]:
         """Returns those of the pairs that touch, each with its deepest contact."""

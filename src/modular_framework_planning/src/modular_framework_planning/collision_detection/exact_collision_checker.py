@@ -21,7 +21,13 @@ from modular_framework_planning.collision_detection.collision_bodies import (
 )
 from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
 from modular_framework_planning.collision_detection.exact_collision import ExactCollision
-from modular_framework_planning.collision_detection.kernels.compiled_collision import World, surrounded_pair_at
+from modular_framework_planning.collision_detection.kernels.compiled_collision import (
+    ASKED,
+    FOUND_FREE,
+    TOUCHING_EXACTLY,
+    World,
+    surrounded_pair_at,
+)
 from modular_framework_planning.collision_detection.kernels.compiled_distance import TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     UNDECIDED_ROWS,
@@ -31,6 +37,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 from modular_framework_planning.collision_detection.kernels.compiled_penetration import Cover, cover_of, penetrations
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.plan_statistics import Refusals
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -84,6 +91,21 @@ class ExactCollisionChecker:
         is_own = type(self).path_is_free is not ExactCollisionChecker.path_is_free
         return None if is_own or self._tolerated or self._compiled.uncompiled else self._compiled.world
 
+    @property
+    def check_counts(self) -> NDArray[np.int64]:
+        """See the protocol CountsChecks."""
+        return self._compiled.world.counts
+
+    def most_refusals(self) -> Refusals | None:
+        """Returns the two bodies that touched in the most checks; None where none did."""
+        refusals = self._compiled.world.refusals
+        pair = int(refusals.argmax()) if len(refusals) else -1
+        if pair < 0 or not refusals[pair]:
+            return None
+        watched = self._pairs[self._moving[self._compiled.members[pair][0]]]
+        names = (self._parts[part].body.name for part in (watched.first, watched.second))
+        return Refusals(*names, int(refusals[pair]))
+
     def build(self, check_interrupt: Callable[[], None]) -> None:
         """Builds now what the first check would build: it takes seconds for 100,000 triangles.
 
@@ -125,33 +147,35 @@ class ExactCollisionChecker:
             if written == count:
                 break
             decided, self._undecided = written, np.empty((4 * written, 2), dtype=np.int64)
+            self.check_counts[ASKED] -= 1  # the same check again
             status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         if status == TOUCHING:
             return count, numbers
         end = int(numbers[-1])
         if self._tolerated or self._compiled.uncompiled:
+            self.check_counts[FOUND_FREE] -= status != TOO_CLOSE  # the bounds of the other pairs alone do not decide
             for number in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
                 if not self._rest_is_free(sample_at(path, numbers, number)):
+                    self.check_counts[TOUCHING_EXACTLY] += 1
                     return number, numbers
         return -1, numbers
 
     def _decide(self, path: Array, numbers: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
         """Asks the exact check about (sample, pair) rows; returns the number of a sample that touches, or -1."""
-        members = self._compiled.members
-        return next(
-            (
-                number
-                for number, pair in undecided.tolist()
-                if self._exact.touches(
-                    sample_at(path, numbers, number), (self._moving[member] for member in members[pair])
-                )
-            ),
-            -1,
-        )
+        for number, pair in undecided.tolist():
+            members = {self._moving[member]: member for member in self._compiled.members[pair]}
+            touching = self._exact.touching_pair(sample_at(path, numbers, number), members)
+            if touching >= 0:
+                self.check_counts[TOUCHING_EXACTLY] += 1
+                rows = self._compiled.members  # those of single pairs come before those that stand for them
+                row = next(row for row, items in enumerate(rows) if members[touching] in items)
+                self._compiled.world.refusals[row] += 1
+                return number
+        return -1
 
     def _rest_is_free(self, positions: Array) -> bool:
         """Whether tolerated contacts stay shallow and pairs without bounds apart."""
-        if self._exact.touches(positions, (self._moving[number] for number in self._compiled.uncompiled)):
+        if self._exact.touching_pair(positions, (self._moving[number] for number in self._compiled.uncompiled)) >= 0:
             return False
         return all(
             contact.depth <= self._tolerated[number] + DEPTH_SLACK

@@ -11,6 +11,7 @@ import numpy as np
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -222,7 +223,7 @@ class PlanningAnswer:
         start, goal: positions of the whole robot.
         planning_time_s: time until a path was found; total_time_s: until the checked, timed motion was ready.
         path: vertices of the shortened path, shape (n, joints).
-        phases_s: how long the parts of the plan took, see phase_times [s].
+        statistics: what the parts of the plan took, see phase_times.
     """
 
     trajectory: Trajectory
@@ -232,4 +233,9 @@ class PlanningAnswer:
     planner_id: str
     planning_time_s: float
     total_time_s: float
-    phases_s: Mapping[str, float] = field(default_factory=dict)
+    statistics: PlanStatistics = field(default_factory=PlanStatistics)
+
+    @property
+    def phases_s(self) -> Mapping[str, float]:
+        """How long the parts of the plan took [s]."""
+        return self.statistics.phases_s

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
-from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOUCHING
+from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     Samples,
     check_samples,
+    count_verdict,
     new_workspace,
     number_samples,
     release,
@@ -128,6 +129,8 @@ def _check_edge(space, world, start, end, samples, undecided, workspace):  # typ
     _write_positions(space, end, samples.vertices[1])
     number_samples(samples, space.step)
     status, _ = check_samples(world, samples, 1, undecided, workspace)
+    if status != TOO_CLOSE:  # else it is asked again elsewhere
+        count_verdict(world.counts, status)
     return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
 
 

@@ -98,8 +98,8 @@ class RrtConnect:
             limit: of random states; None: the clock ends the search.
             is_weighted: whether joints count in a length by the root of their reach, the one that reaches farthest as
                 1; else all count as 1. A wrist then turns further in one step than a shoulder.
-            number: of the search among those that run at the same time; all but number 0 have a distance field of their
-                own, which they fill.
+            number: of the search among those that run at the same time; all but number 0 have a distance field and counts
+                of their own, which they fill.
         """
         self._problem, self._limit = problem, limit
         start = problem.start_values
@@ -107,7 +107,13 @@ class RrtConnect:
         checker = problem.checker
         assert isinstance(checker, CompiledChecks) and checker.compiled_world is not None
         world = checker.compiled_world
-        self._world = arguments(world if number == 0 else world._replace(field=empty_field(world.field)))
+        if number > 0:
+            world = world._replace(
+                field=empty_field(world.field),
+                counts=np.zeros_like(world.counts),
+                refusals=np.zeros_like(world.refusals),
+            )
+        self._bodies, self._world = world, arguments(world)
         self._space = self._space_of(world, step, longest, is_weighted)
         self._trees = _trees(start, goals)
         self._samples, self._drawn = np.empty((0, len(self._low))), 0
@@ -146,6 +152,11 @@ class RrtConnect:
         elif self._status == UNDECIDED:
             self._verdict = FREE if self._undecided_edge_is_free() else BLOCKED
         return True
+
+    def add_counts_of(self, other: RrtConnect) -> None:
+        """Adds the checks of a search that ran at the same time to those of this one."""
+        self._bodies.counts[:] += other._bodies.counts
+        self._bodies.refusals[:] += other._bodies.refusals
 
     def run(self) -> Array | None:
         """Returns vertices of shape (n, joints) from the start to one of the goals, or None."""
@@ -207,7 +218,11 @@ class SideBySide:
         if len(self._searches) == 1:
             return self._take_turns(map)
         with ThreadPoolExecutor(len(self._searches)) as threads:
-            return self._take_turns(threads.map)
+            path = self._take_turns(threads.map)
+        first, *others = self._searches
+        for search in others:
+            first.add_counts_of(search)
+        return path
 
     def _take_turns(
         self, each: Callable[[Callable[[RrtConnect], None], list[RrtConnect]], Iterable[None]]
