@@ -10,7 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair
+from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair, WatchedPairs
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -22,7 +22,7 @@ MAX_CONTACTS = 20  # of a pair, of which the deepest is reported
 class ExactCollision:
     """Coal's results for the watched pairs; not thread-safe, because it holds the poses of one state."""
 
-    def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> None:
+    def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: WatchedPairs) -> None:
         """Stores what to check.
 
         Args:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from modular_framework_planning.collision_detection.collision_bodies import (
     Joints,
     PlacedGeometry,
-    WatchedPair,
+    WatchedPairs,
     placed_geometries,
     watched_pairs,
 )
@@ -62,16 +62,15 @@ class ExactCollisionChecker:
         """
         self.model: RobotModel = scene.model
         self._parts: list[PlacedGeometry] = placed_geometries(scene)
-        self._pairs: list[WatchedPair] = watched_pairs(scene, self._parts, moving)
+        self._pairs: WatchedPairs = watched_pairs(scene, self._parts, moving)
         depths = {frozenset((item.first.name, item.second.name)): item.depth for item in tolerated}
+        moving_pairs = np.flatnonzero(~self._pairs.fixed)
         self._tolerated: dict[int, float] = {}
-        self._moving: list[int] = []
-        for number, pair in enumerate(self._pairs):
-            depth = depths.get(frozenset((self._parts[pair.first].body.name, self._parts[pair.second].body.name)))
-            if not pair.is_fixed and depth is not None:
+        for number in moving_pairs.tolist() if depths else ():
+            depth = depths.get(frozenset(self._names(number)))
+            if depth is not None:
                 self._tolerated[number] = depth
-            elif not pair.is_fixed:
-                self._moving.append(number)
+        self._moving = np.setdiff1d(moving_pairs, list(self._tolerated)) if self._tolerated else moving_pairs
         self._undecided = np.empty((UNDECIDED_ROWS, 2), dtype=np.int64)
 
     @cached_property
@@ -80,7 +79,7 @@ class ExactCollisionChecker:
 
     @cached_property
     def _compiled(self) -> CompiledWorld:
-        return compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving])
+        return compile_world(self.model, self._parts, self._pairs.chosen(self._moving))
 
     @property
     def compiled_world(self) -> World | None:
@@ -102,9 +101,11 @@ class ExactCollisionChecker:
         pair = int(refusals.argmax()) if len(refusals) else -1
         if pair < 0 or not refusals[pair]:
             return None
-        watched = self._pairs[self._moving[self._compiled.members[pair][0]]]
-        names = (self._parts[part].body.name for part in (watched.first, watched.second))
-        return Refusals(*names, int(refusals[pair]))
+        return Refusals(*self._names(self._moving[self._compiled.members[pair][0]]), int(refusals[pair]))
+
+    def _names(self, number: int) -> tuple[str, str]:
+        pair = self._pairs[number]
+        return self._parts[pair.first].body.name, self._parts[pair.second].body.name
 
     def build(self, check_interrupt: Callable[[], None]) -> None:
         """Builds now what the first check would build: it takes seconds for 100,000 triangles.
@@ -112,8 +113,7 @@ class ExactCollisionChecker:
         Args:
             check_interrupt: called between shapes; raises an exception to stop. What was built is kept.
         """
-        pairs = [self._pairs[number] for number in self._moving]
-        self._compiled = compile_world(self.model, self._parts, pairs, check_interrupt)
+        self._compiled = compile_world(self.model, self._parts, self._pairs.chosen(self._moving), check_interrupt)
 
     def is_free(self, positions: Array) -> bool:
         """Whether no pair that can move touches at these positions (of the whole robot)."""
@@ -163,13 +163,11 @@ class ExactCollisionChecker:
     def _decide(self, path: Array, numbers: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
         """Asks the exact check about (sample, pair) rows; returns the number of a sample that touches, or -1."""
         for number, pair in undecided.tolist():
-            members = {self._moving[member]: member for member in self._compiled.members[pair]}
+            members = {int(self._moving[member]): member for member in self._compiled.members[pair]}
             touching = self._exact.touching_pair(sample_at(path, numbers, number), members)
             if touching >= 0:
                 self.check_counts[TOUCHING_EXACTLY] += 1
-                rows = self._compiled.members  # those of single pairs come before those that stand for them
-                row = next(row for row, items in enumerate(rows) if members[touching] in items)
-                self._compiled.world.refusals[row] += 1
+                self._compiled.world.refusals[self._compiled.members.row_of(members[touching])] += 1
                 return number
         return -1
 
@@ -187,7 +185,7 @@ class ExactCollisionChecker:
 
         A body wholly inside another one, touching none of its surface, is reported only where no other pair touches.
         """
-        numbers = [number for number, pair in enumerate(self._pairs) if include_fixed or not pair.is_fixed]
+        numbers = np.flatnonzero(~self._pairs.fixed | include_fixed).tolist()
         found = [
             contact
             for number, contact in self._exact.contacts(positions, numbers)
@@ -208,7 +206,7 @@ class ExactCollisionChecker:
 
     def fixed_contacts(self, positions: Array) -> list[Contact]:
         """Returns contacts of watched pairs the moving joints cannot change."""
-        numbers = [number for number, pair in enumerate(self._pairs) if pair.is_fixed]
+        numbers = np.flatnonzero(self._pairs.fixed).tolist()
         return [contact for _, contact in self._exact.contacts(positions, numbers)]
 
     def distance(self, positions: Array) -> float:

@@ -57,7 +57,7 @@ class World(NamedTuple):
         watched: the pairs to check, those left out for which one with FIELD stands.
         represented: the pairs for which each pair with FIELD stands, in the order of the field's solids; shape (f, n).
         counts: of checks, see CHECK_COUNTS; those of undecided checks that are asked again elsewhere are left out.
-        refusals: in how many checks each pair touched; shape (p,), 0 for pairs with FIELD: the pairs they stand for count.
+        refusals: in how many checks each pair touched, 0 for pairs with FIELD: those they stand for count; shape (p,).
         field: the solids of the world that all bodies with such a pair are checked against.
     """
 
