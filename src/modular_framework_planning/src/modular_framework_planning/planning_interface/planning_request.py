@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 
 PARTS_OF_MOTION_STEP = 100  # costs nothing away from contact: a known clearance covers many samples at once
+DEFAULT_PLANNER = "default_planner_config"  # parameter of a group or a pipeline
 SAME_POSITION = 1.0e-4  # [rad or m]; positions of joints that follow each other need not agree better
 
 
@@ -107,7 +108,8 @@ class PipelineSettings:
         robot_planning: robot_description_planning (joint_limits, cartesian_limits, ...).
         seed: of every plan of the pipeline; None for fresh random numbers each time.
         seeded_iterations: after how many a planner that goes on to improve its path stops, where a seed is set.
-        search_threads: searches of RRTConnect that run at the same time for one request; the first path wins.
+        search_threads: searches of RRTConnect that run at the same time for one request, of which the first path wins;
+            0 for as many as pay.
         sampling: of paths that are searched.
     """
 
@@ -129,7 +131,7 @@ class PipelineSettings:
     robot_planning: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
     seeded_iterations: int = 2000
-    search_threads: int = 1
+    search_threads: int = 0
     sampling: SamplingSettings = field(default_factory=SamplingSettings)
 
     @property
@@ -138,12 +140,12 @@ class PipelineSettings:
         return self.motion_step / PARTS_OF_MOTION_STEP
 
     def default_planner(self, group: str) -> str:
-        """Returns the planner of requests that name none; empty where no parameter says."""
-        return str(
-            self.groups.get(group, {}).get("default_planner_config")
-            or self.parameters.get("default_planner_config")
-            or ""
-        )
+        """Returns the planner of requests that name none; empty where no parameter says.
+
+        MoveIt's Setup Assistant writes `None` for a group without one.
+        """
+        given = (self.groups.get(group, {}).get(DEFAULT_PLANNER), self.parameters.get(DEFAULT_PLANNER))
+        return next((str(name) for name in given if name and name != "None"), "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
