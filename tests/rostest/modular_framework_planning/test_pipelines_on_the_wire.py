@@ -83,6 +83,7 @@ def test_the_planner_of_the_guide_plans(session: Any) -> None:
     assert len(guide_planner().splitlines()) <= 22
     answer, report = report_of(lambda: plan(request(GOAL, pipeline_id="mine", allowed_planning_time=10.0)))
     assert answer.error_code.val == OK, report["reason"]
+    assert report["summary"].split()[0] in report["phases_s"] and report["checks"]["search"]["asked"] > 0
     assert motion(answer)[-1][1] == pytest.approx(list(POSITIONS), abs=1e-6)
 
 

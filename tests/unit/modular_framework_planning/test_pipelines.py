@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import threading
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from modular_framework_planning.constraints.kinematic_constraints import Kinemat
 from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.planners.ompl.planner import search_threads
 from modular_framework_planning.planners.ompl.planner_settings import PLANNERS, parameter_faults
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planner_configurations import PlannerConfigurations
@@ -339,3 +342,41 @@ def test_a_number_of_search_threads_that_is_none_is_refused_with_what_is_allowed
 def test_search_threads_of_a_pipeline_come_before_those_of_the_node() -> None:
     assert read_pipeline_spec("ompl", {"search_threads": 3}, {}, {"search_threads": 2}).settings.search_threads == 3
     assert read_pipeline_spec("ompl", {}, {}, {"search_threads": 2}).settings.search_threads == 2
+
+
+@pytest.mark.parametrize(
+    ("joints", "load", "changes", "expected"),
+    [
+        (14, 0.4, {}, 3),
+        (14, 0.0, {}, 4),
+        (14, 7.0, {}, 1),
+        (8, 0.0, {}, 1),
+        (14, 0.0, {"repeatable": True}, 1),
+        (14, 0.0, {"request": SimpleNamespace(seed=5)}, 1),
+        (14, 0.0, {"settings": PipelineSettings(seed=0)}, 1),
+        (8, 7.0, {"settings": PipelineSettings(seed=0, search_threads=2)}, 2),
+    ],
+)
+def test_large_groups_without_a_seed_are_searched_in_as_many_threads_as_processors_are_free(
+    monkeypatch: pytest.MonkeyPatch, joints: int, load: float, changes: dict[str, Any], expected: int
+) -> None:
+    processors = 4 if load else 8
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(processors)))
+    monkeypatch.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0))
+    problem = {
+        "settings": PipelineSettings(),
+        "repeatable": False,
+        "request": SimpleNamespace(seed=None),
+        "group": SimpleNamespace(joints=("joint",) * joints),
+        **changes,
+    }
+    assert search_threads(SimpleNamespace(**problem)) == expected  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("given", [{}, {"default_planner_config": "None"}, {"default_planner_config": None}])
+def test_a_group_without_a_default_planner_gets_rrt_connect(
+    model: RobotModel, pool: KinematicsPool, given: dict[str, Any]
+) -> None:
+    settings = read_pipeline_spec("ompl", {GROUP: {**given, "planner_configs": ["RRTstar"]}}, {}, {}).settings
+    answer = PipelineSpec(settings=settings).build(model, pool).plan(wall_request(model))
+    assert arrives(answer) and answer.planner_id == "RRTConnect"

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from blended_path_reference import BlendedPath
 
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.planning_interface.phase_times import PhaseTimes
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
 from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
-from modular_framework_planning.trajectory_processing.blended_path import BlendedPath
 from modular_framework_planning.trajectory_processing.time_parameterization import WINDOW_S, parameterize
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
@@ -208,3 +208,38 @@ def test_the_validator_sees_a_contact_a_twentieth_of_a_milliradian_long() -> Non
     assert f"{problem.settings.finest_step} rad steps" in fault
     problem.motion.colliding_state = lambda line, step: None
     assert TrajectoryValidator().fault(problem, PlannedPath(motion.positions, motion)) == ""
+
+
+def quintic(start: tuple[float, ...], end: tuple[float, ...], span: float) -> np.polynomial.Polynomial:
+    """The quintic with given position, velocity and acceleration at both ends, by its six linear equations."""
+    powers = np.arange(6)
+    rows, values = [], []
+    for time, state in ((0.0, start), (span, end)):
+        for order, value in enumerate(state):
+            factor = np.prod([powers - number for number in range(order)], axis=0) if order else np.ones(6)
+            rows.append(np.where(powers >= order, factor * time ** np.maximum(powers - order, 0), 0.0))
+            values.append(value)
+    return np.polynomial.Polynomial(np.linalg.solve(np.array(rows), np.array(values)))
+
+
+def test_the_curve_and_its_derivatives_are_those_of_the_quintics_through_the_points() -> None:
+    rng = np.random.default_rng(12)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 0.8, 5))])
+    motion = Trajectory(("a", "b"), times, *rng.uniform(-1.0, 1.0, (3, 6, 2)))
+    wanted = np.concatenate([rng.uniform(0.0, times[-1], 40), times])
+    values = motion.at(wanted)
+    assert np.array_equal(motion.positions_at(wanted), values[0])
+    for joint in range(2):
+        states = [
+            tuple(float(item[row, joint]) for item in (motion.positions, motion.velocities, motion.accelerations))
+            for row in range(6)
+        ]
+        pieces = [quintic(states[row], states[row + 1], times[row + 1] - times[row]) for row in range(5)]
+        for number, time in enumerate(wanted):
+            row = min(int(np.searchsorted(times, time, side="right")) - 1, 4)
+            for order in range(4):
+                expected = pieces[row].deriv(order)(time - times[row]) if order else pieces[row](time - times[row])
+                assert values[order][number, joint] == pytest.approx(expected, abs=1e-7, rel=1e-7)
+    for before in (-1.0, times[-1] + 1.0):
+        ends = motion.at(np.array([before]))[0][0]
+        assert np.allclose(ends, motion.positions[0 if before < 0.0 else -1])

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from enum import IntEnum
 
 from modular_framework_planning.contacts import Contact
+from modular_framework_planning.plan_statistics import PlanStatistics
 
 
 class ErrorCode(IntEnum):
@@ -51,13 +52,21 @@ class PlanningError(Exception):
         code: the error code in the response on the wire.
         reason: where, what was got, what was allowed and what to do.
         contacts: what touches, where that is the reason.
+        statistics: of the plan that failed; None where nothing was planned.
     """
 
-    def __init__(self, code: ErrorCode, reason: str, contacts: Sequence[Contact] = ()) -> None:
+    def __init__(
+        self,
+        code: ErrorCode,
+        reason: str,
+        contacts: Sequence[Contact] = (),
+        statistics: PlanStatistics | None = None,
+    ) -> None:
         super().__init__(reason)
         self.code = code
         self.reason = reason
         self.contacts = tuple(contacts)
+        self.statistics = statistics
 
 
 class ModelError(PlanningError):

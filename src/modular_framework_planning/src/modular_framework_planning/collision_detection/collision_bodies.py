@@ -49,6 +49,32 @@ class WatchedPair:
     is_fixed: bool
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class WatchedPairs:
+    """Pairs of geometries that may not come closer than a margin.
+
+    Attributes:
+        parts: the two geometries of each by index, shape (n, 2).
+        margins: distance they must keep [m], shape (n,).
+        fixed: whether no joint moves them against each other, shape (n,).
+    """
+
+    parts: NDArray[np.int64]
+    margins: NDArray[np.float64]
+    fixed: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __getitem__(self, number: int) -> WatchedPair:
+        first, second = self.parts[number].tolist()
+        return WatchedPair(first, second, float(self.margins[number]), bool(self.fixed[number]))
+
+    def chosen(self, numbers: NDArray[np.int64]) -> WatchedPairs:
+        """Returns some of the pairs, by their numbers."""
+        return WatchedPairs(self.parts[numbers], self.margins[numbers], self.fixed[numbers])
+
+
 def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
     """Returns every collision geometry of a scene: links, held objects, then the world."""
     model = scene.model
@@ -68,7 +94,7 @@ def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
     return result
 
 
-def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving: Joints) -> list[WatchedPair]:
+def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving: Joints) -> WatchedPairs:
     """Returns the pairs that may not touch.
 
     Args:
@@ -78,27 +104,62 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
     """
     chosen = None if moving is None else tuple(int(number) for number in moving)
     acm, links = scene.acm, len(scene.model.link_geometries)
-    result = list(_link_pairs(scene.model, chosen, frozenset(acm.entries.items()), frozenset(acm.defaults.items())))
-    supports = _supports(scene.model, chosen)
-    standing = _standing(scene.model, chosen)
-    joints = [standing.get(part.joint_id, part.joint_id) for part in parts]
-    verdicts: dict[tuple[str, str, str, str], bool] = {}
-    for first, one in enumerate(parts):
-        if one.body.kind == WORLD:
-            break  # the world comes last, and its bodies do not move relative to each other
-        for second in range(max(first + 1, links), len(parts)):
-            other = parts[second]
-            if joints[first] == joints[second] and ATTACHED not in (one.body.kind, other.body.kind):
-                continue  # rigidly connected: no motion changes whether they touch
-            key = (one.body.kind, one.body.name, other.body.kind, other.body.name)
-            allowed = verdicts.get(key)
-            if allowed is None:
-                allowed = verdicts[key] = _may_touch(scene, one.body, other.body)
-            if not allowed:
-                margin = one.margin if other.body.kind == WORLD else 0.0
-                is_fixed = supports[one.joint_id] == supports[other.joint_id]
-                result.append(WatchedPair(first, second, margin, is_fixed))
-    return result
+    own = _link_pairs(scene.model, chosen, frozenset(acm.entries.items()), frozenset(acm.defaults.items()))
+    rows = next((number for number, part in enumerate(parts) if part.body.kind == WORLD), len(parts))
+    if len(parts) == links:
+        return own
+    support, standing = _rigid_joints(scene.model, chosen)
+    joint_ids = np.array([part.joint_id for part in parts])
+    held = np.array([part.body.kind == ATTACHED for part in parts])
+    numbers = np.arange(len(parts))
+    first, second = (
+        numbers[:rows, None],
+        numbers[None, links:],
+    )  # bodies of the world do not move relative to each other
+    is_rigid = (standing[joint_ids[first]] == standing[joint_ids[second]]) & ~held[first] & ~held[second]
+    checked = np.nonzero((second > first) & ~is_rigid & ~_allowed(scene, parts, rows, links))
+    first, second = checked[0], checked[1] + links
+    margins = np.array([part.margin for part in parts[:rows]])[first]
+    return WatchedPairs(
+        np.concatenate([own.parts, np.column_stack([first, second])]),
+        np.concatenate([own.margins, np.where(second >= rows, margins, 0.0)]),
+        np.concatenate([own.fixed, support[joint_ids[first]] == support[joint_ids[second]]]),
+    )
+
+
+def _allowed(scene: PlanningScene, parts: Sequence[PlacedGeometry], rows: int, links: int) -> NDArray[np.bool_]:
+    """Returns whether each of the first `rows` geometries may touch each of those behind the links, as a matrix.
+
+    Most objects of the world are not in the allowed collision matrix: what holds for one of them holds for all.
+    """
+    acm = scene.acm
+    named = {name for pair in acm.entries for name in pair} | acm.defaults.keys()
+    bodies = list({(part.body.kind, part.body.name): part.body for part in parts[:rows]}.values())
+    row_of = {(body.kind, body.name): number for number, body in enumerate(bodies)}
+    columns: list[list[bool]] = []
+    column_of: dict[tuple[str, str], int] = {}
+    others: list[int] = []
+    for part in parts[links:]:
+        body = part.body
+        key = (body.kind, body.name if body.kind != WORLD or body.name in named else "")  # no body has an empty name
+        if key not in column_of:
+            column_of[key] = len(columns)
+            columns.append([_may_touch(scene, one, body) for one in bodies])
+        others.append(column_of[key])
+    by_body = np.array(columns, dtype=bool).T
+    return by_body[np.ix_([row_of[part.body.kind, part.body.name] for part in parts[:rows]], others)]
+
+
+@lru_cache(maxsize=KEPT_LINK_PAIRS)
+def _rigid_joints(model: RobotModel, moving: tuple[int, ...] | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Returns, for each of Pinocchio's joints, a number of the moving joints it depends on, and of what it is rigid to.
+
+    Two joints have the same number where these are the same.
+    """
+    supports, standing = _supports(model, moving), _standing(model, moving)
+    numbers: dict[frozenset[int], int] = {}
+    support = [numbers.setdefault(item, len(numbers)) for item in supports]
+    return np.array(support), np.array([standing.get(joint, joint) for joint in range(len(supports))])
 
 
 @lru_cache(maxsize=KEPT_LINK_PAIRS)
@@ -107,7 +168,7 @@ def _link_pairs(
     moving: tuple[int, ...] | None,
     entries: frozenset[tuple[frozenset[str], bool]],
     defaults: frozenset[tuple[str, bool]],
-) -> tuple[WatchedPair, ...]:
+) -> WatchedPairs:
     """Returns the pairs of the robot's own links that may not touch; they are the same in most scenes.
 
     Args:
@@ -117,14 +178,18 @@ def _link_pairs(
         defaults: of the same.
     """
     acm = AllowedCollisionMatrix(dict(entries), dict(defaults))
-    supports, standing = _supports(model, moving), _standing(model, moving)
-    joints = [standing.get(item.joint_id, item.joint_id) for item in model.link_geometries]
-    return tuple(
-        WatchedPair(first, second, 0.0, supports[one.joint_id] == supports[other.joint_id])
+    support, standing = _rigid_joints(model, moving)
+    pairs = [
+        (first, second)
         for first, one in enumerate(model.link_geometries)
         for second, other in enumerate(model.link_geometries[first + 1 :], first + 1)
-        if joints[first] != joints[second] and one.link != other.link and not acm.allows(one.link, other.link)
-    )
+        if standing[one.joint_id] != standing[other.joint_id]
+        and one.link != other.link
+        and not acm.allows(one.link, other.link)
+    ]
+    parts = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    joints = np.array([item.joint_id for item in model.link_geometries], dtype=np.int64)[parts]
+    return WatchedPairs(parts, np.zeros(len(parts)), support[joints[:, 0]] == support[joints[:, 1]])
 
 
 def _standing(model: RobotModel, moving: Joints) -> dict[int, int]:

@@ -18,9 +18,10 @@ from modular_framework_planning.collision_detection.bounding_geometry import (
     moved,
     stacked,
 )
-from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair
+from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPairs
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     CELLS,
+    CHECK_COUNTS,
     FIELD,
     UNKNOWN,
     World,
@@ -55,7 +56,7 @@ class CompiledWorld:
 
     world: World
     arguments: tuple[NDArray[Any], ...]
-    members: tuple[tuple[int, ...], ...]
+    members: Represented
     uncompiled: tuple[int, ...]
 
 
@@ -138,17 +139,41 @@ def _joined(spheres: list[Array], boxes: list[Array], links: list[Array], roots:
     return len(spheres) - 1
 
 
-def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> Grouping:
+def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: WatchedPairs) -> Grouping:
     """Groups links that one joint moves, that have surfaces and are checked against the same bodies at one distance."""
-    partners: dict[int, set[tuple[int, float]]] = {}
-    for pair in pairs:
-        partners.setdefault(pair.first, set()).add((pair.second, pair.margin))
-        partners.setdefault(pair.second, set()).add((pair.first, pair.margin))
-    groups: dict[tuple[object, ...], list[int]] = {}
-    for number, shape in enumerate(_link_bounding_geometries(model)):
-        if shape.kind == SURFACE and shape.corners is not None and number in partners:
-            groups.setdefault((parts[number].joint_id, frozenset(partners[number])), []).append(number)
+    links, (first, second) = len(model.link_geometries), pairs.parts.T
+    partners = np.full((len(parts), len(parts)), -1.0)  # the margin of a pair
+    partners[first, second] = partners[second, first] = pairs.margins
+    groups: dict[tuple[int, bytes], list[int]] = {}
+    for number in np.flatnonzero((partners[:links] >= 0.0).any(axis=1)).tolist():
+        shape = _link_bounding_geometries(model)[number]
+        if shape.kind == SURFACE and shape.corners is not None:
+            groups.setdefault((parts[number].joint_id, partners[number].tobytes()), []).append(number)
     return tuple(tuple(group) for group in groups.values())
+
+
+class Represented:
+    """The watched pairs that each pair of the arrays represents, by number."""
+
+    def __init__(self, rows: NDArray[np.int64], numbers: NDArray[np.int64], joined: NDArray[np.int64]) -> None:
+        """Stores which they are.
+
+        Args:
+            rows: pair of the arrays for each watched pair, -1 for none.
+            numbers: of the watched pairs by their rows, those without a row left out.
+            joined: the rows that each row at the end stands for, shape (f, n).
+        """
+        self._rows, self._numbers, self._joined = rows, numbers, joined
+        self._ends = np.cumsum(np.bincount(rows[numbers])) if len(numbers) else np.zeros(0, np.int64)
+
+    def row_of(self, number: int) -> int:
+        """Returns the single pair of the arrays that represents a watched pair."""
+        return int(self._rows[number])
+
+    def __getitem__(self, row: int) -> tuple[int, ...]:
+        if row >= len(self._ends):
+            return tuple(number for single in self._joined[row - len(self._ends)].tolist() for number in self[single])
+        return tuple(self._numbers[self._ends[row - 1] if row else 0 : self._ends[row]].tolist())
 
 
 def _never_interrupt() -> None:
@@ -158,7 +183,7 @@ def _never_interrupt() -> None:
 def compile_world(
     model: RobotModel,
     parts: Sequence[PlacedGeometry],
-    pairs: Sequence[WatchedPair],
+    pairs: WatchedPairs,
     check_interrupt: Callable[[], None] = _never_interrupt,
 ) -> CompiledWorld:
     """Builds the arrays; what is built for a shape is cached as long as the shape exists.
@@ -173,33 +198,46 @@ def compile_world(
     robot, roots = _link_surfaces(model, groups)
     members, member_of = _link_members(model, parts, groups, robot, roots)
     scene = _add_others(model, parts, pairs, members, member_of, check_interrupt)
-    found: dict[tuple[int, int, float], list[int]] = {}
-    uncompiled = []
-    ordered_pairs: dict[tuple[int, int], tuple[int, int] | None] = {}
-    for number, pair in enumerate(pairs):
-        both = member_of[pair.first], member_of[pair.second]
-        if both not in ordered_pairs:
-            ordered_pairs[both] = _ordered(members, *both)
-        ordered = ordered_pairs[both]
-        if ordered is None:
-            uncompiled.append(number)
-        else:
-            found.setdefault((*ordered, pair.margin), []).append(number)
-    world = _arrays(model, members, robot, scene, list(found))
-    is_environment: list[bool] = np.any(world.is_environment[world.pairs], axis=1).tolist()
-    keys = tuple(None if is_environment[number] else _table_key(world, number) for number in range(len(found)))
-    chosen = tuple(key for key in keys if key is not None)
-    tables, joints = _tables(model, groups, chosen)
-    numbers = iter(range(len(chosen)))
-    world = world._replace(
-        tables=tables,
-        table_joints=joints,
-        table_of=np.array([-1 if key is None else next(numbers) for key in keys], dtype=np.int64),
+    of_part = np.zeros(len(parts), dtype=np.int64)
+    of_part[list(member_of.keys())] = list(member_of.values())
+    ordered, is_compiled = _ordered(members, of_part[pairs.parts])
+    firsts, rows = _distinct(ordered, pairs.margins, is_compiled)
+    world = _arrays(model, members, robot, scene, ordered[firsts], pairs.margins[firsts])
+    tabled = np.flatnonzero(~world.is_environment[world.pairs].any(axis=1))
+    keys = [_table_key(world, number) for number in tabled.tolist()]
+    table_of = np.full(len(firsts), -1)
+    table_of[[number for number, key in zip(tabled.tolist(), keys, strict=True) if key]] = np.arange(
+        len(keys) - keys.count(None)
     )
-    world, replaced = _with_field(world)
-    watched_by = [tuple(item) for item in found.values()]
-    watched_by += [tuple(number for pair in pairs_of for number in watched_by[pair]) for pairs_of in replaced]
-    return CompiledWorld(world, arguments(world), tuple(watched_by), tuple(uncompiled))
+    tables, joints = _tables(model, groups, tuple(key for key in keys if key is not None))
+    world = _with_field(world._replace(tables=tables, table_joints=joints, table_of=table_of))
+    numbers = np.argsort(rows, kind="stable")[np.count_nonzero(~is_compiled) :]
+    represented = Represented(rows, numbers, world.represented)
+    return CompiledWorld(world, arguments(world), represented, tuple(np.flatnonzero(~is_compiled).tolist()))
+
+
+def _distinct(
+    ordered: NDArray[np.int64], margins: Array, is_compiled: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Joins pairs of the same bodies at the same distance.
+
+    Args:
+        ordered: the two bodies of each pair, shape (n, 2).
+        margins: distance they must keep [m], shape (n,).
+        is_compiled: whether a pair counts, shape (n,).
+
+    Returns:
+        The first pair of each kind, in their order, and the number of each pair's kind, -1 where it does not count.
+    """
+    chosen, rows = np.flatnonzero(is_compiled), np.full(len(ordered), -1)
+    _, distance = np.unique(margins, return_inverse=True)
+    codes = (ordered[:, 0] * (ordered.max(initial=0) + 1) + ordered[:, 1]) * (distance.max(initial=0) + 1) + distance
+    _, first, kinds = np.unique(codes[chosen], return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(len(order))
+    rows[chosen] = ranks[kinds]
+    return chosen[first[order]], rows
 
 
 def _link_members(
@@ -218,15 +256,14 @@ def _link_members(
 def _add_others(
     model: RobotModel,
     parts: Sequence[PlacedGeometry],
-    pairs: Sequence[WatchedPair],
+    pairs: WatchedPairs,
     members: list[_Member],
     member_of: dict[int, int],
     check_interrupt: Callable[[], None],
 ) -> Surfaces:
     """Appends links in closed form, held objects and the world; returns the surfaces they need."""
     links = _link_bounding_geometries(model)
-    watched = {number for pair in pairs for number in (pair.first, pair.second)}
-    others = [number for number in sorted(watched) if number not in member_of]
+    others = [number for number in np.unique(pairs.parts).tolist() if number not in member_of]
     shapes = []
     for number in others:
         shapes.append(links[number] if number < len(links) else bounding_geometry_of(parts[number]))
@@ -260,47 +297,53 @@ def _scene_surfaces(shapes: tuple[BoundingGeometry, ...]) -> tuple[Surfaces, tup
 
 
 def _with_surface(
-    shapes: Mapping[int, BoundingGeometry], parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]
+    shapes: Mapping[int, BoundingGeometry], parts: Sequence[PlacedGeometry], pairs: WatchedPairs
 ) -> set[int]:
     """Returns which bodies are checked by their surface.
 
     A solid of the world against a body whose surface is (nearly) exact is checked in closed form. Its triangles would
     not be used, and building a tree over them takes longer than many plans.
     """
-    plain = {
-        number
-        for number, shape in shapes.items()
-        if parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_excess == 0.0
-    }
-    inexact = {number for number, shape in shapes.items() if shape.surface_excess > SMALL_EXCESS}
-    needed = {
-        number
-        for pair in pairs
-        for number, other in ((pair.first, pair.second), (pair.second, pair.first))
-        if number in plain and (other in inexact or other in plain)
-    }
-    return set(shapes) - (plain - needed)
+    is_plain, is_inexact = np.zeros(len(parts), dtype=bool), np.zeros(len(parts), dtype=bool)
+    for number, shape in shapes.items():
+        is_plain[number] = parts[number].body.kind == WORLD and shape.kind != SURFACE and shape.solid_excess == 0.0
+        is_inexact[number] = shape.surface_excess > SMALL_EXCESS
+    needed = np.zeros(len(parts), dtype=bool)
+    for number, other in (pairs.parts.T, pairs.parts.T[::-1]):
+        needed[number[is_plain[number] & (is_inexact[other] | is_plain[other])]] = True
+    return {number for number in shapes if needed[number] or not is_plain[number]}
 
 
-def _excess(members: Sequence[_Member], first: int, second: int) -> float:
+def _ordered(members: Sequence[_Member], both: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Orders the two bodies of pairs such that the first one has a surface, the second a closed form if possible.
+
+    Args:
+        members: the bodies.
+        both: two of them by number for each pair, shape (n, 2).
+
+    Returns:
+        The ordered pairs, and whether there is such an order.
+    """
+    has_surface = np.array([item.root >= 0 for item in members], dtype=bool)
+    is_solid = np.array([item.shape.kind != SURFACE for item in members], dtype=bool)
+    excess = _excess(members, both), _excess(members, both[:, ::-1])
+    valid, rank = [], []
+    for (first, second), outside in zip((both.T, both.T[::-1]), excess, strict=True):
+        valid.append(has_surface[first] & (has_surface[second] | is_solid[second]))
+        rank.append(2 * (outside <= SMALL_EXCESS) + is_solid[second])
+    is_better = (rank[1] > rank[0]) | ((rank[1] == rank[0]) & (excess[1] < excess[0]))
+    turned = valid[1] & (is_better | ~valid[0])
+    return np.where(turned[:, None], both[:, ::-1], both), valid[0] | valid[1]
+
+
+def _excess(members: Sequence[_Member], both: NDArray[np.int64]) -> Array:
     """Returns how far the surface of the first and the closed form or surface of the second body lie outside [m]."""
-    other = members[second].shape
-    return members[first].shape.surface_excess + (other.surface_excess if other.kind == SURFACE else other.solid_excess)
-
-
-def _ordered(members: Sequence[_Member], first: int, second: int) -> tuple[int, int] | None:
-    """Returns the two bodies such that the first one has a surface, the second a closed form if possible."""
-    choices = [
-        (one, two)
-        for one, two in ((first, second), (second, first))
-        if members[one].root >= 0 and (members[two].root >= 0 or members[two].shape.kind != SURFACE)
-    ]
-
-    def preference(item: tuple[int, int]) -> tuple[bool, bool, float]:
-        excess = _excess(members, *item)
-        return excess <= SMALL_EXCESS, members[item[1]].shape.kind != SURFACE, -excess
-
-    return max(choices, default=None, key=preference)
+    surface = np.array([item.shape.surface_excess for item in members], dtype=float)
+    other = np.array(
+        [item.shape.surface_excess if item.shape.kind == SURFACE else item.shape.solid_excess for item in members],
+        dtype=float,
+    )
+    return np.asarray(surface[both[:, 0]] + other[both[:, 1]])
 
 
 def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
@@ -337,74 +380,74 @@ def _arrays(
     members: Sequence[_Member],
     robot: Surfaces,
     scene: Surfaces,
-    pairs: Sequence[tuple[int, int, float]],
+    pairs: NDArray[np.int64],
+    margins: Array,
 ) -> World:
-    inflation = [
-        members[one].shape.inflation_radius
-        + (members[two].shape.inflation_radius if members[two].shape.kind == SURFACE else 0.0)
-        for one, two, _ in pairs
-    ]
+    inflation = np.array([item.shape.inflation_radius for item in members], dtype=float)
+    kinds = np.array([item.shape.kind for item in members], dtype=np.int64)
+    first, second = pairs.T
     return World(
         tree=_tree(model),
         joints=np.array([item.joint for item in members], dtype=np.int64),
         poses=np.array([item.pose for item in members], dtype=float).reshape(-1, 3, 4),
         roots=np.array([item.root for item in members], dtype=np.int64),
         is_environment=np.array([item.is_environment for item in members], dtype=bool),
-        kinds=np.array([item.shape.kind for item in members], dtype=np.int64),
+        kinds=kinds,
         sizes=np.array([item.shape.size for item in members], dtype=float).reshape(-1, 3),
         spheres=np.array([item.sphere for item in members], dtype=float).reshape(-1, 4),
         closed=np.array([item.shape.is_closed for item in members], dtype=bool),
         robot=robot,
         scene=scene,
-        pairs=np.array([item[:2] for item in pairs], dtype=np.int64).reshape(-1, 2),
-        margins=np.array([item[2] for item in pairs], dtype=float) + np.array(inflation, dtype=float),
-        excess=np.array([_excess(members, one, two) for one, two, _ in pairs], dtype=float),
+        pairs=pairs,
+        margins=margins + inflation[first] + np.where(kinds[second] == SURFACE, inflation[second], 0.0),
+        excess=_excess(members, pairs),
         tables=np.zeros((0, CELLS, CELLS), dtype=np.int8),
         table_joints=np.zeros((0, 2), dtype=np.int64),
         table_of=np.full(len(pairs), -1, dtype=np.int64),
         watched=np.arange(len(pairs)),
+        represented=np.zeros((0, 0), dtype=np.int64),
+        counts=np.zeros(CHECK_COUNTS, dtype=np.int64),
+        refusals=np.zeros(len(pairs), dtype=np.int64),
         field=_field(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)), 0.0),
     )
 
 
-def _with_field(world: World) -> tuple[World, list[list[int]]]:
-    """Lets one pair with the field stand for the pairs of a body with all solids of the world.
-
-    Returns:
-        The world with its field, and the pairs for which each of the new pairs stands.
-    """
+def _with_field(world: World) -> World:
+    """Lets one pair with the field stand for the pairs of a body with all solids of the world."""
     is_plain = (world.joints < 0) & (world.kinds != SURFACE)
-    partners: dict[int, dict[int, int]] = {}  # of each body: the pair with each solid
     solid_pairs = np.flatnonzero(is_plain[world.pairs[:, 1]] & np.isfinite(world.excess))
-    for pair, (first, second) in zip(solid_pairs.tolist(), world.pairs[solid_pairs].tolist(), strict=True):
-        partners.setdefault(first, {})[second] = pair
-    counts = Counter(frozenset(item) for item in partners.values())
-    solids = max(counts, key=lambda item: (counts[item] * len(item), sorted(item)), default=frozenset())
-    replaced: list[list[int]] = []
-    rows, margins, excess = [], [], []
-    for body, item in partners.items() if len(solids) > 1 else ():
-        numbers = [item[solid] for solid in sorted(solids) if solid in item]
-        if len(numbers) == len(solids) and len(set(world.margins[numbers].tolist())) == 1:
+    bodies, solids_of = world.pairs[solid_pairs].T
+    pair_of = np.full((len(world.joints), len(world.joints)), -1)
+    pair_of[bodies, solids_of] = solid_pairs
+    partners = {body: tuple(np.flatnonzero(pair_of[body] >= 0).tolist()) for body in dict.fromkeys(bodies.tolist())}
+    counts = Counter(partners.values())
+    solids = max(counts, key=lambda item: (counts[item] * len(item), item), default=())
+    chosen = list(solids)
+    replaced: list[NDArray[np.int64]] = []
+    rows = []
+    for body in partners if len(solids) > 1 else ():
+        numbers = pair_of[body, chosen]
+        if numbers.min() >= 0 and np.ptp(world.margins[numbers]) == 0.0:
             replaced.append(numbers)
             rows.append((body, FIELD))
-            margins.append(world.margins[numbers[0]])
-            excess.append(world.excess[numbers].max())
     if not replaced:
-        return world, []
-    count, chosen = len(world.pairs), sorted(solids)
-    left_out = np.array([number for numbers in replaced for number in numbers])
+        return world
+    count, represented = len(world.pairs), np.array(replaced)
     field = _field(
         world.kinds[chosen], world.sizes[chosen], world.poses[chosen], min(farthest_end(world), FIELD_REACH_M)
     )
-    world = world._replace(
+    is_watched = np.ones(count, dtype=bool)
+    is_watched[represented] = False
+    return world._replace(
         pairs=np.concatenate([world.pairs, np.array(rows, dtype=np.int64)]),
-        margins=np.concatenate([world.margins, margins]),
-        excess=np.concatenate([world.excess, excess]),
+        margins=np.concatenate([world.margins, world.margins[represented[:, 0]]]),
+        excess=np.concatenate([world.excess, world.excess[represented].max(axis=1)]),
         table_of=np.concatenate([world.table_of, np.full(len(rows), -1)]),
-        watched=np.concatenate([np.setdiff1d(np.arange(count), left_out), count + np.arange(len(rows))]),
+        watched=np.concatenate([np.flatnonzero(is_watched), count + np.arange(len(rows))]),
+        represented=represented,
+        refusals=np.zeros(count + len(rows), dtype=np.int64),
         field=field,
     )
-    return world, replaced
 
 
 def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:

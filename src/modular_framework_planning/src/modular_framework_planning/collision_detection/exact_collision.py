@@ -10,7 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair
+from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPair, WatchedPairs
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -22,7 +22,7 @@ MAX_CONTACTS = 20  # of a pair, of which the deepest is reported
 class ExactCollision:
     """Coal's results for the watched pairs; not thread-safe, because it holds the poses of one state."""
 
-    def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: Sequence[WatchedPair]) -> None:
+    def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: WatchedPairs) -> None:
         """Stores what to check.
 
         Args:
@@ -73,13 +73,13 @@ class ExactCollision:
         coal.collide(*self._placed(pair.first), *self._placed(pair.second), request, result)
         return result
 
-    def touches(self, positions: Array, numbers: Iterable[int]) -> bool:
-        """Whether any of the pairs touches at these positions (of the whole robot)."""
+    def touching_pair(self, positions: Array, numbers: Iterable[int]) -> int:
+        """Returns the first of the pairs that touches at these positions (of the whole robot), or -1."""
         self._update_poses(positions)
-        return any(
-            not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
-            for number in numbers
-        )
+        return next((number for number in numbers if self._touches(number)), -1)
+
+    def _touches(self, number: int) -> bool:
+        return not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
 
     def contacts(self, positions: Array, numbers: Iterable[int]) -> list[tuple[int, Contact]]:
         """Returns those of the pairs that touch, each with its deepest contact."""

@@ -15,13 +15,19 @@ from numpy.typing import NDArray
 from modular_framework_planning.collision_detection.collision_bodies import (
     Joints,
     PlacedGeometry,
-    WatchedPair,
+    WatchedPairs,
     placed_geometries,
     watched_pairs,
 )
 from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
 from modular_framework_planning.collision_detection.exact_collision import ExactCollision
-from modular_framework_planning.collision_detection.kernels.compiled_collision import World, surrounded_pair_at
+from modular_framework_planning.collision_detection.kernels.compiled_collision import (
+    ASKED,
+    FOUND_FREE,
+    TOUCHING_EXACTLY,
+    World,
+    surrounded_pair_at,
+)
 from modular_framework_planning.collision_detection.kernels.compiled_distance import TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     UNDECIDED_ROWS,
@@ -31,6 +37,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 from modular_framework_planning.collision_detection.kernels.compiled_penetration import Cover, cover_of, penetrations
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.plan_statistics import Refusals
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -55,16 +62,15 @@ class ExactCollisionChecker:
         """
         self.model: RobotModel = scene.model
         self._parts: list[PlacedGeometry] = placed_geometries(scene)
-        self._pairs: list[WatchedPair] = watched_pairs(scene, self._parts, moving)
+        self._pairs: WatchedPairs = watched_pairs(scene, self._parts, moving)
         depths = {frozenset((item.first.name, item.second.name)): item.depth for item in tolerated}
+        moving_pairs = np.flatnonzero(~self._pairs.fixed)
         self._tolerated: dict[int, float] = {}
-        self._moving: list[int] = []
-        for number, pair in enumerate(self._pairs):
-            depth = depths.get(frozenset((self._parts[pair.first].body.name, self._parts[pair.second].body.name)))
-            if not pair.is_fixed and depth is not None:
+        for number in moving_pairs.tolist() if depths else ():
+            depth = depths.get(frozenset(self._names(number)))
+            if depth is not None:
                 self._tolerated[number] = depth
-            elif not pair.is_fixed:
-                self._moving.append(number)
+        self._moving = np.setdiff1d(moving_pairs, list(self._tolerated)) if self._tolerated else moving_pairs
         self._undecided = np.empty((UNDECIDED_ROWS, 2), dtype=np.int64)
 
     @cached_property
@@ -73,7 +79,7 @@ class ExactCollisionChecker:
 
     @cached_property
     def _compiled(self) -> CompiledWorld:
-        return compile_world(self.model, self._parts, [self._pairs[number] for number in self._moving])
+        return compile_world(self.model, self._parts, self._pairs.chosen(self._moving))
 
     @property
     def compiled_world(self) -> World | None:
@@ -84,14 +90,30 @@ class ExactCollisionChecker:
         is_own = type(self).path_is_free is not ExactCollisionChecker.path_is_free
         return None if is_own or self._tolerated or self._compiled.uncompiled else self._compiled.world
 
+    @property
+    def check_counts(self) -> NDArray[np.int64]:
+        """See the protocol CountsChecks."""
+        return self._compiled.world.counts
+
+    def most_refusals(self) -> Refusals | None:
+        """Returns the two bodies that touched in the most checks; None where none did."""
+        refusals = self._compiled.world.refusals
+        pair = int(refusals.argmax()) if len(refusals) else -1
+        if pair < 0 or not refusals[pair]:
+            return None
+        return Refusals(*self._names(self._moving[self._compiled.members[pair][0]]), int(refusals[pair]))
+
+    def _names(self, number: int) -> tuple[str, str]:
+        pair = self._pairs[number]
+        return self._parts[pair.first].body.name, self._parts[pair.second].body.name
+
     def build(self, check_interrupt: Callable[[], None]) -> None:
         """Builds now what the first check would build: it takes seconds for 100,000 triangles.
 
         Args:
             check_interrupt: called between shapes; raises an exception to stop. What was built is kept.
         """
-        pairs = [self._pairs[number] for number in self._moving]
-        self._compiled = compile_world(self.model, self._parts, pairs, check_interrupt)
+        self._compiled = compile_world(self.model, self._parts, self._pairs.chosen(self._moving), check_interrupt)
 
     def is_free(self, positions: Array) -> bool:
         """Whether no pair that can move touches at these positions (of the whole robot)."""
@@ -125,33 +147,33 @@ class ExactCollisionChecker:
             if written == count:
                 break
             decided, self._undecided = written, np.empty((4 * written, 2), dtype=np.int64)
+            self.check_counts[ASKED] -= 1  # the same check again
             status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         if status == TOUCHING:
             return count, numbers
         end = int(numbers[-1])
         if self._tolerated or self._compiled.uncompiled:
+            self.check_counts[FOUND_FREE] -= status != TOO_CLOSE  # the bounds of the other pairs alone do not decide
             for number in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
                 if not self._rest_is_free(sample_at(path, numbers, number)):
+                    self.check_counts[TOUCHING_EXACTLY] += 1
                     return number, numbers
         return -1, numbers
 
     def _decide(self, path: Array, numbers: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
         """Asks the exact check about (sample, pair) rows; returns the number of a sample that touches, or -1."""
-        members = self._compiled.members
-        return next(
-            (
-                number
-                for number, pair in undecided.tolist()
-                if self._exact.touches(
-                    sample_at(path, numbers, number), (self._moving[member] for member in members[pair])
-                )
-            ),
-            -1,
-        )
+        for number, pair in undecided.tolist():
+            members = {int(self._moving[member]): member for member in self._compiled.members[pair]}
+            touching = self._exact.touching_pair(sample_at(path, numbers, number), members)
+            if touching >= 0:
+                self.check_counts[TOUCHING_EXACTLY] += 1
+                self._compiled.world.refusals[self._compiled.members.row_of(members[touching])] += 1
+                return number
+        return -1
 
     def _rest_is_free(self, positions: Array) -> bool:
         """Whether tolerated contacts stay shallow and pairs without bounds apart."""
-        if self._exact.touches(positions, (self._moving[number] for number in self._compiled.uncompiled)):
+        if self._exact.touching_pair(positions, (self._moving[number] for number in self._compiled.uncompiled)) >= 0:
             return False
         return all(
             contact.depth <= self._tolerated[number] + DEPTH_SLACK
@@ -163,7 +185,7 @@ class ExactCollisionChecker:
 
         A body wholly inside another one, touching none of its surface, is reported only where no other pair touches.
         """
-        numbers = [number for number, pair in enumerate(self._pairs) if include_fixed or not pair.is_fixed]
+        numbers = np.flatnonzero(~self._pairs.fixed | include_fixed).tolist()
         found = [
             contact
             for number, contact in self._exact.contacts(positions, numbers)
@@ -184,7 +206,7 @@ class ExactCollisionChecker:
 
     def fixed_contacts(self, positions: Array) -> list[Contact]:
         """Returns contacts of watched pairs the moving joints cannot change."""
-        numbers = [number for number, pair in enumerate(self._pairs) if pair.is_fixed]
+        numbers = np.flatnonzero(self._pairs.fixed).tolist()
         return [contact for _, contact in self._exact.contacts(positions, numbers)]
 
     def distance(self, positions: Array) -> float:

@@ -156,7 +156,7 @@ def answer(
     details.update(
         planner_id=found.planner_id,
         planning_time_s=found.total_time_s,
-        phases_s=dict(found.phases_s),
+        **found.statistics.as_json(),
         goal=dict(zip(scene.model.joint_names, found.goal.tolist(), strict=True)),
     )
     context.reporter.report("plan", ErrorCode.SUCCESS, "", **details)

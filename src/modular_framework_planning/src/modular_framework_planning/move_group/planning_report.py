@@ -57,12 +57,15 @@ class Reporter:
         }
         if code != ErrorCode.SUCCESS:
             name = ErrorCode(code).name if code in set(ErrorCode) else str(code)
-            rospy.logwarn("%s failed (%s): %s", kind, name, reason)
+            summary = f"; {details['summary']}" if details.get("summary") else ""
+            rospy.logwarn("%s failed (%s): %s%s", kind, name, reason, summary)
         publish(self._publisher, String(json.dumps(entry)))
 
     def failure(self, kind: str, error: Exception, **details: Any) -> int:
         """Reports an exception and returns the code to answer with."""
         if isinstance(error, PlanningError):
+            if error.statistics is not None:
+                details = {**details, **error.statistics.as_json()}
             self.report(kind, error.code, error.reason, **details)
             return int(error.code)
         rospy.logerr("%s: unexpected %s", kind, type(error).__name__, exc_info=error)

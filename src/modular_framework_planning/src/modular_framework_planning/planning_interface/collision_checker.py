@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.plan_statistics import Refusals
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
@@ -128,4 +129,18 @@ class CompiledChecks(Protocol):
     @property
     def compiled_world(self) -> World | None:
         """The world as `compiled_paths.check_path` takes it; None where some pair needs more than that knows."""
+        ...
+
+
+@runtime_checkable
+class CountsChecks(Protocol):
+    """An optional part of checkers, for reports about plans."""
+
+    @property
+    def check_counts(self) -> NDArray[np.int64]:
+        """What was counted since the checker was made, see `compiled_collision.CHECK_COUNTS`; it counts on in place."""
+        ...
+
+    def most_refusals(self) -> Refusals | None:
+        """Returns the two bodies that touched in the most checks; None where none did."""
         ...

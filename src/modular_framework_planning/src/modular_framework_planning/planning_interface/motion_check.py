@@ -36,7 +36,7 @@ class MotionChecker:
         self._rest = np.array(rest, dtype=float)
         self._state, self._edge = self._rest[None].copy(), np.tile(self._rest, (2, 1))
         self._remembered_step = remembered_step
-        self._verdicts: dict[bytes, bool] = {}  # of edges, by both ends and the step
+        self._verdicts: dict[tuple[bytes, bytes, float], bool] = {}  # of edges, by both ends and the step
         self._free: list[Array] = []  # edges, shape (2, joints)
         self._edges = np.zeros((0, 2, len(indices)))  # the same
         model = checker.model
@@ -63,12 +63,13 @@ class MotionChecker:
         """
         if step > self._remembered_step:
             return self._edge_is_free(start, end, step)
-        key = np.concatenate([start, end, [step]]).tobytes()
-        if key not in self._verdicts:
-            self._verdicts[key] = self._edge_is_free(start, end, step)
-            if self._verdicts[key]:
+        key = start.tobytes(), end.tobytes(), step
+        verdict = self._verdicts.get(key)
+        if verdict is None:
+            verdict = self._verdicts[key] = self._edge_is_free(start, end, step)
+            if verdict:
                 self._free.append(np.array([start, end]))
-        return self._verdicts[key]
+        return verdict
 
     def _edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         if self._members:
@@ -76,6 +77,10 @@ class MotionChecker:
         edge = self._edge
         edge[0, self._indices], edge[1, self._indices] = start, end
         return self._checker.path_is_free(edge, step, 1)
+
+    def polyline_is_free(self, polyline: Array, step: float) -> bool:
+        """Whether straight pieces are free (start included); free edges that are known are not looked for."""
+        return self._checker.path_is_free(self.full_path(polyline), step)
 
     def colliding_state(self, polyline: Array, step: float) -> Array | None:
         """Returns a colliding sample along straight pieces (start included), or None."""

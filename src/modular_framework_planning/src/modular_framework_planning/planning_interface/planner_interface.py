@@ -182,7 +182,8 @@ class PlanningProblem:
         Constraints are checked no more finely than the solution validator does.
         """
         step = step or self.step
-        return self.keeps_constraints(np.array([first, second]), step) and self.motion.edge_is_free(first, second, step)
+        keeps = self.constraints is None or self.keeps_constraints(np.array([first, second]), step)
+        return keeps and self.motion.edge_is_free(first, second, step)
 
     def keeps_constraints(self, polyline: Array, step: float) -> bool:
         """Whether straight motions satisfy the path constraints (their start is not checked).

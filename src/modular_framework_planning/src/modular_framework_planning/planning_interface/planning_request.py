@@ -11,6 +11,7 @@ import numpy as np
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
+from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 
 PARTS_OF_MOTION_STEP = 100  # costs nothing away from contact: a known clearance covers many samples at once
+DEFAULT_PLANNER = "default_planner_config"  # parameter of a group or a pipeline
 SAME_POSITION = 1.0e-4  # [rad or m]; positions of joints that follow each other need not agree better
 
 
@@ -106,7 +108,8 @@ class PipelineSettings:
         robot_planning: robot_description_planning (joint_limits, cartesian_limits, ...).
         seed: of every plan of the pipeline; None for fresh random numbers each time.
         seeded_iterations: after how many a planner that goes on to improve its path stops, where a seed is set.
-        search_threads: searches of RRTConnect that run at the same time for one request; the first path wins.
+        search_threads: searches of RRTConnect that run at the same time for one request, of which the first path wins;
+            0 for as many as pay.
         sampling: of paths that are searched.
     """
 
@@ -128,7 +131,7 @@ class PipelineSettings:
     robot_planning: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
     seeded_iterations: int = 2000
-    search_threads: int = 1
+    search_threads: int = 0
     sampling: SamplingSettings = field(default_factory=SamplingSettings)
 
     @property
@@ -137,12 +140,12 @@ class PipelineSettings:
         return self.motion_step / PARTS_OF_MOTION_STEP
 
     def default_planner(self, group: str) -> str:
-        """Returns the planner of requests that name none; empty where no parameter says."""
-        return str(
-            self.groups.get(group, {}).get("default_planner_config")
-            or self.parameters.get("default_planner_config")
-            or ""
-        )
+        """Returns the planner of requests that name none; empty where no parameter says.
+
+        MoveIt's Setup Assistant writes `None` for a group without one.
+        """
+        given = (self.groups.get(group, {}).get(DEFAULT_PLANNER), self.parameters.get(DEFAULT_PLANNER))
+        return next((str(name) for name in given if name and name != "None"), "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,7 +225,7 @@ class PlanningAnswer:
         start, goal: positions of the whole robot.
         planning_time_s: time until a path was found; total_time_s: until the checked, timed motion was ready.
         path: vertices of the shortened path, shape (n, joints).
-        phases_s: how long the parts of the plan took, see phase_times [s].
+        statistics: what the parts of the plan took, see phase_times.
     """
 
     trajectory: Trajectory
@@ -232,4 +235,9 @@ class PlanningAnswer:
     planner_id: str
     planning_time_s: float
     total_time_s: float
-    phases_s: Mapping[str, float] = field(default_factory=dict)
+    statistics: PlanStatistics = field(default_factory=PlanStatistics)
+
+    @property
+    def phases_s(self) -> Mapping[str, float]:
+        """How long the parts of the plan took [s]."""
+        return self.statistics.phases_s

@@ -118,19 +118,22 @@ class PlanningPipeline:
         Raises:
             PlanningError: with the code and the reason; a partial result is never returned.
         """
+        phases = PhaseTimes()
         try:
-            return self._plan(request, repeatable)
+            return self._plan(request, repeatable, phases)
         except PlanningError as error:
+            error.statistics = phases.statistics()
             code = getattr(self._planner, "collision_code", error.code)
             if error.code in COLLISIONS and code != error.code:
-                raise PlanningError(code, error.reason, error.contacts) from error
+                raise PlanningError(code, error.reason, error.contacts, error.statistics) from error
             raise
 
-    def _plan(self, request: PlanningRequest, repeatable: bool) -> PlanningAnswer:
+    def _plan(self, request: PlanningRequest, repeatable: bool, phases: PhaseTimes) -> PlanningAnswer:
         """Searches, and repairs what the check of the motion finds, until the motion passes or the time is over."""
-        begun, phases = time.monotonic(), PhaseTimes()
+        begun = time.monotonic()
         with phases.measured(SETUP):
             problem = replace(self._problem(request, begun), repeatable=repeatable, phases=phases)
+            phases.watch(problem.checker)
         adapters, fault, steps = self._adapters_for(request), "", list(self._steps())
         search = PathSearch(self._planner)
         while steps:
@@ -190,7 +193,7 @@ class PlanningPipeline:
             path.planner_id or problem.planner_id,
             path.found_s - begun,
             time.monotonic() - begun,
-            dict(problem.phases.seconds),
+            problem.phases.statistics(),
         )
 
     def checker(

@@ -73,8 +73,8 @@ def read_pipeline_spec(
     Raises:
         PlanningError: `search_threads` is not a whole number above 0.
     """
-    threads = parameters.get("search_threads", node.get("search_threads", 1))
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+    threads = parameters.get("search_threads", node.get("search_threads"))
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
         raise PlanningError(
             ErrorCode.PLANNING_FAILED,
             f"pipeline '{name}': search_threads is {threads!r}; allowed are whole numbers from 1: of searches of "

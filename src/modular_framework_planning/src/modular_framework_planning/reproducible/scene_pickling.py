@@ -34,7 +34,7 @@ class _Pickler(pickle.Pickler):
         if isinstance(item, KinematicConstraints):
             return KinematicConstraints, (item.model, item.joints, item.positions, item.orientations, item.name)
         if isinstance(item, PlanningError):
-            return PlanningError, (item.code, item.reason, item.contacts)
+            return PlanningError, (item.code, item.reason, item.contacts, item.statistics)
         return NotImplemented
 
 

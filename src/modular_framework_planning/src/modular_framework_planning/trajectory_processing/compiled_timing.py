@@ -18,9 +18,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.trajectory_processing.compiled_curves import curve_values, quintic_coefficients
 
 _FLAT = 1.0e-10  # a joint whose tangent is smaller than this does not bound the path acceleration
 _NODE = 0.7745966692414834  # outer node of Gauss's quadrature with three nodes, exact for polynomials of degree 5
+GRID_STEP = 0.02  # [rad or m] between changes of the path acceleration, at most
+MIN_INTERVALS = 12  # a straight or curved piece is cut into
+JUMP = 0.05  # jump of an acceleration, as a share of its limit, that is worth a point
+SAMPLES_PER_SEGMENT = 24
 
 
 class PathPieces(NamedTuple):
@@ -309,3 +314,123 @@ def largest_shares(
                 fastest = max(fastest, abs(speed) / velocity[j])
                 hardest = max(hardest, abs(rate) / acceleration[j])
     return fastest, hardest
+
+
+@njit(cache=True, nogil=True)
+def blended_pieces(vertices: Array, blends: Array) -> PathPieces:
+    """Returns the straight pieces and the parabolic corners of a polyline.
+
+    With d the distance from a corner at which the parabola leaves the line, u and v the unit directions before and
+    after it, the derivative along the parabola goes linearly from u to v over a length 2 d. It misses the corner by
+    d |u - v| / 4.
+
+    Args: vertices of shape (n, joints), n > 1; distance d of each inner corner, shape (n - 2,), above 0.
+    """
+    edges, joints = len(vertices) - 1, vertices.shape[1]
+    breaks, used, position = np.zeros(2 * edges), 0, 0.0
+    points, tangents = np.empty((2 * edges - 1, joints)), np.empty((2 * edges - 1, joints))
+    curvatures = np.zeros((2 * edges - 1, joints))
+    lengths, directions = np.empty(edges), np.empty((edges, joints))
+    for edge in range(edges):
+        directions[edge] = vertices[edge + 1] - vertices[edge]
+        lengths[edge] = np.sqrt((directions[edge] * directions[edge]).sum())
+        directions[edge] /= lengths[edge]
+    for edge in range(edges):
+        before = blends[edge - 1] if edge > 0 else 0.0
+        after = blends[edge] if edge + 1 < edges else 0.0
+        straight = lengths[edge] - before - after
+        if straight > 1e-12:
+            points[used] = vertices[edge] + before * directions[edge]
+            tangents[used] = directions[edge]
+            position += straight
+            used += 1
+            breaks[used] = position
+        if edge + 1 < edges:
+            points[used] = vertices[edge + 1] - after * directions[edge]
+            tangents[used] = directions[edge]
+            curvatures[used] = (directions[edge + 1] - directions[edge]) / (2.0 * after)
+            position += 2.0 * after
+            used += 1
+            breaks[used] = position
+    return PathPieces(breaks[: used + 1], points[:used], tangents[:used], curvatures[:used])
+
+
+@njit(cache=True, nogil=True)
+def spread_times(wanted: Array, end: float, longest: float, shortest: float) -> Array:
+    """Returns times from 0 to `end`: the wanted ones, where not too near to each other, and evenly between.
+
+    Args: wanted times of shape (m,), in any order; last time; longest and shortest time between two [s].
+    """
+    kept, used = np.zeros(len(wanted) + 2), 1
+    for time in np.sort(wanted):
+        if kept[used - 1] + shortest <= time <= end - shortest:
+            kept[used] = time
+            used += 1
+    kept[used] = end
+    count = 1
+    for i in range(used):
+        count += int(np.ceil((kept[i + 1] - kept[i]) / longest))
+    result, row = np.empty(count), 0
+    for i in range(used):
+        span = kept[i + 1] - kept[i]
+        parts = int(np.ceil(span / longest))
+        for k in range(parts):
+            result[row] = kept[i] + k * (span / parts)
+            row += 1
+    result[row] = end
+    return result
+
+
+@njit(cache=True, nogil=True)
+def timed_points(
+    vertices: Array, blends: Array, velocity: Array, acceleration: Array, window: float, longest: float, shortest: float
+) -> tuple[Array, Array]:
+    """Times a polyline with blended corners from rest to rest.
+
+    Args: vertices of shape (n, joints), n > 1; distance of each inner corner, shape (n - 2,), above 0; limits of the
+        joints, above 0, shape (joints,); the window over which the fastest motion is averaged; longest and shortest
+        time between two points [s].
+
+    Returns:
+        Times of the points, shape (m,), whole nanoseconds; positions, velocities and accelerations (3, m, joints). The
+        quintics between them keep the limits.
+    """
+    pieces = blended_pieces(vertices, blends)
+    motion = fastest_motion(pieces, velocity, acceleration, GRID_STEP, MIN_INTERVALS)
+    jumps = motion.times[motion.jumps > JUMP]
+    end = motion.times[-1] + window
+    wanted = np.concatenate((jumps, jumps + window, np.array([window, end - window])))
+    times = spread_times(wanted, end, longest, shortest)
+    positions, velocities, accelerations = averaged(pieces, motion, times, window)
+    positions[0], positions[-1] = vertices[0], vertices[-1]
+    velocities[0], velocities[-1] = 0.0, 0.0
+    accelerations[0], accelerations[-1] = 0.0, 0.0
+    coefficients = quintic_coefficients(times, positions, velocities, accelerations)
+    fastest, hardest = largest_shares(times, coefficients, velocity, acceleration, SAMPLES_PER_SEGMENT)
+    factor = max(1.0, fastest, np.sqrt(hardest))
+    slower = np.rint(times * factor * 1e9) / 1e9
+    values = curve_values(times, coefficients, slower / factor, 3)
+    values[0, 0], values[0, -1] = vertices[0], vertices[-1]
+    values[1, 0], values[1, -1] = 0.0, 0.0
+    values[2, 0], values[2, -1] = 0.0, 0.0
+    values[1] /= factor
+    values[2] /= factor * factor
+    return slower, values
+
+
+@njit(cache=True, nogil=True)
+def corner_samples(start: Array, corner: Array, end: Array, size: float, step: float) -> Array:
+    """Returns samples of the parabola that rounds a corner, shape (m, joints).
+
+    Args: the vertex before, the corner and the vertex behind it, shape (joints,) each; distance from the corner at
+        which the parabola leaves the line; distance of the samples.
+    """
+    before, after = corner - start, end - corner
+    before /= np.sqrt((before * before).sum())
+    after /= np.sqrt((after * after).sum())
+    count = max(8, int(2.0 * size / step))
+    result = np.empty((count, len(corner)))
+    for k in range(count):
+        way = 2.0 * size * k / (count - 1)
+        result[k] = corner - size * before + way * before + way * way * (after - before) / (4.0 * size)
+    return result

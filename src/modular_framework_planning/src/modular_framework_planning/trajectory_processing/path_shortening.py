@@ -13,6 +13,8 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 
 LEAST_GAIN = 0.01  # of a cut, as a share of the path's length
+LEAST_PULL = 0.003  # gain of a vertex that is moved, as a share of the path's length
+PULLS = 2  # of each vertex at most
 EdgeTest = Callable[[Array, Array], bool]
 Join = Callable[[Array, Array, float], Array | None]
 
@@ -94,6 +96,27 @@ def cut_corners(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.ra
     return without_repeats(cut_pieces(path, straight, deadline, rng))
 
 
+def pull_vertices(path: Array, edge_is_free: EdgeTest, deadline: float) -> Array:
+    """Moves inner vertices half of the way to the line between their neighbours where both new edges are free."""
+    path = path.copy()
+    least = LEAST_PULL * path_length(path)
+    for _ in range(PULLS):
+        has_moved = False
+        for number in range(1, len(path) - 1):
+            before, vertex, after = path[number - 1 : number + 2].copy()
+            way = after - before
+            along = float((vertex - before) @ way) / max(float(way @ way), 1e-30)
+            moved = 0.5 * (vertex + before + min(max(along, 0.0), 1.0) * way)
+            ways = (np.array([before, vertex, after]), np.array([before, moved, after]))
+            if path_length(ways[0]) - path_length(ways[1]) < least or time.monotonic() > deadline:
+                continue
+            if edge_is_free(before, moved) and edge_is_free(moved, after):
+                path[number], has_moved = moved, True
+        if not has_moved:
+            break
+    return path
+
+
 def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
     """Drops vertices equal to their predecessor and those in the middle of a straight line; keeps both ends.
 
@@ -113,4 +136,4 @@ def shorten(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random
         return path
     path = drop_vertices(path, edge_is_free, deadline)
     path = cut_corners(path, edge_is_free, deadline, rng)
-    return drop_vertices(path, edge_is_free, deadline)
+    return pull_vertices(drop_vertices(path, edge_is_free, deadline), edge_is_free, deadline)

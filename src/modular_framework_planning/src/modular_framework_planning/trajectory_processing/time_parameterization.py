@@ -15,30 +15,23 @@ import numpy as np
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.trajectory_processing.blended_path import BlendedPath
-from modular_framework_planning.trajectory_processing.compiled_timing import averaged, fastest_motion, largest_shares
+from modular_framework_planning.trajectory_processing.blended_path import choose_blends
+from modular_framework_planning.trajectory_processing.compiled_timing import (
+    SAMPLES_PER_SEGMENT,
+    largest_shares,
+    spread_times,
+    timed_points,
+)
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 WINDOW_S = 0.04  # over which the fastest motion is averaged
 LONGEST_PERIOD_S, SHORTEST_PERIOD_S = 0.02, 0.004  # between two points, unless longer ones are asked for
-GRID_STEP = 0.02  # [rad or m] between changes of the path acceleration, at most
-MIN_INTERVALS = 12  # a straight or curved piece is cut into
-JUMP = 0.05  # jump of an acceleration, as a share of its limit, that is worth a point
 MARGIN = 1.0e-3  # share of the limits kept free for what happens between the checked samples
-SAMPLES_PER_SEGMENT = 24
 
 
 def point_times(wanted: Array, end: float, longest_period_s: float = LONGEST_PERIOD_S) -> Array:
     """Returns times from 0 to `end`: the wanted ones, where not too near to each other, and evenly between."""
-    kept = [0.0]
-    for time in np.sort(wanted).tolist():
-        if kept[-1] + SHORTEST_PERIOD_S <= time <= end - SHORTEST_PERIOD_S:
-            kept.append(time)
-    kept.append(end)
-    spans = np.diff(kept)
-    counts = np.ceil(spans / longest_period_s).astype(int)
-    indices = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.append(np.repeat(kept[:-1], counts) + indices * np.repeat(spans / counts, counts), end)
+    return spread_times(np.ascontiguousarray(wanted, dtype=float), float(end), longest_period_s, SHORTEST_PERIOD_S)
 
 
 def overrun(trajectory: Trajectory, velocity: Array, acceleration: Array) -> float:
@@ -49,29 +42,10 @@ def overrun(trajectory: Trajectory, velocity: Array, acceleration: Array) -> flo
     return max(1.0, fastest, float(np.sqrt(hardest)))
 
 
-def _section(
-    joint_names: tuple[str, ...], path: BlendedPath, velocity: Array, acceleration: Array, longest_period_s: float
-) -> Trajectory:
-    """Times one section from rest to rest."""
-    pieces = path.pieces()
-    motion = fastest_motion(pieces, velocity, acceleration, GRID_STEP, MIN_INTERVALS)
-    jumps = motion.times[motion.jumps > JUMP]
-    end = float(motion.times[-1]) + WINDOW_S
-    times = point_times(np.concatenate([jumps, jumps + WINDOW_S, [WINDOW_S, end - WINDOW_S]]), end, longest_period_s)
-    positions, velocities, accelerations = averaged(pieces, motion, times, WINDOW_S)
-    velocities[[0, -1]] = accelerations[[0, -1]] = 0.0
-    positions[0], positions[-1] = path.start, path.end
-    draft = Trajectory(joint_names, times, positions, velocities, accelerations)
-    return draft.slowed(overrun(draft, velocity, acceleration))
-
-
-def _sections(vertices: Array, blends: Array) -> list[BlendedPath]:
-    """Cuts the polyline at the corners where the motion stops."""
+def _sections(vertices: Array, blends: Array) -> list[tuple[Array, Array]]:
+    """Cuts the polyline at the corners where the motion stops; returns vertices and corner distances of each part."""
     stops = [0, *(number + 1 for number, blend in enumerate(blends) if blend <= 0.0), len(vertices) - 1]
-    return [
-        BlendedPath(vertices[low : high + 1], blends[low : high - 1])
-        for low, high in zip(stops[:-1], stops[1:], strict=True)
-    ]
+    return [(vertices[low : high + 1], blends[low : high - 1]) for low, high in zip(stops[:-1], stops[1:], strict=True)]
 
 
 def parameterize(
@@ -114,12 +88,12 @@ def parameterize(
         still = np.zeros_like(vertices)
         return Trajectory(joint_names, np.zeros(1), vertices.copy(), still, still.copy())
     kept = 1.0 - MARGIN
-    return joined(
-        [
-            _section(joint_names, section, velocity * kept, acceleration * kept, longest_period_s)
-            for section in _sections(vertices, blends)
-        ]
+    vertices, blends, velocity, acceleration = (
+        np.ascontiguousarray(item, dtype=float) for item in (vertices, blends, velocity * kept, acceleration * kept)
     )
+    periods = WINDOW_S, float(longest_period_s), SHORTEST_PERIOD_S
+    parts = [timed_points(*section, velocity, acceleration, *periods) for section in _sections(vertices, blends)]
+    return joined([Trajectory(joint_names, times, *values) for times, values in parts])
 
 
 def joined(parts: Sequence[Trajectory]) -> Trajectory:
@@ -138,4 +112,10 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
 def warm_up() -> None:
     """Compiles the loops of this module, or loads them: the first motion then waits for nothing."""
     limits = np.ones(2)
-    parameterize(("a", "b"), np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), np.array([0.1]), limits, limits)
+    vertices = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    motion = parameterize(("a", "b"), vertices, np.array([0.1]), limits, limits)
+    motion.chords()
+    motion.curve(0.1)
+    point_times(motion.times, motion.duration_s)
+    overrun(motion.slowed(2.0), limits, limits)
+    choose_blends(vertices, 0.1, lambda samples: len(samples) > 0)

@@ -28,6 +28,8 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements
 
 CELLS = 128  # of a table along each joint, over a whole turn
+CHECK_COUNTS = 5  # checks asked for, found free, found touching; states looked at; checks that Coal found touching
+ASKED, FOUND_FREE, FOUND_TOUCHING, LOOKED_AT, TOUCHING_EXACTLY = range(CHECK_COUNTS)
 FIELD = -1  # in place of a pair's second body: all solids of the field
 UNKNOWN, APART, NEAR = range(3)
 
@@ -53,6 +55,9 @@ class World(NamedTuple):
         table_joints: the two joints of each table, the one nearer to the base first, -1 for none; shape (t, 2).
         table_of: table of each pair, -1 for none; shape (p,).
         watched: the pairs to check, those left out for which one with FIELD stands.
+        represented: the pairs for which each pair with FIELD stands, in the order of the field's solids; shape (f, n).
+        counts: of checks, see CHECK_COUNTS; those of undecided checks that are asked again elsewhere are left out.
+        refusals: in how many checks each pair touched, 0 for pairs with FIELD: those they stand for count; shape (p,).
         field: the solids of the world that all bodies with such a pair are checked against.
     """
 
@@ -74,6 +79,9 @@ class World(NamedTuple):
     table_joints: NDArray[np.int64]
     table_of: NDArray[np.int64]
     watched: NDArray[np.int64]
+    represented: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    refusals: NDArray[np.int64]
     field: DistanceField
 
 
@@ -136,7 +144,10 @@ def centre_gap(centres, first, second):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def pair_bound(world, pair, poses, centres, limit, memory):  # type: ignore[no-untyped-def]
-    """Returns (status, lower bound of the pair's distance less its margin, at most `limit`)."""
+    """Returns (status, lower bound of the pair's distance less its margin, at most `limit`).
+
+    Where a pair with FIELD touches, the number of a solid that is touched instead of the bound.
+    """
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     margin, excess = world.margins[pair], world.excess[pair]
     if second == FIELD:
@@ -218,9 +229,9 @@ def world_of(arrays):  # type: ignore[no-untyped-def]
     """
     a = borrowed(arrays)
     tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
-    field = DistanceField(*a[27:])
+    field = DistanceField(*a[30:])
     bodies = (tree, a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], robot, scene)
-    return World(*bodies, a[20], a[21], a[22], a[23], a[24], a[25], a[26], field)
+    return World(*bodies, a[20], a[21], a[22], a[23], a[24], a[25], a[26], a[27], a[28], a[29], field)
 
 
 @njit(cache=True, nogil=True)

@@ -125,6 +125,7 @@ def _pose_in_solid(pose, poses, number, out):  # type: ignore[no-untyped-def]
 def surface_to_field(surface, root, pose, field, margin, excess, limit, memory):  # type: ignore[no-untyped-def]
     """Bounds the distance of a surface from all solids; arguments and result are those of surface_to_solid.
 
+    Where it touches, the number of the solid instead of the bound.
     `pose` (3, 4) is the surface's in the planning frame.
     """
     kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
@@ -143,7 +144,7 @@ def surface_to_field(surface, root, pose, field, margin, excess, limit, memory):
         solid = Solid(kinds[number], sizes[number, 0], sizes[number, 1], sizes[number, 2])
         status, bound = surface_to_solid(surface, root, relative, solid, margin, excess, limit, memory)
         if status == TOUCHING:
-            return TOUCHING, 0.0
+            return TOUCHING, float(number)
         if status == TOO_CLOSE:  # what is left to find out is whether it touches elsewhere
             result, limit = TOO_CLOSE, -ROUNDING - excess
         limit = min(limit, bound)

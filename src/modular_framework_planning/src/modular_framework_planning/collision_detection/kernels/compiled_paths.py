@@ -18,7 +18,11 @@ from numpy.typing import NDArray
 from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     APART,
+    ASKED,
     FIELD,
+    FOUND_FREE,
+    FOUND_TOUCHING,
+    LOOKED_AT,
     UNKNOWN,
     centre_gap,
     pair_bound,
@@ -369,6 +373,7 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
     pairs, margins, spheres, kinds, sizes = world.pairs, world.margins, world.spheres, world.kinds, world.sizes
     tables, table_joints, table_of = world.tables, world.table_joints, world.table_of
     parents, prismatic, hangs_on, field = world.tree.parents, world.tree.prismatic, world.joints, world.field
+    counts, refusals, represented = world.counts, world.refusals, world.represented
     _, poses, centres, axes, still, reach, change, signs, motions, rows = stretch
     ranges = np.empty((64, 4), np.int64)  # first sample, last sample, and their pairs' indices in `active`
     active, used, last = np.empty(4 * len(pairs) + 16, np.int64), len(world.watched), samples.numbers[-1]
@@ -423,6 +428,8 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
                         continue
             status, bound = pair_bound(world, pair, poses, centres, needed, memory)
             if status == TOUCHING:
+                counts[LOOKED_AT] += looked_at
+                refusals[represented[pair - len(pairs) + len(represented), int(bound)] if two == FIELD else pair] += 1
                 return TOUCHING, middle
             if status == TOO_CLOSE:
                 if open_questions < len(undecided):
@@ -431,7 +438,10 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
             if bound < needed and moves:
                 active[kept] = pair
                 kept, share = kept + 1, min(share, bound / needed)
-        if len(samples.vertices) == 1 and surrounded_pair(world, poses, centres) >= 0:  # a path would cross the surface
+        surrounded = surrounded_pair(world, poses, centres) if len(samples.vertices) == 1 else -1
+        if surrounded >= 0:  # a path would cross the surface
+            counts[LOOKED_AT] += looked_at
+            refusals[surrounded] += 1
             return TOUCHING, middle
         if is_long:
             ranges = _with_room(ranges, tail + 2)
@@ -443,7 +453,18 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
             ranges[tail] = low, _certified(samples, middle, low, change, rows) - 1, used, kept
             ranges[tail + 1] = _certified(samples, middle, high, change, rows) + 1, high, used, kept
             tail, used = tail + 2, kept
+    counts[LOOKED_AT] += looked_at
     return (TOO_CLOSE, open_questions) if open_questions else (CLEAR, looked_at)
+
+
+@njit(cache=True, nogil=True)
+def count_verdict(counts, status):  # type: ignore[no-untyped-def]
+    """Counts a check in World.counts."""
+    counts[ASKED] += 1
+    if status == CLEAR:
+        counts[FOUND_FREE] += 1
+    elif status == TOUCHING:
+        counts[FOUND_TOUCHING] += 1
 
 
 @njit(cache=True, nogil=True)
@@ -456,7 +477,9 @@ def check_polyline(vertices, step, first, undecided, *world):  # type: ignore[no
         What check_path does, and the numbers of the samples at the vertices, shape (n,).
     """
     samples = sample(vertices, step)
-    status, number = check_path(world_of(world), samples, first, undecided)
+    bodies = world_of(world)
+    status, number = check_path(bodies, samples, first, undecided)
+    count_verdict(bodies.counts, status)
     return status, number, samples.numbers
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -33,6 +34,8 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
 CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # of the search for a detour round one edge
+LARGE_GROUP = 10  # joints from which on a search takes long enough for threads, as those of two arms
+MOST_THREADS = 4  # that are chosen; each further search makes the first path come less sooner than the one before
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
@@ -142,7 +145,7 @@ def _search(problem: PlanningProblem, goals: Array, step: float, limit: int | No
     if problem.planner_id == "RRTConnect" and can_search(problem) and not keeps_intermediate_states(parameters):
         limit = problem.request.most_iterations if limit is None else limit
         wanted = connection_range(parameters)
-        generators = [problem.rng, *problem.rng.spawn(problem.settings.search_threads - 1)]
+        generators = [problem.rng, *problem.rng.spawn(search_threads(problem) - 1)]
         return SideBySide(
             problem,
             [
@@ -153,6 +156,21 @@ def _search(problem: PlanningProblem, goals: Array, step: float, limit: int | No
             ],
         )
     return _Search(problem, goals, step, limit)
+
+
+def search_threads(problem: PlanningProblem) -> int:
+    """Returns how many searches run at the same time for a problem: what the settings say, else as many as pay.
+
+    Searches of small groups end too soon for that. With a seed it is one, whatever the machine has to do.
+    """
+    settings = problem.settings
+    if settings.search_threads:
+        return settings.search_threads
+    is_seeded = problem.repeatable or settings.seed is not None or problem.request.seed is not None
+    if is_seeded or len(problem.group.joints) < LARGE_GROUP:
+        return 1
+    free = len(os.sched_getaffinity(0)) - os.getloadavg()[0]
+    return int(min(max(free, 1.0), MOST_THREADS))
 
 
 def edge_step(problem: PlanningProblem) -> float:

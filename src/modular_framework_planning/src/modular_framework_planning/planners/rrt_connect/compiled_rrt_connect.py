@@ -4,8 +4,11 @@
 Kuffner, LaValle: RRT-Connect: An efficient approach to single-query path planning, ICRA 2000. The smaller tree extends
 to the next sample and the other one connects to it, as in the same authors' "An efficient approach to path planning
 using balanced bidirectional RRT search", CMU-RI-TR-05-34: the tree in the narrower place grows as large as the other
-one. The loop returns where it needs the interpreter: for more samples, for larger trees, for an edge that the bounds
-leave undecided, and every few edges for the clock.
+one. A state whose extension met an obstacle is extended to samples near to it alone, as in Yershova, Jaillet, Simeon,
+LaValle: Dynamic-domain RRTs, ICRA 2005: else trees that cannot grow meet the same obstacle again and again.
+
+The loop returns where it needs the interpreter: for more samples, for larger trees, for an edge that the bounds leave
+undecided, and every few edges for the clock.
 """
 
 from __future__ import annotations
@@ -18,10 +21,11 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
-from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOUCHING
+from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     Samples,
     check_samples,
+    count_verdict,
     new_workspace,
     number_samples,
     release,
@@ -29,7 +33,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 from modular_framework_planning.geometry.spatial import Array
 
 # What `grow` returns
-FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED, PAUSED = range(5)
+FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED, PAUSED, AT_LIMIT = range(6)
 # What is known of the edge that it was about to add
 UNKNOWN, FREE, BLOCKED = 0, 1, 2
 EXTENDS, CONNECTS = 0, 1
@@ -43,14 +47,16 @@ class Trees(NamedTuple):
     Attributes:
         states: joint vectors of the group [rad or m]; shape (2, room, joints).
         parents: of each state, -1 for a root; shape (2, room).
+        blocked: whether an extension of each state met an obstacle; shape (2, room).
         sizes: how many states each tree has; shape (2,).
         position: next sample; tree that grows; EXTENDS or CONNECTS; state at which it grows, or NEW; shape (4,).
         target: state that it grows to; shape (joints,).
-        counts: edges that were checked; shape (1,).
+        counts: edges that were checked, extensions that were tried, and how many may be; shape (3,).
     """
 
     states: Array
     parents: NDArray[np.int64]
+    blocked: NDArray[np.bool_]
     sizes: NDArray[np.int64]
     position: NDArray[np.int64]
     target: Array
@@ -63,6 +69,7 @@ class Space(NamedTuple):
     Attributes:
         weights: of each joint in a length; shape (joints,).
         longest: most a tree grows by at once, in weighted length.
+        domain: how far a sample may be from a blocked state that is extended to it, in weighted length.
         step: distance of the checks along an edge, of any joint [rad or m].
         rest: positions of the whole robot where the group's are 0; shape (all,).
         map: change of the robot's positions by the group's, mimic joints included; shape (all, joints).
@@ -70,6 +77,7 @@ class Space(NamedTuple):
 
     weights: Array
     longest: float
+    domain: float
     step: float
     rest: Array
     map: Array
@@ -128,6 +136,8 @@ def _check_edge(space, world, start, end, samples, undecided, workspace):  # typ
     _write_positions(space, end, samples.vertices[1])
     number_samples(samples, space.step)
     status, _ = check_samples(world, samples, 1, undecided, workspace)
+    if status != TOO_CLOSE:  # else it is asked again elsewhere
+        count_verdict(world.counts, status)
     return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
 
 
@@ -144,8 +154,8 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
 
     Returns:
         FOUND: the last states of both trees are the same. NEEDS_SAMPLES: all samples are used. NEEDS_ROOM: a tree is
-        full. UNDECIDED: the edge from the state at which a tree grows to `target`, `longest` of it at most. PAUSED:
-        EDGES edges were checked; to be called again.
+        full. AT_LIMIT: the last extension that may be was tried. UNDECIDED: the edge from the state at which a tree
+        grows to `target`, `longest` of it at most. PAUSED: EDGES edges were checked; to be called again.
     """
     bodies = world_of(world)
     workspace, all_joints = new_workspace(bodies), len(space.rest)
@@ -159,7 +169,7 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
 @njit(cache=True, nogil=True)
 def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: ignore[no-untyped-def]
     """Does what `grow` does, in given working memory; none of the arrays should have an owner (see `borrowed`)."""
-    states, parents, sizes, position, target, counts = trees
+    states, parents, blocked, sizes, position, target, counts = trees
     state, no_rows = np.empty(len(target)), np.empty((0, 2), np.int64)
     end = counts[0] + EDGES
     while True:
@@ -167,6 +177,8 @@ def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: igno
             return PAUSED
         if position[3] == NEW:
             if position[2] == EXTENDS:
+                if counts[1] == counts[2]:
+                    return AT_LIMIT
                 if position[0] == len(samples):
                     return NEEDS_SAMPLES
                 position[1] = 0 if sizes[0] <= sizes[1] else 1
@@ -174,6 +186,12 @@ def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: igno
                 position[0] += 1
             tree = position[1]
             position[3] = _nearest(states, tree, sizes[tree], target, space.weights)
+            if position[2] == EXTENDS:
+                nearest = states[tree, position[3]]
+                if blocked[tree, position[3]] and _squared_length(nearest, target, space.weights) > space.domain**2:
+                    position[3] = NEW
+                    continue
+                counts[1] += 1
         tree = position[1]
         if sizes[tree] == parents.shape[1]:
             return NEEDS_ROOM
@@ -188,6 +206,8 @@ def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: igno
         if is_free:
             states[tree, sizes[tree]], parents[tree, sizes[tree]] = state, position[3]
             sizes[tree] += 1
+        elif position[2] == EXTENDS:
+            blocked[tree, position[3]] = True
         if position[2] == EXTENDS:
             position[3] = NEW
             if is_free:

@@ -77,7 +77,7 @@ def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
     """Whether a rounded corner is free and keeps the path constraints."""
     if not problem.keeps_constraints(curve, problem.settings.motion_step):
         return False
-    return problem.motion.colliding_state(curve, problem.settings.finest_step) is None
+    return problem.motion.polyline_is_free(curve, problem.settings.finest_step)
 
 
 def _number(parameters: Any, name: str, default: float, lowest: float) -> float:
