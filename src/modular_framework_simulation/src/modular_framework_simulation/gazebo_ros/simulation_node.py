@@ -24,6 +24,7 @@ from modular_framework_simulation.gazebo_ros.parameters import SimulationParamet
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
 from modular_framework_simulation.gazebo_ros.sensor_topics import SensorTopics, noise_seed
 from modular_framework_simulation.gazebo_ros.time_services import TimeServices
+from modular_framework_simulation.gazebo_ros.visible_scene_topics import VisibleSceneTopics
 from modular_framework_simulation.gazebo_ros.world_files import find_world_file
 from modular_framework_simulation.gazebo_ros.world_topics import ClockTopic, WorldTopics
 from modular_framework_simulation.loop.pacing import Pacer
@@ -80,7 +81,7 @@ def _resources(model_path: str) -> Resources:
 class SimulationNode:
     """Builds the world from parameters and runs it.
 
-    Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `GazeboServices`,
+    Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `VisibleSceneTopics`, `GazeboServices`,
     `TimeServices`, `PlanningScenePublisher`, `SensorTopics`, `CameraPublisher` and, for the controllers,
     `RosControllerManager`.
 
@@ -113,6 +114,7 @@ class SimulationNode:
         )
         if parameters.paused:
             self._loop.pause()
+        self._visible = VisibleSceneTopics(self._world, lambda: self._loop.paused) if parameters.ros_network else None
         self._services = GazeboServices(self._loop, self._resources)
         self._scene = PlanningScenePublisher()
         digest = WorldDigest(self._world, actors.robot if actors else None) if parameters.state_digest else None
@@ -178,6 +180,8 @@ class SimulationNode:
             self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
             self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
             self._loop.add_hook(Hook(every(_PERFORMANCE_RATE_HZ), self._topics.publish_performance))
+        if self._visible is not None:
+            self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._visible.publish))
         self._loop.add_hook(Hook(every(_GRASP_RATE_HZ), self._watch_grasps))
         self._loop.add_hook(Hook(every(_CAMERA_RATE_HZ), lambda: self._cameras.tick(self._world.time_ns)))
         self._loop.add_hook(Hook(0, self._sensors.tick))
@@ -200,6 +204,8 @@ class SimulationNode:
         """Publishes the state while time is paused, because models may be spawned, moved and deleted then."""
         self._clock.publish()
         self._sensors.follow()
+        if self._visible is not None:
+            self._visible.publish()
         self._show_snapshot()
 
     def _show_snapshot(self) -> None:

@@ -24,12 +24,14 @@ from modular_framework_simulation.loop.world_digest import WorldDigest
 _ANSWER_TIMEOUT_S = 30.0
 _WAIT_SLICE_S = 0.2
 _LONGEST_ADVANCE_S = 3600.0
+_LONGEST_STEP_S = 1.0
+"""Steps are made one after the other, while no other request is carried out."""
 _SLOWEST_FACTOR = 0.02
 """Simulated over real time below which a request for time to pass is given up."""
 
 
 class TimeServices:
-    """Advertises and answers /gazebo/hold_time, /gazebo/advance_time, /gazebo/restart and /gazebo/state_digest.
+    """Advertises and answers /gazebo/{hold,advance,step}_time, /gazebo/restart and /gazebo/state_digest.
 
     Args:
         loop: The simulation loop.
@@ -60,6 +62,7 @@ class TimeServices:
         for name, kind, answer in (
             (ros_names.HOLD_TIME, HoldTime, self._on_hold),
             (ros_names.ADVANCE_TIME, AdvanceTime, self._on_advance),
+            (ros_names.STEP_TIME, AdvanceTime, self._on_step),
             (ros_names.RESTART, Trigger, self._on_restart),
         ):
             self._services.append(rospy.Service(name, kind, answer))
@@ -105,10 +108,31 @@ class TimeServices:
             rospy.logerr("%s: %s", ros_names.ADVANCE_TIME, error)
             return AdvanceTimeResponse(success=False, message=str(error))
 
+    def _on_step(self, request: Any) -> AdvanceTimeResponse:
+        """Lets paused time pass by a duration, in whole physics steps and at least one of them."""
+        try:
+            duration_s = request.duration.to_sec()
+            if not 0.0 <= duration_s <= _LONGEST_STEP_S:
+                raise HoldError(f"duration is {duration_s:g} s; allowed is 0 (one step) to {_LONGEST_STEP_S:g} s")
+            stamp = self._in_loop(ros_names.STEP_TIME, lambda: self._step(duration_s))
+            return AdvanceTimeResponse(success=True, stamp=stamp, held=True)
+        except (HoldError, SimulationError) as error:
+            rospy.logerr("%s: %s", ros_names.STEP_TIME, error)
+            return AdvanceTimeResponse(success=False, message=str(error))
+
+    def _step(self, duration_s: float) -> rospy.Time:
+        if not self._loop.paused:
+            raise HoldError(f"time is not paused; call {ros_names.PAUSE_PHYSICS} first")
+        for _ in range(self._whole_steps(duration_s)):
+            self._loop.step()
+        return stamp_of(self._loop.world)
+
+    def _whole_steps(self, duration_s: float) -> int:
+        return max(1, math.ceil(duration_s / self._loop.world.settings.time_step_s - 1e-6))
+
     def _let_pass(self, duration_s: float) -> None:
         """Waits until a duration has passed, in whole physics steps, or the world has begun again."""
-        step_s, holds = self._loop.world.settings.time_step_s, self._loop.holds
-        count = max(1, math.ceil(duration_s / step_s - 1e-6))
+        holds, count = self._loop.holds, self._whole_steps(duration_s)
         asked: Advance = self._in_loop(ros_names.ADVANCE_TIME, lambda: holds.advance(self._loop.world.steps + count))
         waited_s, limit_s = 0.0, _ANSWER_TIMEOUT_S + duration_s / _SLOWEST_FACTOR
         while not asked.passed.wait(_WAIT_SLICE_S):

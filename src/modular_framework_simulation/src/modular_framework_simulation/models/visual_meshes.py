@@ -74,7 +74,7 @@ class VisualMeshes:
         if not (folder / _LIST).is_file():
             files: dict[str, bytes] = {}
             colours = []
-            for number, part in enumerate(_make(visual)):
+            for number, part in enumerate(drawn_bodies_of(visual)):
                 name = f"part_{number:03d}"
                 files |= _obj_files(name, part)
                 colours.append(part.colour)
@@ -157,7 +157,12 @@ class _Pictures:
         return self.get(name)
 
 
-def _make(visual: Visual) -> list[DrawnBody]:
+def drawn_bodies_of(visual: Visual) -> list[DrawnBody]:
+    """Returns the triangles of a visual, one body for each material.
+
+    Raises:
+        DescriptionError: Its mesh cannot be read.
+    """
     picture = _open(visual.texture) if visual.texture is not None else None
     match visual.geometry:
         case Plane(normal=normal, size=size):

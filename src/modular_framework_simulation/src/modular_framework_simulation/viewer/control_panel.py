@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The panel beside the scene: time, layers, replay of the plan, and the image of a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+NO_CAMERA = "none"
+AS_FAST_AS_POSSIBLE = "as fast as possible"
+_FACTORS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+_STEPS_S = {"1 step": 0.0, "0.1 s": 0.1, "1 s": 1.0}
+
+
+class CommandError(Exception):
+    """The simulation did not carry out a command; the text says why."""
+
+
+class Commands(Protocol):
+    """What the buttons do with the simulation; each raises CommandError where it fails."""
+
+    def pause(self) -> None:
+        """Stops time."""
+
+    def unpause(self) -> None:
+        """Resumes time."""
+
+    def step(self, duration_s: float) -> None:
+        """Stops time and lets a duration pass [s]; 0 is one physics step."""
+
+    def reset_world(self) -> None:
+        """Puts models and robot where they started."""
+
+    def reset_simulation(self) -> None:
+        """Puts models and robot where they started, and time to 0."""
+
+    def set_real_time_factor(self, factor: float) -> None:
+        """Bounds simulated over real time; 0: as fast as possible."""
+
+    def real_time_factor(self) -> float:
+        """Returns that bound."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What the panel says about time.
+
+    Attributes:
+        time_s: Simulated time [s]; None without a simulation.
+        paused: Whether it is paused.
+        factor: Simulated over real time, as measured.
+    """
+
+    time_s: float | None
+    paused: bool
+    factor: float
+
+    def __str__(self) -> str:
+        if self.time_s is None:
+            return "There is no simulation."
+        state = "paused" if self.paused else f"real time factor {self.factor:.2f}"
+        return f"Time {self.time_s:.2f} s, {state}"
+
+
+class ControlPanel:
+    """Buttons, switches and the image; its attributes are read by the thread that draws.
+
+    Args:
+        server: The viser server.
+        commands: What the buttons do.
+        log: Takes a line about a command that failed.
+    """
+
+    def __init__(self, server: Any, commands: Commands, log: Callable[[str], None]) -> None:
+        self._server, self._commands, self._log = server, commands, log
+        gui = server.gui
+        self._status = gui.add_markdown(str(Status(None, False, 0.0)))
+        self._shown_status = ""
+        self._time = gui.add_folder("Time")
+        with self._time:
+            self._add_time_controls(gui)
+        with gui.add_folder("Show"):
+            self._world = gui.add_checkbox("World", True)
+            self._robot = gui.add_checkbox("Robot", True)
+            self._scene = gui.add_checkbox("Planning scene", False, hint="What move_group plans around")
+            self._plan = gui.add_checkbox("Plan", True)
+            self._grid = gui.add_checkbox("Grid", False)
+            self._shadows = gui.add_checkbox("Shadows", True)
+        with gui.add_folder("Plan"):
+            self._replay = gui.add_button("Replay", hint="Shows the motion planned last")
+            self._loop = gui.add_checkbox("Repeat", False)
+            self._position = gui.add_slider("Position", 0.0, 1.0, 0.005, 0.0)
+        with gui.add_folder("Camera"):
+            self._camera = gui.add_dropdown("Image", (NO_CAMERA,), initial_value=NO_CAMERA)
+            self._image = gui.add_image(np.zeros((3, 4, 3), np.uint8), format="jpeg", visible=False)
+
+    def _add_time_controls(self, gui: Any) -> None:
+        self._paused = gui.add_button("Pause")
+        self._resumed = gui.add_button("Resume", visible=False)
+        self._step = gui.add_button_group("Step", tuple(_STEPS_S))
+        self._speed = gui.add_dropdown(
+            "Speed", _speeds(1.0), initial_value=_speed(1.0), hint="Bound of the real time factor"
+        )
+        self._known_speed = self._speed.value
+        reset = gui.add_button("Reset poses", hint="/gazebo/reset_world: time goes on")
+        reset_all = gui.add_button("Reset poses and time", hint="/gazebo/reset_simulation")
+        commands = self._commands
+        self._paused.on_click(lambda event: self._do(event, commands.pause))
+        self._resumed.on_click(lambda event: self._do(event, commands.unpause))
+        self._step.on_click(lambda event: self._do(event, lambda: commands.step(_STEPS_S[self._step.value])))
+        self._speed.on_update(self._on_speed)
+        reset.on_click(lambda event: self._do(event, commands.reset_world))
+        reset_all.on_click(lambda event: self._do(event, commands.reset_simulation))
+
+    def _do(self, event: Any, command: Callable[[], None]) -> None:
+        try:
+            command()
+        except CommandError as error:
+            self._log(str(error))
+            if event.client is not None:
+                event.client.add_notification("Not done", str(error), auto_close_seconds=10.0)
+
+    def _on_speed(self, event: Any) -> None:
+        if self._speed.value != self._known_speed:
+            self._known_speed = self._speed.value
+            text = self._speed.value
+            factor = 0.0 if text == AS_FAST_AS_POSSIBLE else float(text)
+            self._do(event, lambda: self._commands.set_real_time_factor(factor))
+
+    def refresh_speed(self) -> None:
+        """Shows the bound of the real time factor as the simulation has it, where there is one."""
+        try:
+            factor = self._commands.real_time_factor()
+        except CommandError:
+            return
+        self._known_speed = _speed(factor)
+        self._speed.options = _speeds(factor)
+        self._speed.value = self._known_speed
+
+    def show_status(self, status: Status) -> None:
+        """Says what time it is."""
+        if str(status) == self._shown_status:
+            return
+        self._shown_status = str(status)
+        self._status.content = str(status)
+        for handle, visible in (
+            (self._time, status.time_s is not None),
+            (self._paused, not status.paused),
+            (self._resumed, status.paused),
+        ):
+            if handle.visible != visible:
+                handle.visible = visible
+
+    def shows(self, layer: str) -> bool:
+        """Whether a layer is to be shown: "world", "robot", "planning scene", "plan", "grid" or "shadows"."""
+        boxes = {
+            "world": self._world,
+            "robot": self._robot,
+            "planning scene": self._scene,
+            "plan": self._plan,
+            "grid": self._grid,
+            "shadows": self._shadows,
+        }
+        return bool(boxes[layer].value)
+
+    def show_planning_scene(self) -> None:
+        """Switches the layer of the planning scene on."""
+        self._scene.value = True
+
+    def on_replay(self, action: Callable[[], None]) -> None:
+        """Has an action done when a replay is asked for."""
+        self._replay.on_click(lambda _event: action())
+
+    def on_position(self, action: Callable[[float], None]) -> None:
+        """Has an action done when a client moves the slider, with the share of the motion that has passed."""
+        self._position.on_update(lambda event: action(self._position.value) if event.client is not None else None)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether a replay begins again at its end."""
+        return bool(self._loop.value)
+
+    @property
+    def camera(self) -> str:
+        """Topic of the image to be shown; empty for none."""
+        return "" if self._camera.value == NO_CAMERA else str(self._camera.value)
+
+    def offer_cameras(self, topics: Sequence[str]) -> None:
+        """Offers topics with images; the chosen one stays, also when it is gone for a while."""
+        options = (NO_CAMERA, *sorted({*topics, *([self.camera] if self.camera else [])}))
+        if tuple(self._camera.options) != options:
+            chosen = self._camera.value
+            self._camera.options = options
+            self._camera.value = chosen
+
+    def show_image(self, picture: NDArray[np.uint8] | None) -> None:
+        """Shows an image, shape (height, width, 3); None: none."""
+        if picture is not None:
+            self._image.image = picture
+        if self._image.visible != (picture is not None):
+            self._image.visible = picture is not None
+
+
+def _speed(factor: float) -> str:
+    return f"{factor:g}" if factor else AS_FAST_AS_POSSIBLE
+
+
+def _speeds(present: float) -> tuple[str, ...]:
+    """Returns the choices of the bound, the present one among them."""
+    return (*(_speed(factor) for factor in sorted({*_FACTORS, present} - {0.0})), AS_FAST_AS_POSSIBLE)

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The viewer as a ROS node: draws in a browser what public topics say about world, robot, planning scene and plan."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import rosgraph
+import rospkg
+import rospy
+from moveit_msgs.msg import DisplayTrajectory, PlanningScene
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import String
+
+from modular_framework_ros.parameter_search import nearest_parameter
+from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.gazebo_ros import ros_names
+from modular_framework_simulation.sensors.scene_text import models_from_text, poses_from_text
+from modular_framework_simulation.viewer.control_panel import ControlPanel, Status
+from modular_framework_simulation.viewer.layers import Layer
+from modular_framework_simulation.viewer.pictures import picture_of
+from modular_framework_simulation.viewer.plan_playback import plan_of
+from modular_framework_simulation.viewer.planning_scene_view import PlanningSceneView
+from modular_framework_simulation.viewer.robot_links import finite_positions
+from modular_framework_simulation.viewer.robot_view import PlanView, RobotView
+from modular_framework_simulation.viewer.ros_base_pose import BasePose
+from modular_framework_simulation.viewer.ros_feed import Feed
+from modular_framework_simulation.viewer.ros_gazebo_commands import GazeboCommands
+from modular_framework_simulation.viewer.web_server import WebServer, free_port
+from modular_framework_simulation.viewer.world_view import RealTimeFactor, WorldView
+
+_NODE = "viewer"
+_NICENESS = 5
+"""Physics and controllers come first where processors are scarce."""
+_RATE_HZ = 25.0
+_IDLE_PERIOD_S = 0.2
+"""Longest wait of a new client until something is drawn [s]."""
+_LOOK_AROUND_PERIOD_S = 2.0
+_IMAGE_PERIOD_S = 0.2
+_STATUS_PERIOD_S = 0.25
+_SCENE_MESSAGES = 1000
+
+
+class ViewerNode:
+    """Draws while a browser is connected, and rests otherwise.
+
+    Parameters: ~address (127.0.0.1), ~port (8080; the next free one where it is taken), ~fixed_frame (world):
+    the frame that is drawn at the origin; robot_description.
+
+    Subscribes, while a browser is connected: /gazebo/visible_models and /gazebo/visible_poses (std_msgs/String),
+    joint_states (sensor_msgs/JointState), /tf and /tf_static where the root of the robot is not the fixed frame, and,
+    while they are shown, /move_group/monitored_planning_scene (moveit_msgs/PlanningScene),
+    /move_group/display_planned_path (moveit_msgs/DisplayTrajectory) and one topic with images (sensor_msgs/Image).
+
+    Services called: those of `GazeboCommands`.
+
+    Args:
+        server: Serves the page.
+    """
+
+    def __init__(self, server: WebServer) -> None:
+        self._server = server
+        fixed_frame = str(rospy.get_param("~fixed_frame", ros_names.WORLD_FRAME))
+        self._panel = ControlPanel(server.viser, GazeboCommands(), rospy.logwarn)
+        self._layers = {name: Layer(server.viser, name) for name in ("world", "robot", "planning scene", "plan")}
+        self._world = WorldView(self._layers["world"], rospy.logwarn)
+        self._plan = PlanView(self._layers["plan"], server.viser)
+        self._scene = PlanningSceneView(self._layers["planning scene"], rospy.logwarn)
+        self._robot: RobotView | None = None
+        self._description = ""
+        self._base = BasePose(fixed_frame)
+        self._models = Feed(ros_names.VISIBLE_MODELS, String)
+        self._poses = Feed(ros_names.VISIBLE_POSES, String)
+        self._joints = Feed("joint_states", JointState, keep=20)
+        self._scenes = Feed(ros_names.MONITORED_PLANNING_SCENE, PlanningScene, keep=_SCENE_MESSAGES)
+        self._paths = Feed(ros_names.DISPLAY_PLANNED_PATH, DisplayTrajectory)
+        self._images: Feed | None = None
+        self._factor = RealTimeFactor()
+        self._status = Status(None, False, 0.0)
+        self._replay_from_s: float | None = None
+        self._scrubbed_to: float | None = None
+        self._due_s: dict[str, float] = {}
+        self._faults: dict[str, str] = {}
+        self._was_watched = False
+        self._panel.on_replay(self._start_replay)
+        self._panel.on_position(self._scrub)
+
+    def run(self) -> None:
+        """Draws until ROS shuts down."""
+        while not rospy.is_shutdown():
+            begun_s = time.monotonic()
+            watched = self._server.has_clients
+            self._guard("drawing", self._draw if watched else self._rest)
+            self._was_watched = watched
+            period_s = 1 / _RATE_HZ if watched else _IDLE_PERIOD_S
+            time.sleep(max(0.0, begun_s + period_s - time.monotonic()))
+
+    def _rest(self) -> None:
+        for feed in (self._models, self._poses, self._joints, self._scenes, self._paths, self._images):
+            if feed is not None:
+                feed.switch(False)
+        self._base.close()
+
+    def _draw(self) -> None:
+        if not self._was_watched:
+            self._due_s.clear()
+        for feed in (self._models, self._poses, self._joints):
+            feed.switch(True)
+        self._paths.switch(self._panel.shows("plan"))
+        if self._is_due("look around", _LOOK_AROUND_PERIOD_S):
+            self._guard("looking for simulation and robot", self._look_around)
+        for name, layer in self._layers.items():
+            layer.visible = self._panel.shows(name)
+        self._server.show_grid(self._panel.shows("grid"))
+        self._server.show_shadows(self._panel.shows("shadows"))
+        self._take(self._models, lambda message: self._world.show(models_from_text(message.data)))
+        with self._server.viser.atomic():
+            self._take(self._poses, self._place_world)
+            self._draw_robot()
+            self._draw_scene()
+            self._draw_plan()
+        self._draw_image()
+        if self._is_due("status", _STATUS_PERIOD_S):
+            self._panel.show_status(self._status)
+
+    def _take(self, feed: Feed, work: Callable[[Any], None]) -> None:
+        for message in feed.take():
+            self._guard(feed.topic, lambda message=message: work(message))  # type: ignore[misc]
+
+    def _guard(self, what: str, work: Callable[[], None]) -> None:
+        """Does something; what goes wrong is logged once, and the viewer goes on."""
+        try:
+            work()
+        except Exception as error:  # any node may publish anything
+            known = isinstance(error, SimulationError | ValueError)
+            fault = str(error) if known else f"unexpected {type(error).__name__}: {error}"
+            if self._faults.get(what) != fault:
+                self._faults[what] = fault
+                rospy.logwarn("%s: %s", what, fault)
+
+    def _is_due(self, what: str, period_s: float) -> bool:
+        now_s = time.monotonic()
+        if now_s < self._due_s.get(what, 0.0):
+            return False
+        self._due_s[what] = now_s + period_s
+        return True
+
+    def _look_around(self) -> None:
+        """Looks what there is: a simulation, a robot, cameras."""
+        there = _has_service(ros_names.PAUSE_PHYSICS)
+        if there != (self._status.time_s is not None):
+            self._status = Status(0.0 if there else None, False, 0.0)
+            if there:
+                self._panel.refresh_speed()
+        if not there:
+            self._world.show(())
+        if not there and not self._was_watched:
+            self._panel.show_planning_scene()
+        images = [name for name, kind in rospy.get_published_topics() if kind == Image._type]
+        self._panel.offer_cameras(images)
+        text = rospy.get_param(nearest_parameter("robot_description"), "")
+        if isinstance(text, str) and text and text != self._description:
+            self._description = text
+            find_package = rospkg.RosPack().get_path
+            self._robot = RobotView(self._layers["robot"], text, find_package, rospy.logwarn)
+            self._plan.show(None, self._robot)
+            self._server.look_at(np.array([pose.position for pose in self._robot.in_world.values()]))
+
+    def _place_world(self, message: Any) -> None:
+        poses = poses_from_text(message.data)
+        self._world.place(poses)
+        self._factor.note(time.monotonic(), poses.time_ns)
+        self._status = Status(poses.time_ns * 1e-9, poses.paused, self._factor.value)
+
+    def _draw_robot(self) -> None:
+        robot = self._robot
+        if robot is None:
+            self._joints.take()
+            return
+        positions: dict[str, float] = {}
+        self._take(self._joints, lambda message: positions.update(_positions_of(message)))
+        base = self._base.find(robot.links.root)
+        if positions or base != robot.base:
+            robot.place(positions, base)
+
+    def _draw_scene(self) -> None:
+        shown = self._panel.shows("planning scene")
+        self._scenes.switch(shown)
+        if not shown:
+            self._scene.clear()
+            return
+        self._take(self._scenes, self._scene.apply)
+        self._scene.place(self._robot.in_world if self._robot is not None else {})
+
+    def _draw_plan(self) -> None:
+        robot = self._robot
+        if robot is None:
+            return
+
+        def show(message: Any) -> None:
+            self._plan.show(plan_of(message), robot)
+            self._start_replay()
+
+        self._take(self._paths, show)
+        share, self._scrubbed_to = self._scrubbed_to, None
+        if share is not None:
+            self._replay_from_s = None
+            self._plan.show_ghost(share * self._plan.duration_s)
+        if self._replay_from_s is None:
+            return
+        passed_s = time.monotonic() - self._replay_from_s
+        if passed_s <= self._plan.duration_s:
+            self._plan.show_ghost(passed_s)
+        elif self._panel.repeats and self._plan.duration_s > 0.0:
+            self._start_replay()
+        else:
+            self._replay_from_s = None
+            self._plan.hide_ghost()
+
+    def _start_replay(self) -> None:
+        self._replay_from_s = time.monotonic()
+
+    def _scrub(self, share: float) -> None:
+        self._scrubbed_to = share
+
+    def _draw_image(self) -> None:
+        topic = self._panel.camera
+        if topic != (self._images.topic if self._images is not None else ""):
+            if self._images is not None:
+                self._images.switch(False)
+            self._images = Feed(topic, Image) if topic else None
+            self._panel.show_image(None)
+        if self._images is not None:
+            self._images.switch(True)
+            if self._is_due("image", _IMAGE_PERIOD_S):
+                self._take(self._images, lambda message: self._panel.show_image(picture_of(message)))
+
+
+def _positions_of(message: Any) -> dict[str, float]:
+    return finite_positions(message.name, message.position) if message.position else {}
+
+
+def _has_service(name: str) -> bool:
+    try:
+        rosgraph.Master(rospy.get_name()).lookupService(name)
+    except (rosgraph.MasterException, OSError):
+        return False
+    return True
+
+
+def main() -> int:
+    """Runs the node.
+
+    Returns:
+        Exit code: 0 after an ordinary shutdown, 1 where the page cannot be served.
+    """
+    # Without simulated time: the viewer runs on while time is paused.
+    rospy.init_node(_NODE, disable_rostime=True)
+    os.nice(_NICENESS)
+    host, port = rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080)
+    try:
+        free = free_port(str(host), int(port))
+        server = WebServer(str(host), free)
+    except (SimulationError, ValueError) as error:
+        rospy.logfatal("the viewer cannot start: %s", error)
+        return 1
+    if server.port != port:
+        rospy.logwarn("port %s is taken: the viewer uses %d", port, server.port)
+    rospy.loginfo("viewer: open %s in a browser", server.address)
+    ViewerNode(server).run()
+    server.close()
+    return 0

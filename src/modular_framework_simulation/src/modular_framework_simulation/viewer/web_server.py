@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The server of the page: its address, its lights, and where a new client looks from."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import socket
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modular_framework_simulation.errors import SimulationError
+
+_TITLE = "Modular Benchmarking Framework"
+_PORTS_TRIED = 100
+_VIEW_DIRECTION = np.array([0.75, 0.55, 0.45])
+_DISTANCE = 1.5
+"""Of the camera from what it looks at, in sizes of that."""
+_SMALLEST_VIEW_M = 0.8
+
+
+class AddressError(SimulationError):
+    """The page cannot be served at an address."""
+
+
+def free_port(host: str, port: int) -> int:
+    """Returns a port that can be listened at, or else one of the next hundred.
+
+    Raises:
+        AddressError: The address is none of this machine, the port may not be used, or all are taken.
+    """
+    if not 1 <= port <= 65535:
+        raise AddressError(f"port {port} does not exist; allowed: 1 to 65535")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for candidate in range(port, min(port + _PORTS_TRIED, 65536)):
+        try:
+            with socket.create_server((host, candidate), family=family):
+                return candidate
+        except OSError as error:
+            fault = error
+            if error.errno != errno.EADDRINUSE:
+                break
+    raise AddressError(f"cannot listen at {host}, port {port}: {fault}; use another address or port") from fault
+
+
+class WebServer:
+    """The page and its connections.
+
+    Args:
+        host: Address to listen at.
+        port: A free port.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        import viser  # takes a second
+
+        with contextlib.redirect_stdout(io.StringIO()):  # its banner; the log says the address
+            self.viser: Any = viser.ViserServer(host=host, port=port, label=_TITLE, verbose=False)
+        self.host, self.port = host, int(self.viser.get_port())
+        self.viser.gui.configure_theme(show_share_button=False, show_logo=False, dark_mode=False)
+        self._grid = self.viser.scene.add_grid("/grid", width=10.0, height=10.0, cell_size=0.1, visible=False)
+        self._shadows: bool | None = None
+        self.show_shadows(True)
+
+    @property
+    def address(self) -> str:
+        """What to open in a browser."""
+        return f"http://{self.host}:{self.port}"
+
+    @property
+    def has_clients(self) -> bool:
+        """Whether a browser shows the page."""
+        return bool(self.viser.get_clients())
+
+    def show_grid(self, visible: bool) -> None:
+        """Shows or hides the grid at z = 0, whose lines are 0.1 m apart."""
+        if self._grid.visible != visible:
+            self._grid.visible = visible
+
+    def show_shadows(self, on: bool) -> None:
+        """Switches shadows on or off."""
+        if self._shadows != on:
+            self._shadows = on
+            self.viser.scene.configure_default_lights(enabled=True, cast_shadow=on)
+
+    def look_at(self, points: NDArray[np.float64]) -> None:
+        """Has all clients look at some points, and those that come later at first.
+
+        Args:
+            points: shape (n, 3) [m].
+        """
+        low, high = points.min(axis=0), points.max(axis=0)
+        centre, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), _SMALLEST_VIEW_M)
+        position = centre + _VIEW_DIRECTION * size * _DISTANCE
+        for camera in (self.viser.initial_camera, *(client.camera for client in self.viser.get_clients().values())):
+            camera.position = position
+            camera.look_at = centre
+
+    def close(self) -> None:
+        """Ends the server."""
+        self.viser.stop()
