@@ -51,12 +51,15 @@ class PointCloudMethod(ParameterisedMethod):
         self._source = CloudSource()
         self._robot: RobotBodies | None = None
 
+    def connect(self) -> None:
+        """Starts to listen to TF."""
+        self._source.connect()
+
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
         """Returns the grasps of an object in the order of :func:`cloud_grasps`, then with the hand half turned.
 
         Raises:
             NoCandidatesError: There are none; the text says why.
-            CallError: The simulation does not let its time pass.
         """
         settings = read_cloud_settings(self.read)
         begun = time.perf_counter()
@@ -74,7 +77,6 @@ class PointCloudMethod(ParameterisedMethod):
 
         Raises:
             NoCandidatesError: There is nothing; the text says why.
-            CallError: The simulation does not let its time pass.
         """
         return seen_objects(self._points(region_of_crop(crop)), crop, read_cloud_settings(self.read), seed)
 

@@ -114,6 +114,9 @@ class GraspMethod(Protocol):
 class SeeingMethod(Protocol):
     """What a grasp method offers besides that finds objects itself where the planning scene has none."""
 
+    def connect(self) -> None:
+        """Connects to what it sees with; called once, by a node."""
+
     def seen_objects(self, crop: CropBox, seed: int) -> list[SceneObject]:
         """Returns the objects in the crop box.
 

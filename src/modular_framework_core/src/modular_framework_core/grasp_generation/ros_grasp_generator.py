@@ -100,6 +100,8 @@ class GraspGenerator:
             self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
         except (CommanderError, CallError, GripperGeometryError) as error:
             raise NoGraspError(str(error)) from error
+        if isinstance(self._method, SeeingMethod):
+            self._method.connect()
         self._services = [
             rospy.Service(name, Trigger, lambda _, refresh=refresh: self._on_demand(refresh))
             for refresh, names in ((False, GENERATE_SERVICES), (True, REFRESH_SERVICES))

@@ -191,6 +191,7 @@ class SimulationNode:
         """Publishes the state while time is paused, because models may be spawned, moved and deleted then."""
         self._clock.publish()
         self._show_snapshot()
+        self._cameras.tick(self._world.time_ns)
 
     def _show_snapshot(self) -> None:
         self._scene.show(self._snapshot())
