@@ -158,6 +158,7 @@ def test_no_cloud_in_time_is_a_failure_that_names_the_topic(scene, method: Metho
     assert not success
     assert "no point cloud arrived on topic '/other/points' within 1 s, nobody publishes it" in text
     method.set("point_cloud_topic", "")
+    method.set("cloud_timeout", 60.0)
     assert method.generate()[0]
 
 

@@ -38,11 +38,14 @@ def point_array(message: Any) -> npt.NDArray[np.float64]:
         )
     if not min(shape):
         return np.empty((*shape, 3))
-    order = ">" if message.is_bigendian else "<"
+    types = {
+        name: np.dtype(FLOAT_TYPES[fields[name].datatype]).newbyteorder(">" if message.is_bigendian else "<")
+        for name in "xyz"
+    }
     axes = [
         np.ndarray(
             shape,
-            np.dtype(FLOAT_TYPES[fields[name].datatype]).newbyteorder(order),
+            types[name],
             data,
             fields[name].offset,
             (message.row_step, message.point_step),
