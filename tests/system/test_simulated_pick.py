@@ -40,13 +40,21 @@ print(json.dumps([heights, ended.is_set()]))
 """
 
 
-@pytest.mark.parametrize("robot", ["modular_framework_api", "panda_hand_robot"])
-def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSession, robot: str) -> None:
+@pytest.mark.parametrize(
+    ("robot", "method"),
+    [
+        ("modular_framework_api", "top_down_grasps"),
+        ("panda_hand_robot", "top_down_grasps"),
+        ("modular_framework_api", "point_cloud_grasps"),
+        ("panda_hand_robot", "point_cloud_grasps"),
+    ],
+)
+def test_simulated_pick_lifts_an_object_and_exits_with_success(session: RosSession, robot: str, method: str) -> None:
     watcher = subprocess.Popen(
         [sys.executable, "-c", WATCHER], env=session.env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     try:
-        launch = session.run_framework(robot, gui="false", rviz="false")
+        launch = session.run_framework(robot, gui="false", rviz="false", method_launch_file=f"{method}/{method}.launch")
         exit_code = launch.wait(TASK_TIMEOUT_S)
         heights, ended = json.loads(watcher.communicate(timeout=60)[0].splitlines()[-1])
     finally:

@@ -18,6 +18,7 @@ from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from ros_session import until as wait_until
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_srvs.srv import Empty
 
 LAUNCH = """<launch>
   <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>
@@ -127,6 +128,16 @@ def test_images_come_at_the_rate_of_the_camera_in_simulated_time(simulation: Any
     # one that comes late on a busy machine does not delay the others
     assert np.mean(np.diff(stamps)) == pytest.approx(0.1, rel=0.1)
     assert stamps == sorted(set(stamps))
+
+
+def test_a_new_subscriber_gets_one_image_of_now_while_time_stands_still(simulation: Any) -> None:
+    rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
+    try:
+        for _ in range(2):
+            (message,) = collect(f"{NAMESPACE}/rgb_image", Image, 1)
+            assert message.header.stamp == rospy.Time.now()
+    finally:
+        rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
 
 
 def test_time_goes_on_without_the_process_that_draws_and_the_log_says_so(simulation: Any) -> None:

@@ -16,11 +16,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from antipodal_grasps.antipodal import AntipodalGrasp, AntipodalSettings, antipodal_grasps
-from antipodal_grasps.hand_poses import HandSettings
+from antipodal_grasps.antipodal import AntipodalSettings, antipodal_grasps
 from modular_framework_core.grasp_generation import solid_meshes, surface_points
 from modular_framework_core.grasp_generation.grasp_candidates import GraspQuery
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry, measure_gripper
+from modular_framework_core.grasp_generation.hand_poses import HandSettings
+from modular_framework_core.grasp_generation.pair_grasps import PairGrasp
 from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
@@ -97,7 +98,7 @@ def as_fcl(shape: Any, pose: Any) -> fcl.CollisionObject:
 
 
 def distances(
-    hand: Hand, gripper: GripperGeometry, grasp: AntipodalGrasp, back: float, joint: float, body: fcl.CollisionObject
+    hand: Hand, gripper: GripperGeometry, grasp: PairGrasp, back: float, joint: float, body: fcl.CollisionObject
 ) -> dict[str, float]:
     """Distance of each shape of the hand from a body [m], negative where they meet, the hand drawn back so far."""
     rotation = grasp.pose.axes @ gripper.axes.T

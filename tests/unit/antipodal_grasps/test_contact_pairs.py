@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from antipodal_grasps.contact_pairs import ContactPair, PairSettings, contact_pairs
+from antipodal_grasps.contact_pairs import PairSettings, contact_pairs
 from modular_framework_core.grasp_generation import solid_meshes
+from modular_framework_core.grasp_generation.contact_pair import ContactPair
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
 SETTINGS = PairSettings()

@@ -1,77 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds and ranks antipodal grasps: two fingers close on opposite sides, the hand comes from above, inclined or level.
 
-Pairs of contacts come from lines through the object (:mod:`contact_pairs`). Around the closing axis of each, the hand
-is turned through several approach directions and placed (:mod:`hand_poses`). Poses at which it would touch another
-object on its way, or while it closes, are left out. What remains is ranked by how squarely the sides face each other,
-how near the closing axis is to the centre of mass, the distance from other objects, how much of the pads touches, and
-how much room there is between the pads.
+Pairs of contacts come from lines through the object (:mod:`contact_pairs`); what the hand does with each is that of
+every method which begins with pairs, :mod:`modular_framework_core.grasp_generation.pair_grasps`.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 
-from antipodal_grasps.contact_pairs import ContactPair, PairSettings, contact_pairs
-from antipodal_grasps.hand_poses import HandPose, HandSettings, hand_axes_for, place_hand
+from antipodal_grasps.contact_pairs import PairSettings, contact_pairs
 from modular_framework_core.grasp_generation.grasp_candidates import GraspQuery
-from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
-from modular_framework_core.grasp_generation.obstacle_clearance import ObstacleClearance
-
-T = TypeVar("T")
-
-CENTRED_M = 0.06
-"""Distance of the closing axis from the centre of mass at which a grasp is no longer centred."""
-ANGLE_BINS = 4
+from modular_framework_core.grasp_generation.pair_grasps import PairGrasp, PairGraspSettings, grasps_on_pairs
 
 
 @dataclass(frozen=True, slots=True)
-class AntipodalSettings:
+class AntipodalSettings(PairGraspSettings):
     """What counts as usable, how much is tried, and how grasps are ranked.
 
     Attributes:
         pairs: How pairs of contacts are found.
-        hand: How the hand comes to them, is placed on them, and leaves.
-        full_clearance_m: Distance from other objects beyond which more is no better [m].
-        max_poses: Greatest number of poses of the hand that are tried.
-        max_candidates: Greatest number of grasps to return.
     """
 
     pairs: PairSettings = field(default_factory=PairSettings)
-    hand: HandSettings = field(default_factory=HandSettings)
-    full_clearance_m: float = 0.03
-    max_poses: int = 400
-    max_candidates: int = 80
-
-    def squareness(self, alignment: float) -> float:
-        """Returns how squarely two sides face each other: 1 for parallel sides, 0 at the edge of the friction cone."""
-        least = self.hand.cone_cosine
-        return max(0.0, (alignment - least) / (1.0 - least))
 
 
-@dataclass(frozen=True, slots=True)
-class AntipodalGrasp:
-    """One way to grasp.
-
-    Attributes:
-        pose: The hand at the grasp.
-        clearance: Least distance from other objects on the way [m], at most `full_clearance_m` of the settings.
-        offset: Distance of the closing axis from the centre of mass [m].
-        quality: Rank in [0, 1]; more is better.
-    """
-
-    pose: HandPose
-    clearance: float
-    offset: float
-    quality: float
-
-
-def antipodal_grasps(query: GraspQuery, settings: AntipodalSettings) -> list[AntipodalGrasp]:
+def antipodal_grasps(query: GraspQuery, settings: AntipodalSettings) -> list[PairGrasp]:
     """Finds the grasps of an object; the same query gives the same grasps.
 
     Args:
@@ -79,66 +35,9 @@ def antipodal_grasps(query: GraspQuery, settings: AntipodalSettings) -> list[Ant
         settings: What counts as usable.
 
     Returns:
-        Usable grasps in the order in which their reachability should be checked: the best of each inclination of the
-        hand in turn, since the arm may reach an object in one of them only.
+        Usable grasps in the order in which their reachability should be checked.
     """
     generator = np.random.default_rng(query.seed)
-    widest = query.gripper.max_opening - 2 * settings.hand.min_finger_clearance_m
+    widest = settings.widest(query.gripper)
     pairs = contact_pairs(query.target.solids, query.target.surface.centroid, widest, settings.pairs, generator)
-    surroundings = ObstacleClearance(query.obstacles, query.gripper, settings.full_clearance_m)
-    grasps: list[AntipodalGrasp] = []
-    for pair, axes in itertools.islice(_poses_to_try(pairs, query, settings), settings.max_poses):
-        pose = place_hand(pair, axes, query.target.surface, query.support_z, query.gripper, settings.hand)
-        if pose is None:
-            continue
-        clearance = surroundings.of_grasp(
-            pose.position, pose.axes, (pose.opening, pose.width), settings.hand.approach_distance_m
-        )
-        if clearance > 0.0:
-            grasps.append(_ranked(pose, clearance, query, settings))
-            if len(grasps) >= settings.max_candidates:
-                break
-    return _in_turns([(grasp.pose.approach_angle, grasp.quality, grasp) for grasp in grasps], settings)
-
-
-def _poses_to_try(
-    pairs: list[ContactPair], query: GraspQuery, settings: AntipodalSettings
-) -> Iterator[tuple[ContactPair, np.ndarray]]:
-    """Yields pairs with axes of the hand: of each inclination in turn, well aligned and centred pairs first."""
-    centroid = query.target.surface.centroid
-    tries = []
-    for pair in pairs:
-        worth = settings.squareness(pair.alignment) + _centred(pair.distance_from(centroid))
-        for axes in hand_axes_for(pair.axis, settings.hand):
-            angle = float(np.arccos(np.clip(-axes[2, 2], -1.0, 1.0)))
-            tries.append((angle, worth, (pair, axes)))
-    yield from _in_turns(tries, settings)
-
-
-def _in_turns(items: list[tuple[float, float, T]], settings: AntipodalSettings) -> list[T]:
-    """Orders items (angle of approach, worth, item): the best of each bin of angles, then the second of each, ..."""
-    width = settings.hand.max_approach_angle_rad / ANGLE_BINS
-    bins: list[list[tuple[float, float, T]]] = [[] for _ in range(ANGLE_BINS)]
-    for item in items:
-        bins[min(ANGLE_BINS - 1, int(item[0] / width))].append(item)
-    turns = [sorted(each, key=lambda item: -item[1]) for each in bins]
-    return [item[2] for turn in itertools.zip_longest(*turns) for item in turn if item is not None]
-
-
-def _ranked(pose: HandPose, clearance: float, query: GraspQuery, settings: AntipodalSettings) -> AntipodalGrasp:
-    gripper: GripperGeometry = query.gripper
-    axis = pose.axes[:, 0]
-    from_centre = query.target.surface.centroid - pose.contacts.mean(axis=0)
-    offset = float(np.linalg.norm(from_centre - axis * (from_centre @ axis)))
-    quality = (
-        0.25 * settings.squareness(pose.alignment)
-        + 0.25 * _centred(offset)
-        + 0.25 * min(1.0, clearance / settings.full_clearance_m)
-        + 0.15 * min(1.0, pose.overlap / (2 * gripper.pad_half_height))
-        + 0.10 * (gripper.max_opening - pose.opening) / gripper.max_opening
-    )
-    return AntipodalGrasp(pose, clearance, offset, quality)
-
-
-def _centred(offset: float) -> float:
-    return 1.0 - min(1.0, offset / CENTRED_M)
+    return grasps_on_pairs(pairs, query, settings)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from antipodal_grasps.ray_casting import Crossing, lines_through
 from modular_framework_core.grasp_generation import solid_meshes
+from modular_framework_core.grasp_generation.contact_pair import ContactPair, cone_cosine, distinct_pairs
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
 Array = npt.NDArray[np.float64]
@@ -42,43 +43,7 @@ class PairSettings:
     @property
     def cone_cosine(self) -> float:
         """Cosine of the half angle of the friction cone."""
-        return 1.0 / math.hypot(1.0, self.friction)
-
-
-@dataclass(frozen=True, slots=True)
-class ContactPair:
-    """Two contacts on opposite sides.
-
-    Attributes:
-        first: (3,) where the line between them enters the object [m].
-        second: (3,) where it leaves the object [m].
-        alignment: The lesser cosine between that line and the inward normal of the first, or the outward normal of the
-            second contact.
-    """
-
-    first: Array
-    second: Array
-    alignment: float
-
-    @property
-    def width(self) -> float:
-        """Distance between the contacts [m]."""
-        return float(np.linalg.norm(self.second - self.first))
-
-    @property
-    def axis(self) -> Array:
-        """Unit vector (3,) from the first contact to the second: the closing axis."""
-        return (self.second - self.first) / self.width
-
-    @property
-    def middle(self) -> Array:
-        """Half way between the contacts (3,) [m]."""
-        return (self.first + self.second) / 2
-
-    def distance_from(self, point: Array) -> float:
-        """Returns the distance of the closing axis from a point (3,) [m]."""
-        offset = point - self.middle
-        return float(np.linalg.norm(offset - self.axis * (offset @ self.axis)))
+        return cone_cosine(self.friction)
 
 
 def contact_pairs(
@@ -118,7 +83,7 @@ def contact_pairs(
                 ends = (origin + entry.distance * direction, origin + end.distance * direction)
                 found.append(ContactPair(*ends, alignment))
     found.sort(key=lambda pair: (-round(pair.alignment, ALIGNMENT_DIGITS), pair.distance_from(centroid)))
-    return _distinct(found, settings)
+    return distinct_pairs(found, settings.spacing_m, settings.spacing_rad)
 
 
 def _samples(mesh: TriangleMesh, count: int, generator: np.random.Generator) -> tuple[Array, Array]:
@@ -158,16 +123,3 @@ def _passages(crossings: list[Crossing]) -> list[tuple[Crossing, Crossing]]:
         if depth == 0:
             found += [(entry, crossing) for entry in entries if crossing.distance - entry.distance > SAME_PLACE_M]
     return found if depth == 0 else []
-
-
-def _distinct(pairs: list[ContactPair], settings: PairSettings) -> list[ContactPair]:
-    """Keeps the first of all pairs that are nearly the same."""
-    kept: list[ContactPair] = []
-    middles, axes = np.zeros((0, 3)), np.zeros((0, 3))
-    least = math.cos(settings.spacing_rad)
-    for pair in pairs:
-        near = np.linalg.norm(middles - pair.middle, axis=1) < settings.spacing_m
-        if not (near & (np.abs(axes @ pair.axis) > least)).any():
-            kept.append(pair)
-            middles, axes = np.vstack([middles, pair.middle]), np.vstack([axes, pair.axis])
-    return kept

@@ -24,7 +24,12 @@ from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspMethod, GraspQuery
+from modular_framework_core.grasp_generation.grasp_candidates import (
+    GraspCandidate,
+    GraspMethod,
+    GraspQuery,
+    NoCandidatesError,
+)
 from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
     GripperGeometryError,
@@ -55,7 +60,7 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         numbers = GivenNumbers(settings.get("method_parameters") or {})
         method = load_method(str(settings["method"]), numbers)
         started_s, start = watch.elapsed_s(), time.perf_counter()
-        candidates = _candidates(method, scene, prepared.gripper, spec.seed)
+        candidates, cause = _candidates(method, scene, prepared.gripper, spec.seed)
         search_s = time.perf_counter() - start
         numbers.check_all_read()
         reached = _reached(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
@@ -65,7 +70,7 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
             component="generation",
             name=str(settings["target"]),
             succeeded=bool(found),
-            reason=_reason(method, candidates, reached, outcome),
+            reason=_reason(method, candidates, reached, outcome) + cause,
             started_s=started_s,
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
@@ -107,13 +112,19 @@ def load_method(reference: str, numbers: GivenNumbers) -> GraspMethod:
     return made
 
 
-def _candidates(method: GraspMethod, scene: GraspScene, gripper: GripperGeometry, seed: int) -> list[GraspCandidate]:
-    """Returns the candidates of all parts of the target, best first."""
-    found_in = []
+def _candidates(
+    method: GraspMethod, scene: GraspScene, gripper: GripperGeometry, seed: int
+) -> tuple[list[GraspCandidate], str]:
+    """Returns the candidates of all parts of the target, best first, and why there are none, as far as it is known."""
+    found_in, causes = [], []
     for target in scene.targets:
         beside = tuple(part for part in (*scene.targets, *scene.others) if part.name != target.name)
-        found_in.append(method.candidates(GraspQuery(target, beside, target.bottom, gripper, seed)))
-    return list(heapq.merge(*found_in, key=lambda candidate: -candidate.quality))
+        try:
+            found_in.append(method.candidates(GraspQuery(target, beside, target.bottom, gripper, seed)))
+        except NoCandidatesError as error:
+            causes.append(f": {error}")
+    found = list(heapq.merge(*found_in, key=lambda candidate: -candidate.quality))
+    return found, "" if found else "".join(causes)
 
 
 def _reached(prepared: _Prepared, scene: GraspScene, candidates: list[GraspCandidate]) -> list[float | None]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
-from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
+from modular_framework_core.grasp_generation.planning_scene_objects import CropBox, SceneObject
 
 Array = npt.NDArray[np.float64]
 
@@ -66,6 +66,10 @@ class GraspCandidate:
         return self.position + np.array([0.0, 0.0, self.lift_distance_m])
 
 
+class NoCandidatesError(RuntimeError):
+    """A method finds no grasp of an object; the text says why, to follow "no part of it can be grasped ...:"."""
+
+
 class ReadNumber(Protocol):
     """Reads a parameter of a method, which is a number."""
 
@@ -88,7 +92,11 @@ class GraspMethod(Protocol):
         """How it grasps, to complete "no part of this can be grasped ...": ``from above``."""
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
-        """Returns the grasps of an object, best first; empty when it cannot be grasped in this manner."""
+        """Returns the grasps of an object, best first; empty when it cannot be grasped in this manner.
+
+        Raises:
+            NoCandidatesError: It cannot, and the method knows why.
+        """
 
     def reached_quality(self, candidate: GraspCandidate, joint_travel: float) -> float:
         """Ranks a grasp that the arm can reach.
@@ -99,4 +107,23 @@ class GraspMethod(Protocol):
 
         Returns:
             Its final rank in [0, 1]; more is better.
+        """
+
+
+@runtime_checkable
+class SeeingMethod(Protocol):
+    """What a grasp method offers besides that finds objects itself where the planning scene has none."""
+
+    def connect(self) -> None:
+        """Connects to what it sees with; called once, by a node."""
+
+    def seen_objects(self, crop: CropBox, seed: int) -> list[SceneObject]:
+        """Returns the objects in the crop box.
+
+        Args:
+            crop: Where objects are looked for.
+            seed: Seed of every random choice.
+
+        Raises:
+            NoCandidatesError: There are none; the text says why.
         """

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import rospy
 
 from modular_framework_core.grasp_generation.grasp_candidates import ReadNumber
 from modular_framework_core.grasp_generation.hand_motion_settings import HandMotionSettings
+from modular_framework_core.grasp_generation.hand_poses import HandSettings
+from modular_framework_core.grasp_generation.pair_grasps import PairGraspSettings
 from modular_framework_core.grasp_generation.planning_scene_objects import CropBox
 
 DEFAULT_SEED, LARGEST_SEED = 1, 2**63 - 1
@@ -105,6 +107,28 @@ def read_hand_motion(read: ReadNumber = number) -> HandMotionSettings:
         min_finger_clearance_m=read("~min_finger_clearance", defaults.min_finger_clearance_m, 0.0, 0.1),
         tip_clearance_m=read("~tip_clearance", defaults.tip_clearance_m, 0.0, 0.1),
         min_pad_overlap_m=read("~min_pad_overlap", defaults.min_pad_overlap_m, 0.001, 0.1),
+    )
+
+
+def read_pair_grasps(cone_cosine: float, read: ReadNumber = number) -> PairGraspSettings:
+    """Reads the parameters of methods that begin with pairs of contacts.
+
+    Args:
+        cone_cosine: Cosine of the half angle of the friction cone.
+        read: Reads a parameter; by default from the parameter server.
+    """
+    hand, defaults = HandSettings(), PairGraspSettings()
+    hand = HandSettings(
+        **asdict(read_hand_motion(read)),
+        approach_step_rad=read("~approach_step", hand.approach_step_rad, 0.05, math.pi),
+        max_approach_angle_rad=read("~max_approach_angle", hand.max_approach_angle_rad, 0.01, math.pi),
+        cone_cosine=cone_cosine,
+    )
+    return PairGraspSettings(
+        hand=hand,
+        full_clearance_m=read("~full_clearance", defaults.full_clearance_m, 0.001, 1.0),
+        max_poses=int(read("~max_poses", defaults.max_poses, 1, 1000000)),
+        max_candidates=int(read("~max_candidates", defaults.max_candidates, 1, 1000000)),
     )
 
 

@@ -16,7 +16,13 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_core.commander.arm_commander import ArmCommander, CommanderError
 from modular_framework_core.grasp_generation.generated_objects import GeneratedObjects, at_rest
-from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspMethod, GraspQuery
+from modular_framework_core.grasp_generation.grasp_candidates import (
+    GraspCandidate,
+    GraspMethod,
+    GraspQuery,
+    NoCandidatesError,
+    SeeingMethod,
+)
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometryError, measure_gripper
 from modular_framework_core.grasp_generation.planning_scene_objects import SceneObject
 from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings, read_settings
@@ -94,6 +100,8 @@ class GraspGenerator:
             self._gripper = measure_gripper(str(rospy.get_param("robot_description")), tip, settings.gripper_joint)
         except (CommanderError, CallError, GripperGeometryError) as error:
             raise NoGraspError(str(error)) from error
+        if isinstance(self._method, SeeingMethod):
+            self._method.connect()
         self._services = [
             rospy.Service(name, Trigger, lambda _, refresh=refresh: self._on_demand(refresh))
             for refresh, names in ((False, GENERATE_SERVICES), (True, REFRESH_SERVICES))
@@ -153,11 +161,24 @@ class GraspGenerator:
         try:
             settings = read_settings()
             self._time.catch_up()
-            objects = self._resting(settings) if refresh else self._scene.targets(settings)
+            objects = self._objects(settings, refresh)
             return TriggerResponse(*self._signal_grasps(settings, objects, refresh))
         except (NoGraspError, CallError, CommanderError) as error:
             self._publish(False, str(error))
             return TriggerResponse(False, str(error))
+
+    def _objects(self, settings: GeneratorSettings, refresh: bool) -> list[SceneObject]:
+        """Returns the objects to grasp; those that the method sees, if the planning scene has none in the crop box."""
+        try:
+            return self._resting(settings) if refresh else self._scene.targets(settings)
+        except NoObjectError as error:
+            if settings.object_name or not isinstance(self._method, SeeingMethod):
+                raise
+            try:
+                with self._generating, self._time.held("grasp generation", during_motions=True):
+                    return self._method.seen_objects(settings.crop, settings.seed)
+            except NoCandidatesError as unseen:
+                raise NoObjectError(f"{error}; and {unseen}") from unseen
 
     def _resting(self, settings: GeneratorSettings) -> list[SceneObject]:
         """Returns the objects to grasp once they rest, or as they are when that takes too long."""
@@ -213,20 +234,27 @@ class GraspGenerator:
         self, settings: GeneratorSettings, objects: list[SceneObject], figures: dict[str, float]
     ) -> list[StandardisedGrasp]:
         found_in: list[list[tuple[SceneObject, GraspCandidate]]] = []
+        causes: list[str] = []
         present = self._scene.read()
         for found in objects:
             support = max(found.bottom, settings.crop.low[2]) if settings.crop.holds(found.centre) else found.bottom
             obstacles = tuple(other for other in present if other.name != found.name)
             query = GraspQuery(found, obstacles, support, self._gripper, settings.seed)
-            found_in.append([(found, candidate) for candidate in self._method.candidates(query)])
+            try:
+                found_in.append([(found, candidate) for candidate in self._method.candidates(query)])
+            except NoCandidatesError as error:
+                causes.append(str(error))
         ranked = list(heapq.merge(*found_in, key=lambda pair: -pair[1].quality))
         if not ranked:
             raise NoGraspError(
-                f"no part of {'; '.join(_sides(found) for found in objects)} can be grasped {self._method.manner}: the "
-                f"gripper opens to {self._gripper.max_opening:.3f} m and needs flat or round sides"
+                f"no part of {'; '.join(_sides(found) for found in objects)} can be grasped {self._method.manner}: "
+                + ("; ".join(causes) or self._usual_cause())
             )
         figures["candidates"] = len(ranked)
         return self._reachable(ranked, settings, figures)
+
+    def _usual_cause(self) -> str:
+        return f"the gripper opens to {self._gripper.max_opening:.3f} m and needs flat or round sides"
 
     def _reachable(
         self, ranked: list[tuple[SceneObject, GraspCandidate]], settings: GeneratorSettings, figures: dict[str, float]

@@ -10,9 +10,9 @@ import numpy as np
 
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.geometry.spatial import Array
+from modular_framework_ros.point_clouds import PointCloudError, point_array
 
 DEPTH_TYPES = {"16UC1": ("u2", 0.001), "32FC1": ("f4", 1.0), "mono16": ("u2", 0.001)}  # item type, unit [m]
-CLOUD_TYPES = {7: "f4", 8: "f8"}  # sensor_msgs/PointField
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,32 +99,10 @@ def cloud_array(message: Any) -> Array:
     Raises:
         GeometryError: x, y or z is missing or no floating-point number, or there are too few bytes.
     """
-    fields = {field.name: field for field in message.fields}
-    bad = [name for name in "xyz" if name not in fields or fields[name].datatype not in CLOUD_TYPES]
-    if bad:
-        raise GeometryError(
-            f"point cloud: field {', '.join(bad)} is missing or no float; fields are "
-            f"{', '.join(fields) or 'none'}; x, y and z of type FLOAT32 or FLOAT64 are needed"
-        )
-    shape, data = (message.height, message.width), bytes(message.data)
-    reach = max(fields[name].offset + np.dtype(CLOUD_TYPES[fields[name].datatype]).itemsize for name in "xyz")
-    needed = (shape[0] - 1) * message.row_step + (shape[1] - 1) * message.point_step + reach if min(shape) else 0
-    if message.row_step < shape[1] * message.point_step or len(data) < needed:
-        raise GeometryError(
-            f"point cloud: {len(data)} bytes in rows of {message.row_step} and points of "
-            f"{message.point_step}; {shape[1]} x {shape[0]} points need {needed}"
-        )
-    if not min(shape):
-        return np.empty((*shape, 3))
-    types = [
-        np.dtype(CLOUD_TYPES[fields[name].datatype]).newbyteorder(">" if message.is_bigendian else "<")
-        for name in "xyz"
-    ]
-    axes = [
-        np.ndarray(shape, kind, data, fields[name].offset, (message.row_step, message.point_step))
-        for name, kind in zip("xyz", types, strict=True)
-    ]
-    return np.stack(axes, axis=-1).astype(np.float64)
+    try:
+        return point_array(message)
+    except PointCloudError as error:
+        raise GeometryError(str(error)) from error
 
 
 def points_of_cloud(cloud: Array, max_range: float, subsample: int) -> SeenPoints:

@@ -34,16 +34,22 @@ class CameraPublisher:
 
     Args:
         camera: The camera.
+
+    Attributes:
+        subscriptions: How many there have been so far.
     """
 
     def __init__(self, camera: Camera) -> None:
-        self.camera = camera
+        self.camera, self.subscriptions = camera, 0
         self._noise = NoiseSource(camera.seed, camera.name, (camera.noise,))
         topics = camera.topics
-        self._image = _publisher(topics.image, Image)
-        self._depth = _publisher(topics.depth, Image)
-        self._points = _publisher(topics.points, PointCloud2)
-        self._infos = [_publisher(name, CameraInfo) for name in {topics.image_info, topics.depth_info}]
+        self._image = self._publisher(topics.image, Image)
+        self._depth = self._publisher(topics.depth, Image)
+        self._points = self._publisher(topics.points, PointCloud2)
+        self._infos = [self._publisher(name, CameraInfo) for name in {topics.image_info, topics.depth_info}]
+
+    def _publisher(self, topic: str, kind: type) -> Any:
+        return rospy.Publisher(topic, kind, queue_size=1, subscriber_listener=_Counter(self)) if topic else None
 
     @property
     def draws(self) -> bool:
@@ -80,8 +86,15 @@ class CameraPublisher:
                 publisher.unregister()
 
 
-def _publisher(topic: str, kind: type) -> Any:
-    return rospy.Publisher(topic, kind, queue_size=1) if topic else None
+class _Counter(rospy.SubscribeListener):
+    """Counts the subscriptions of a camera; called by rospy."""
+
+    def __init__(self, counted: CameraPublisher) -> None:
+        super().__init__()
+        self._counted = counted
+
+    def peer_subscribe(self, *_: Any) -> None:
+        self._counted.subscriptions += 1
 
 
 def _subscribed(publisher: Any) -> bool:
@@ -104,9 +117,9 @@ def serve(pipe: Connection) -> None:
     """
     publishers: list[CameraPublisher] = []
     renderer: Renderer | None = None
-    done, reported = 0, SceneReport(0, frozenset())
+    done, reported = 0, SceneReport(0, {})
     while not rospy.is_shutdown():
-        report = SceneReport(done, frozenset(each.camera.name for each in publishers if each.wanted))
+        report = SceneReport(done, {each.camera.name: each.subscriptions for each in publishers if each.wanted})
         if report != reported:
             pipe.send(report)
             reported = report

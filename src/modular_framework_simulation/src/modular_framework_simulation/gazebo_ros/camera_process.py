@@ -26,7 +26,8 @@ _END_TIMEOUT_S = 5.0
 class CameraProcess:
     """Cameras that are drawn in another process, which is started once there is a camera.
 
-    Physics never waits for it: while an image is drawn, no other is asked for, and the next one is late.
+    Physics never waits for it: while an image is drawn, no other is asked for, and the next one is late. A new
+    subscriber gets an image of now, also while time stands still.
 
     Args:
         make_tracker: Makes what describes the things they see; called when there is a camera.
@@ -40,7 +41,7 @@ class CameraProcess:
         self._cameras = {camera.name: camera for camera in fixed}
         self._due_ns: dict[str, int] = {}
         self._sent = 0
-        self._report = SceneReport(0, frozenset())
+        self._report = SceneReport(0, {})
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._connected = False
@@ -92,15 +93,18 @@ class CameraProcess:
     def _listen(self, pipe: Connection, process: subprocess.Popen[bytes]) -> None:
         try:
             while True:
-                self._report = pipe.recv()
+                before, self._report = self._report, pipe.recv()
+                for name, subscriptions in self._report.wanted.items():
+                    if subscriptions > before.wanted.get(name, 0):
+                        self._due_ns[name] = 0
         except (EOFError, OSError):
-            self._report = SceneReport(0, frozenset())
+            self._report = SceneReport(0, {})
         if self._pipe is not None and not rospy.is_shutdown():
             code = process.wait()
             rospy.logerr("the process that draws what cameras see ended with code %d: cameras are silent now", code)
 
     def tick(self, time_ns: int) -> None:
-        """Asks for the images that are due and have a subscriber; called by the loop's thread as time advances.
+        """Asks for the images that are due and have a subscriber; called by the loop's thread.
 
         Args:
             time_ns: Simulated time [ns].
@@ -115,7 +119,7 @@ class CameraProcess:
             try:
                 self._pipe.send(self._tracker.update(due))
             except OSError:
-                self._report = SceneReport(0, frozenset())
+                self._report = SceneReport(0, {})
 
     def _is_due(self, name: str, time_ns: int) -> bool:
         period_ns = round(1e9 / self._cameras[name].rate_hz)

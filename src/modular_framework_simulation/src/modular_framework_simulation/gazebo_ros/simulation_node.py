@@ -81,9 +81,9 @@ def _resources(model_path: str) -> Resources:
 class SimulationNode:
     """Builds the world from parameters and runs it.
 
-    Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `VisibleSceneTopics`, `GazeboServices`,
-    `TimeServices`, `PlanningScenePublisher`, `SensorTopics`, `CameraPublisher` and, for the controllers,
-    `RosControllerManager`.
+    Parameters: see `SimulationParameters`. Topics and services: see `WorldTopics`, `VisibleSceneTopics`,
+    `GazeboServices`, `TimeServices`, `PlanningScenePublisher`, `SensorTopics`, `CameraPublisher` and, for the
+    controllers, `RosControllerManager`.
 
     Args:
         parameters: What to simulate and how.
@@ -207,6 +207,7 @@ class SimulationNode:
         if self._visible is not None:
             self._visible.publish()
         self._show_snapshot()
+        self._cameras.tick(self._world.time_ns)
 
     def _show_snapshot(self) -> None:
         self._scene.show(self._snapshot())

@@ -46,11 +46,11 @@ class SceneReport:
 
     Attributes:
         images: How many updates it has finished.
-        wanted: Names of the cameras that somebody subscribes to.
+        wanted: Names of the cameras that somebody subscribes to, with how many subscriptions there have been so far.
     """
 
     images: int
-    wanted: frozenset[str]
+    wanted: Mapping[str, int]
 
 
 class SceneTracker:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from antipodal_grasps.contact_pairs import ContactPair
+from modular_framework_core.grasp_generation.contact_pair import ContactPair
 from modular_framework_core.grasp_generation.gripper_geometry import GripperGeometry
 from modular_framework_core.grasp_generation.hand_clearance import (
     CONTACT_DEPTH_M,

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Takes one point cloud from a camera when it is needed, with the transforms of its time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import rospy
+from sensor_msgs.msg import PointCloud2
+
+from modular_framework_core.grasp_generation.grasp_candidates import NoCandidatesError
+from modular_framework_ros.calls import wait_until
+from modular_framework_ros.point_clouds import PointCloudError, point_array
+from modular_framework_ros.simulated_time import SimulatedTime
+from point_cloud_grasps.ros_transforms import Transforms
+
+Array = npt.NDArray[np.float64]
+
+TRANSFORM_TIMEOUT_S, HELD_TRANSFORM_TIMEOUT_S = 2.0, 0.3
+"""Longest wait for transforms [s of real time]; the second where nodes hold simulated time."""
+WARNING_PERIOD_S = 30.0
+BUFFER_BYTES = 1 << 25
+
+
+@dataclass(frozen=True, slots=True)
+class SeenCloud:
+    """What a camera saw.
+
+    Attributes:
+        points: (n, 3) in the planning frame, all finite [m].
+        stamp: When.
+        frame: The camera's frame.
+    """
+
+    points: Array
+    stamp: rospy.Time
+    frame: str
+
+
+class CloudSource:
+    """Takes point clouds; subscribes to the camera only while it waits for one, since a camera draws for subscribers.
+
+    Subscribers: the topic of the cloud (sensor_msgs/PointCloud2); those of :class:`Transforms` all the time.
+    """
+
+    def __init__(self) -> None:
+        """Connects to nothing yet, see :meth:`connect`."""
+        self._transforms = Transforms()
+        self._time = SimulatedTime()
+
+    def connect(self) -> None:
+        """Starts to listen to TF."""
+        self._transforms.connect()
+
+    def take(self, topic: str, frame: str, timeout_s: float) -> SeenCloud:
+        """Waits for a cloud that is not older than this call, and brings it to a frame.
+
+        Args:
+            topic: Topic of the cloud.
+            frame: Frame of the result.
+            timeout_s: Longest wait [s of real time].
+
+        Raises:
+            NoCandidatesError: There is none in time, or it cannot be used; the text says why.
+        """
+        message = self._message(topic, timeout_s)
+        where = f"the cloud of topic '{rospy.resolve_name(topic)}'"
+        try:
+            points = point_array(message).reshape(-1, 3)
+        except PointCloudError as error:
+            raise NoCandidatesError(f"{where} cannot be read: {error}") from error
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            raise NoCandidatesError(
+                f"{where} has no finite point among {message.width} x {message.height}; is the camera covered?"
+            )
+        header = message.header
+        stamp = self._stamps(frame, [header.frame_id], header.stamp).get(header.frame_id)
+        if stamp is None:
+            raise NoCandidatesError(
+                f"{where} is in frame '{header.frame_id}', which has no transform to '{frame}' at the cloud's time "
+                f"{header.stamp.to_sec():.3f} s; frames of TF: "
+                f"{', '.join(self._transforms.frames) or 'none'}"
+            )
+        transform = self._transforms.matrix(frame, header.frame_id, stamp)
+        return SeenCloud(points @ transform[:3, :3].T + transform[:3, 3], header.stamp, header.frame_id)
+
+    def link_poses(self, links: Sequence[str], frame: str, stamp: rospy.Time) -> dict[str, Array]:
+        """Returns the pose (4, 4) of each link in a frame at a time; a link without one is left out, and logged."""
+        stamps = self._stamps(frame, links, stamp)
+        if missing := [link for link in links if link not in stamps]:
+            rospy.logwarn_throttle(
+                WARNING_PERIOD_S,
+                f"{rospy.get_name()}: no transform from {', '.join(missing)} to '{frame}' at {stamp.to_sec():.3f} s; "
+                "points on these links count as obstacles. Is robot_state_publisher running?",
+            )
+        return {link: self._transforms.matrix(frame, link, at) for link, at in stamps.items()}
+
+    def _stamps(self, frame: str, others: Sequence[str], stamp: rospy.Time) -> dict[str, rospy.Time]:
+        timeout_s = HELD_TRANSFORM_TIMEOUT_S if self._time.enabled else TRANSFORM_TIMEOUT_S
+        return self._transforms.stamps(frame, others, stamp, timeout_s)
+
+    def _message(self, topic: str, timeout_s: float) -> PointCloud2:
+        """Returns the first message that shows the world as it is now, or later."""
+        begun, messages = rospy.Time.now(), []
+
+        def keep(message: PointCloud2) -> None:
+            if message.header.stamp >= begun or message.header.stamp.is_zero():
+                messages.append(message)
+
+        subscriber = rospy.Subscriber(topic, PointCloud2, keep, queue_size=1, buff_size=BUFFER_BYTES)
+        try:
+            if not wait_until(lambda: bool(messages), timeout_s):
+                published = subscriber.get_num_connections()
+                raise NoCandidatesError(
+                    f"no point cloud arrived on topic '{subscriber.resolved_name}' within {timeout_s:g} s, "
+                    + (
+                        f"from {published} publisher(s); is the camera running and its clock the one of ROS?"
+                        if published
+                        else "nobody publishes it; start the camera, or set pointcloud_topic_name in "
+                        "sensors_config.yaml"
+                    )
+                )
+        finally:
+            subscriber.unregister()
+        return messages[0]

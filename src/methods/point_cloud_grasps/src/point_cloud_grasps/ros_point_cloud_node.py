@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node of the method: its parameters, its cloud, and its grasps in the form that all grasp generators share."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import numpy.typing as npt
+import rospy
+
+from modular_framework_core.grasp_generation.grasp_candidates import (
+    GraspCandidate,
+    GraspQuery,
+    NoCandidatesError,
+    ReadNumber,
+)
+from modular_framework_core.grasp_generation.pair_grasps import candidates_of, quality_with_travel
+from modular_framework_core.grasp_generation.planning_scene_objects import CropBox, SceneObject
+from modular_framework_core.grasp_generation.ros_generator_settings import (
+    ParameterisedMethod,
+    number,
+    read_pair_grasps,
+)
+from modular_framework_core.grasp_generation.ros_grasp_generator import run_grasp_generator
+from point_cloud_grasps.cloud_grasps import CloudSettings, Region, cloud_grasps, surroundings_of
+from point_cloud_grasps.cloud_pairs import CloudPairSettings
+from point_cloud_grasps.robot_bodies import RobotBodies
+from point_cloud_grasps.ros_cloud_source import CloudSource
+from point_cloud_grasps.seen_objects import region_of_crop, seen_objects
+
+Array = npt.NDArray[np.float64]
+
+TOPIC_PARAMETERS = ("~point_cloud_topic", "pointcloud_topic_name")
+
+
+class PointCloudMethod(ParameterisedMethod):
+    """Antipodal grasps on a point cloud, which is taken for every object anew.
+
+    Parameters: those of :func:`read_cloud_settings`, read again for every object; ``~point_cloud_topic`` (empty: what
+        ``pointcloud_topic_name`` says), ``~cloud_timeout`` [s], ``~robot_padding`` [m], ``origin_frame_name``,
+        ``robot_description``.
+    Subscribers: see :class:`CloudSource`.
+    """
+
+    manner = "between two opposite sides that the camera sees"
+
+    def __init__(self, read: ReadNumber = number) -> None:
+        """Connects to nothing yet."""
+        super().__init__(read)
+        self._source = CloudSource()
+        self._robot: RobotBodies | None = None
+
+    def connect(self) -> None:
+        """Starts to listen to TF."""
+        self._source.connect()
+
+    def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
+        """Returns the grasps of an object in the order of :func:`cloud_grasps`, then with the hand half turned.
+
+        Raises:
+            NoCandidatesError: There are none; the text says why.
+        """
+        settings = read_cloud_settings(self.read)
+        begun = time.perf_counter()
+        points = self._points(surroundings_of(query, settings))
+        taken = time.perf_counter()
+        grasps = cloud_grasps(query, points, settings)
+        rospy.logdebug(
+            "%d points around '%s': %d grasps; cloud %.2f s, search %.2f s",
+            len(points), query.target.name, len(grasps), taken - begun, time.perf_counter() - taken,
+        )  # fmt: skip
+        return candidates_of(grasps, query.gripper, settings)
+
+    def seen_objects(self, crop: CropBox, seed: int) -> list[SceneObject]:
+        """Returns what stands in the crop box, where the planning scene knows of nothing: see :func:`seen_objects`.
+
+        Raises:
+            NoCandidatesError: There is nothing; the text says why.
+        """
+        return seen_objects(self._points(region_of_crop(crop)), crop, read_cloud_settings(self.read), seed)
+
+    def _points(self, region: Region) -> Array:
+        """Takes a cloud and returns its points (n, 3) in a region and off the robot, in the planning frame [m]."""
+        if not rospy.core.is_initialized():
+            raise NoCandidatesError("a camera is needed, in a simulation or on a robot; use the mode `task`")
+        topic = next((name for name in map(_text, TOPIC_PARAMETERS) if name), "")
+        if not topic:
+            raise NoCandidatesError(
+                f"no topic of a point cloud is known; set parameter '{rospy.resolve_name(TOPIC_PARAMETERS[0])}' in "
+                f"generative_methods_config.yaml, or '{TOPIC_PARAMETERS[1]}' in sensors_config.yaml"
+            )
+        frame = _text("origin_frame_name") or "world"
+        cloud = self._source.take(topic, frame, self.read("~cloud_timeout", 20.0, 0.1, 600.0))
+        points = cloud.points[region.hold(cloud.points)]
+        robot = self._robot_bodies()
+        poses = self._source.link_poses(robot.links, frame, cloud.stamp)
+        return points[~robot.hide(points, poses, self.read("~robot_padding", 0.02, 0.0, 0.5))]
+
+    def reached_quality(self, candidate: GraspCandidate, joint_travel: float) -> float:
+        """Ranks by the quality of the hold, and by how little the arm moves between the poses of the grasp."""
+        return quality_with_travel(candidate.quality, joint_travel)
+
+    def _robot_bodies(self) -> RobotBodies:
+        if self._robot is None:
+            self._robot = RobotBodies(_text("robot_description"))
+            for fault in self._robot.faults:
+                rospy.logwarn("%s: %s; points on it count as obstacles.", rospy.get_name(), fault)
+        return self._robot
+
+
+def read_cloud_settings(read: ReadNumber = number) -> CloudSettings:
+    """Reads the parameters of the method.
+
+    Args:
+        read: Reads a parameter; by default from the parameter server, where a value out of range is replaced by its
+            default, and that is logged.
+    """
+    pairs, defaults = CloudPairSettings(), CloudSettings()
+    pairs = CloudPairSettings(
+        contact_samples=int(read("~contact_samples", pairs.contact_samples, 10, 3000)),
+        friction=read("~friction", pairs.friction, 0.02, 2.0),
+    )
+    shared = read_pair_grasps(pairs.cone_cosine, read)
+    return CloudSettings(
+        shared.hand,
+        shared.full_clearance_m,
+        shared.max_poses,
+        shared.max_candidates,
+        pairs=pairs,
+        region_padding_m=read("~region_padding", defaults.region_padding_m, 0.0, 0.5),
+        min_height_m=read("~min_height", defaults.min_height_m, 0.0, 0.1),
+    )
+
+
+def _text(name: str) -> str:
+    return str(rospy.get_param(name, ""))
+
+
+def main() -> int:
+    """Runs the node ``point_cloud_grasp_generator``; returns 1 when something it needs is missing."""
+    return run_grasp_generator("point_cloud_grasp_generator", PointCloudMethod())

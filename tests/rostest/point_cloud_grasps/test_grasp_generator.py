@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The method does what every grasp generator does, with a camera that sees the scene; and says what its cloud lacks."""
+
+from __future__ import annotations
+
+import functools
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from ros_session import until as wait_until
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import PointCloud2, PointField
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
+pytest.register_assert_rewrite("grasp_generator_suite")
+from depth_camera import AXES, EYE, Box, image  # noqa: E402
+from grasp_generator_suite import *  # noqa: E402, F403
+from grasp_generator_suite import FakeMoveGroup, Method, Watcher  # noqa: E402
+
+TOPIC, FRAME = "camera/points", "camera_optical"
+TABLE = Box((2.0, 2.0, 0.02), (0.0, 0.5, 0.83))
+until = functools.partial(wait_until, timeout_s=30.0)
+
+
+class FakeCamera:
+    """Publishes what a camera above the table sees of the boxes of a scene, while somebody subscribes.
+
+    Attributes:
+        scene: Has the boxes.
+        unknown: Boxes that the scene does not have.
+        change: Makes the points (rows, columns, 3) that are published of those that are seen.
+        frame: Frame in the header.
+    """
+
+    def __init__(self, scene: FakeMoveGroup) -> None:
+        self.scene, self.frame = scene, FRAME
+        self.change = lambda points: points
+        self.unknown: list[Box] = []
+        self._static = tf2_ros.StaticTransformBroadcaster()
+        found = TransformStamped()
+        found.header.frame_id, found.child_frame_id = "world", FRAME
+        place, turn = found.transform.translation, found.transform.rotation
+        place.x, place.y, place.z = EYE
+        turn.x, turn.y, turn.z, turn.w = Rotation.from_matrix(AXES).as_quat()
+        self._static.sendTransform(found)
+        self._publisher = rospy.Publisher(TOPIC, PointCloud2, queue_size=1)
+        threading.Thread(target=self._run, daemon=True).start()
+
+    @property
+    def watched(self) -> bool:
+        return bool(self._publisher.get_num_connections())
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            if self.watched:
+                self._publisher.publish(self._cloud())
+            rospy.rostime.wallsleep(0.1)
+
+    def _cloud(self) -> PointCloud2:
+        stamp, shapes = rospy.Time.now(), [TABLE, *self.unknown]
+        for item in self.scene.objects:
+            at = item.pose.position
+            shapes.append(Box(tuple(item.primitives[0].dimensions), (at.x, at.y, at.z)))
+        points = self.change(image(shapes))
+        cloud = PointCloud2(height=points.shape[0], width=points.shape[1], point_step=12, row_step=12 * points.shape[1])
+        cloud.header.stamp, cloud.header.frame_id = stamp, self.frame
+        cloud.fields = [PointField(name, 4 * place, PointField.FLOAT32, 1) for place, name in enumerate("xyz")]
+        cloud.data = points.astype("<f4").tobytes()
+        return cloud
+
+    @contextmanager
+    def changed(self, **values: object) -> Iterator[None]:
+        before = {name: getattr(self, name) for name in values}
+        for name, value in values.items():
+            setattr(self, name, value)
+        yield
+        for name, value in before.items():
+            setattr(self, name, value)
+
+
+@pytest.fixture(scope="module")
+def method() -> Method:
+    return Method(
+        "point_cloud_grasps", "point_cloud_grasp_generator", "between two opposite sides that the camera sees"
+    )
+
+
+@pytest.fixture(scope="module")
+def scene(ros_session, ros_launch, method: Method) -> FakeMoveGroup:
+    fake = FakeMoveGroup()
+    fake.reach = 0.5
+    fake.watcher, fake.camera = Watcher(), FakeCamera(fake)
+    rospy.set_param("pointcloud_topic_name", TOPIC)
+    fake.session = ros_launch(method.launch)
+    return fake
+
+
+def test_the_camera_is_subscribed_to_only_while_a_cloud_is_waited_for(scene, method: Method) -> None:
+    method.set("name_prefix", "")
+    until(lambda: not scene.camera.watched, "the camera without a subscriber")
+    seen = []
+
+    def remember(points: np.ndarray) -> np.ndarray:
+        seen.append(scene.camera.watched)
+        return points
+
+    with scene.camera.changed(change=remember):
+        assert method.generate()[0]
+    assert seen and seen[0]
+    until(lambda: not scene.camera.watched, "the camera without a subscriber")
+
+
+def test_an_unorganised_cloud_with_holes_does_too(scene, method: Method) -> None:
+    def unorganised(points: np.ndarray) -> np.ndarray:
+        flat = points.reshape(1, -1, 3).copy()
+        flat[:, ::10] = np.nan
+        return flat[:, np.random.default_rng(1).permutation(flat.shape[1])]
+
+    with scene.camera.changed(change=unorganised):
+        success, text = method.generate()
+    assert success, text
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (lambda points: np.full_like(points, np.nan), "has no finite point among 640 x 480"),
+        (lambda points: points[:0], "has no finite point among 640 x 0"),
+        (lambda points: points + [0.0, 0.0, -0.6], "the cloud has 0 points on 'box__link'"),
+    ],
+)
+def test_a_cloud_that_shows_nothing_is_a_failure_with_its_cause(scene, method: Method, change, cause: str) -> None:
+    with scene.camera.changed(change=change):
+        success, text = method.generate()
+    assert not success and cause in text
+
+
+def test_a_cloud_in_a_frame_that_nobody_knows_is_a_failure_that_names_it(scene, method: Method) -> None:
+    with scene.camera.changed(frame="nowhere"):
+        success, text = method.generate()
+    assert not success
+    assert f"'/{TOPIC}' is in frame 'nowhere', which has no transform to 'world'" in text and FRAME in text
+
+
+def test_no_cloud_in_time_is_a_failure_that_names_the_topic(scene, method: Method) -> None:
+    method.set("cloud_timeout", 1.0)
+    method.set("point_cloud_topic", "other/points")
+    success, text = method.generate()
+    assert not success
+    assert "no point cloud arrived on topic '/other/points' within 1 s, nobody publishes it" in text
+    method.set("point_cloud_topic", "")
+    method.set("cloud_timeout", 60.0)
+    assert method.generate()[0]
+
+
+def test_what_the_scene_does_not_know_is_found_in_the_cloud(scene, method: Method) -> None:
+    known, scene.objects = scene.objects, [item for item in scene.objects if not item.id.startswith("box")]
+    try:
+        success, text = method.generate()
+        assert not success
+        assert "in the crop box" in text and "stands on the plane at 0.840 m that the cloud shows" in text
+        with scene.camera.changed(unknown=[Box(BOX_SIZE, (-0.1, 0.4, 0.89))]):  # noqa: F405
+            success, text = method.generate()
+        assert success, text
+        grasp = get_grasp().grasp_message  # noqa: F405
+        assert grasp.object_id == "seen_1"
+        assert_between_the_pads(grasp, -0.1, 0.4)  # noqa: F405
+    finally:
+        scene.objects = known
