@@ -179,12 +179,12 @@ def test_a_path_that_stays_close_to_contact_asks_the_exact_check_about_undecided
     rng = np.random.default_rng(44)
     paths = [bars.path_up_to_contact(rng) for _ in range(5)]
     asked: list[int] = []
-    touches = ExactCollision.touches
+    touching_pair = ExactCollision.touching_pair
 
-    def counted(exact: ExactCollision, positions: np.ndarray, numbers: Iterable[int]) -> bool:
+    def counted(exact: ExactCollision, positions: np.ndarray, numbers: Iterable[int]) -> int:
         pairs = list(numbers)
         asked.append(len(pairs))
-        return touches(exact, positions, pairs)
+        return touching_pair(exact, positions, pairs)
 
     def questions(rows: int) -> list[int]:
         monkeypatch.setattr(exact_collision_checker, "UNDECIDED_ROWS", rows)
@@ -193,7 +193,7 @@ def test_a_path_that_stays_close_to_contact_asks_the_exact_check_about_undecided
         assert all(checker.path_is_free(path, FINE_STEP) for path in paths)
         return list(asked)
 
-    monkeypatch.setattr(ExactCollision, "touches", counted)
+    monkeypatch.setattr(ExactCollision, "touching_pair", counted)
     expected = questions(100_000)
     assert len(expected) > 200
     assert questions(1) == expected

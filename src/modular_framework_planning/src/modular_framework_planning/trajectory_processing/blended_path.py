@@ -27,8 +27,8 @@ def choose_blends(vertices: Array, deviation: float, is_free: Callable[[Array], 
     lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
     result = np.zeros(max(0, len(vertices) - 2))
     for number in range(len(result)):
-        before = (vertices[number + 1] - vertices[number]) / lengths[number]
-        after = (vertices[number + 2] - vertices[number + 1]) / lengths[number + 1]
+        start, corner, end = vertices[number : number + 3]
+        before, after = (corner - start) / lengths[number], (end - corner) / lengths[number + 1]
         if float(before @ after) < NEARLY_REVERSED:
             continue
         turn = max(float(np.linalg.norm(before - after)), 1e-9)
@@ -36,7 +36,7 @@ def choose_blends(vertices: Array, deviation: float, is_free: Callable[[Array], 
         for _ in range(4):
             if size < SMALLEST_BLEND:
                 break
-            if is_free(corner_samples(*vertices[number : number + 3], size, SAMPLE_STEP)):
+            if is_free(corner_samples(start, corner, end, size, SAMPLE_STEP)):
                 result[number] = size
                 break
             size *= 0.5
