@@ -2,8 +2,8 @@
 """Has the shipped task pick one object after the other in one running simulation, and prints what became of each.
 
 Run as a node beside `start_framework.launch ... end_with_task:=false`: `pick_objects.py TASK_SCRIPT [CASE ...]`. Every
-line it prints is a JSON object: case, exit_code, lifted_m, held, log. The cases, all by default, are the shipped
-objects and `second_try`: a can whose first two grasps are bad. One cannot be lifted while it holds the can, and
+line it prints is a JSON object: case, exit_code, lifted_m, held, log. The cases, all by default, are the objects of the
+standard set and `second_try`: a can whose first two grasps are bad. One cannot be lifted while it holds the can, and
 with the other the fingers touch the can before they close.
 """
 
