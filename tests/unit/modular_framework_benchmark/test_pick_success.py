@@ -48,10 +48,10 @@ def poses(episodes: list[EpisodeSpec]) -> list[tuple[float, ...]]:
 def test_every_object_is_picked_equally_often_each_time_at_another_pose(
     chosen: Callable[..., list[EpisodeSpec]], rounds: int
 ) -> None:
-    episodes = chosen(episodes=8 * rounds)
+    episodes = chosen(episodes=10 * rounds)
     models = Counter(one.settings["objects"][0]["model"] for one in episodes)
-    assert len(models) == 8 and set(models.values()) == {rounds}
-    assert len(set(poses(episodes))) == 8 * rounds
+    assert len(models) == 10 and set(models.values()) == {rounds}
+    assert len(set(poses(episodes))) == 10 * rounds
 
 
 def test_the_seed_decides_the_poses(chosen: Callable[..., list[EpisodeSpec]]) -> None:
