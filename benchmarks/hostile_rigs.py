@@ -34,8 +34,8 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
+from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
 
 PERIOD_S = 0.008
 READY_S = 60.0
@@ -209,7 +209,7 @@ class PyBulletRig(Rig):
         description = read_robot(urdf, packages.get_path, parts, False)
         body = RobotBody(self._world, description, "robot", Pose(), dict(zip(JOINT_NAMES, START, strict=True)))
         super().__init__(
-            "pybullet", PyBulletRobotHW(body), {**_parameters({}, "position"), "robot_description": urdf}, 0.04
+            "pybullet", SimulatedRobotHW(body), {**_parameters({}, "position"), "robot_description": urdf}, 0.04
         )
 
     def _next_cycle(self) -> float:

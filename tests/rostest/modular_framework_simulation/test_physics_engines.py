@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,22 +20,9 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_ros.action_client import SteadyActionClient
 
-LAUNCH = """<launch>
-  <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>
-  <include file="$(find modular_framework_simulation)/launch/simulation.launch">
-    <arg name="physics_engine" value="mujoco"/>
-    <arg name="world_file" value="$(find modular_framework_description)/worlds/ur5_setup.world"/>
-    <arg name="model_path" value="$(find modular_framework_description)/models"/>
-    <arg name="starting_pose" value="-J shoulder_pan_joint 1.57 -J shoulder_lift_joint -1.57 -J elbow_joint 1.57
-      -J wrist_1_joint -1.57 -J wrist_2_joint -1.57"/>
-  </include>
-  <node name="spawner" pkg="modular_framework_core" type="robot_controllers_spawner"
-        args="ur5_ezgripper_robot ur5_ezgripper_controller_simulation.yaml"/>
-</launch>"""
-ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
-BALL = """<sdf version="1.6"><model name="ball"><link name="link"><inertial><mass>0.1</mass><inertia><ixx>4e-5</ixx>
-  <iyy>4e-5</iyy><izz>4e-5</izz></inertia></inertial><collision name="c"><geometry><sphere><radius>0.03</radius>
-  </sphere></geometry></collision></link></model></sdf>"""
+sys.path.insert(0, str(Path(__file__).parent))
+from simulated_ur5 import ARM, BALL, LAUNCH  # noqa: E402
+
 UNKNOWN = """<launch><include file="$(find gazebo_ros)/launch/empty_world.launch">
   <arg name="physics_engine" value="ode"/><arg name="server_required" value="true"/><arg name="gui" value="false"/>
 </include></launch>"""
@@ -41,7 +30,7 @@ UNKNOWN = """<launch><include file="$(find gazebo_ros)/launch/empty_world.launch
 
 @pytest.fixture(scope="module")
 def simulation(ros_session: Any) -> Iterator[Any]:
-    launch = ros_session.launch(LAUNCH)
+    launch = ros_session.launch(LAUNCH, physics_engine="mujoco")
     ros_session.wait_for_service("/gazebo/spawn_sdf_model", 60.0)
     yield launch
     launch.stop()

@@ -42,24 +42,9 @@ from modular_framework_ros.action_client import SteadyActionClient
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fake_planning_scene import FakePlanningScene  # noqa: E402
+from simulated_ur5 import ARM, BALL, LAUNCH  # noqa: E402
 
-LAUNCH = """<launch>
-  <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>
-  <include file="$(find modular_framework_simulation)/launch/simulation.launch">
-    <arg name="world_file" value="$(find modular_framework_description)/worlds/ur5_setup.world"/>
-    <arg name="model_path" value="$(find modular_framework_description)/models"/>
-    <arg name="starting_pose" value="-J shoulder_pan_joint 1.57 -J shoulder_lift_joint -1.57 -J elbow_joint 1.57
-      -J wrist_1_joint -1.57 -J wrist_2_joint -1.57"/>
-  </include>
-  <node name="spawner" pkg="modular_framework_core" type="robot_controllers_spawner"
-        args="ur5_ezgripper_robot ur5_ezgripper_controller_simulation.yaml"/>
-</launch>"""
-
-ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
 START = [1.57, -1.57, 1.57, -1.57, -1.57, 0.0]
-BALL = """<sdf version="1.6"><model name="ball"><link name="link"><inertial><mass>0.1</mass><inertia><ixx>4e-5</ixx>
-  <iyy>4e-5</iyy><izz>4e-5</izz></inertia></inertial><collision name="c"><geometry><sphere><radius>0.03</radius>
-  </sphere></geometry></collision></link></model></sdf>"""
 
 BOMB = (
     "<?xml version='1.0'?>\n<!DOCTYPE sdf [<!ENTITY e0 'boom'>"

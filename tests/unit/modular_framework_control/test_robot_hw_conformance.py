@@ -23,8 +23,8 @@ from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_resources import no_packages
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
+from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
 
 URDF = """<robot name="r">
 <joint name="shoulder" type="revolute"><limit lower="-1" upper="1" velocity="2" effort="10"/></joint>
@@ -84,13 +84,13 @@ class TestPyBullet(RobotHWConformance):
         yield
         self._world.close()
 
-    def make_robot_hw(self) -> PyBulletRobotHW:
+    def make_robot_hw(self) -> SimulatedRobotHW:
         joints = (("lift", "prismatic"), ("turn", "revolute"))
         links = "".join(LINK.format(name=name, kind=kind) for name, kind in joints)
         body = RobotBody(
             self._world, read_robot(ROBOT.format(links=links), no_packages, self._parts, False), "lab", Pose(), {}
         )
-        robot_hw = PyBulletRobotHW(body)
+        robot_hw = SimulatedRobotHW(body)
         assert robot_hw.init(MappingNodeHandle(), MappingNodeHandle())
         return robot_hw
 

@@ -136,12 +136,12 @@ def pipeline_request(model: RobotModel, goal: np.ndarray, time_s: float = 20.0) 
 def test_a_plan_and_a_failed_one_say_what_they_took_also_to_another_process(small: RobotModel) -> None:
     pipeline = PipelineSpec(settings=PipelineSettings(seed=3)).build(small, KinematicsPool(small))
     answer = pipeline.plan(pipeline_request(small, GOAL))
-    told = json.loads(json.dumps(answer.statistics.as_json()))
-    assert told["checks"]["search"]["asked"] > 0 and told["checks"]["shortening"]["states"] > 0
-    for counts in told["checks"].values():
+    report = json.loads(json.dumps(answer.statistics.as_json()))
+    assert report["checks"]["search"]["asked"] > 0 and report["checks"]["shortening"]["states"] > 0
+    for counts in report["checks"].values():
         assert counts["asked"] == counts["free_by_bounds"] + counts["touching_by_bounds"] + counts["undecided"]
-    assert told["summary"].split(" ")[0] == max(told["phases_s"], key=lambda name: told["phases_s"][name])
-    assert {told["refusals"]["first"], told["refusals"]["second"]} & {"wall0", "wall1"}
+    assert report["summary"].split(" ")[0] == max(report["phases_s"], key=lambda name: report["phases_s"][name])
+    assert {report["refusals"]["first"], report["refusals"]["second"]} & {"wall0", "wall1"}
     with pytest.raises(PlanningError) as failed:
         pipeline.plan(pipeline_request(small, np.array([2.0, 1.2, 5.0, 0.07])))
     assert failed.value.statistics is not None and failed.value.statistics.phases_s["setup"] > 0.0

@@ -22,8 +22,8 @@ from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
+from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
 
 ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
 START = dict(zip(ARM, (1.57, -1.57, 1.57, -1.57, -1.57, 0.0), strict=True))
@@ -44,7 +44,7 @@ class PickTrial:
         urdf = Path(packages.get_path("ur5_ezgripper_robot")) / "urdf" / "ur5_with_ezgripper.urdf.xacro"
         description = read_robot(expand(urdf, {}), packages.get_path, parts, False)
         self.robot = RobotBody(self.world, description, "robot", Pose(), START)
-        self.hardware = PyBulletRobotHW(self.robot)
+        self.hardware = SimulatedRobotHW(self.robot)
         assert self.hardware.init(MappingNodeHandle(), MappingNodeHandle())
         self.handles = {each.name: each for each in self.hardware.get(PositionJointInterface).handles}
         folder = Path(packages.get_path("modular_framework_description")) / "models"

@@ -32,8 +32,8 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_resources import no_packages
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody, Role
+from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
 
 Script = Callable[[float], None]
 
@@ -68,7 +68,7 @@ class Lifter:
         urdf = lift_robot_urdf(f"hardware_interface/{interface}")
         description = read_robot(urdf, no_packages, parts, False)
         self.robot = RobotBody(world, description, "lifter", Pose(), {"lift": 0.1})
-        self.hardware = PyBulletRobotHW(self.robot)
+        self.hardware = SimulatedRobotHW(self.robot)
         assert self.hardware.init(MappingNodeHandle(), MappingNodeHandle())
         self.commander = Commander()
         self.loop = SimulationLoop(world, Pacer(0.0), RequestQueue(), Actors(self.robot, self.hardware, self.commander))
@@ -281,7 +281,7 @@ def test_a_tag_of_simulated_hardware_says_how_joints_are_commanded_and_where_the
     urdf = with_ros2_control(f"<joint name='lift'><command_interface name='effort'/>{state}</joint>", plugin)
     description = read_robot(urdf, no_packages, convex_parts, False)
     robot = RobotBody(world, description, "r", Pose(), description.initial_positions)
-    hardware = PyBulletRobotHW(robot)
+    hardware = SimulatedRobotHW(robot)
     assert hardware.init(MappingNodeHandle(), MappingNodeHandle())
     commanded = {each: hardware.find(each) for each in (EffortJointInterface, PositionJointInterface)}
     found = {each for each, offered in commanded.items() if offered and "lift" in offered.names}
@@ -379,7 +379,7 @@ def test_each_gripper_of_a_robot_holds_an_object_of_its_own(world: PhysicsWorld,
     robot = RobotBody(world, description, "two", Pose(), {"lift_a": -0.235, "lift_b": -0.235})
     assert [(gripper.palm_link, len(gripper.fingers)) for gripper in robot.grippers] == [("palm_a", 2), ("palm_b", 2)]
     assert set(robot.grippers[1].links) == {"palm_b", "finger_1_b", "finger_2_b"}
-    hardware = PyBulletRobotHW(robot)
+    hardware = SimulatedRobotHW(robot)
     hardware.init(MappingNodeHandle(), MappingNodeHandle())
     loop = SimulationLoop(world, Pacer(0.0), RequestQueue(), Actors(robot, hardware, Commander()))
     commands = {each.name: each for each in hardware.get(PositionJointInterface).handles}
@@ -415,7 +415,7 @@ def test_a_robot_without_movable_joints_stands_in_the_world_and_carries_things(
     world: PhysicsWorld, convex_parts: ConvexParts, urdf: str
 ) -> None:
     robot = RobotBody(world, read_robot(urdf, no_packages, convex_parts, False), "stand", Pose(), {})
-    hardware = PyBulletRobotHW(robot)
+    hardware = SimulatedRobotHW(robot)
     assert hardware.init(MappingNodeHandle({"robot_description": urdf}), MappingNodeHandle())
     loop = SimulationLoop(world, Pacer(0.0), RequestQueue(), Actors(robot, hardware, Commander()))
     world.spawn(solid("cube", specs.Box((0.05, 0.05, 0.05)), Pose((0, 0, 0.6))))

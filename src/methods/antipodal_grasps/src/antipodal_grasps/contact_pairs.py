@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from antipodal_grasps.ray_casting import Crossing, lines_through
 from modular_framework_core.grasp_generation import solid_meshes
-from modular_framework_core.grasp_generation.contact_pair import ContactPair, cone_cosine, distinct_pairs
+from modular_framework_core.grasp_generation.contact_pair import ContactPair, PairRules, distinct_pairs
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
 Array = npt.NDArray[np.float64]
@@ -23,27 +23,16 @@ SAME_PLACE_M = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
-class PairSettings:
+class PairSettings(PairRules):
     """What counts as a pair of contacts, and how many are looked for.
 
     Attributes:
         surface_samples: Points of the surface from which lines are cast.
         lines_per_sample: Lines from each point: one along the normal, the others within the friction cone.
-        friction: Coefficient of friction between pad and object; its cone has the half angle atan(friction).
-        spacing_m: Pairs whose middles are nearer than this ...
-        spacing_rad: ... and whose axes differ by less than this [rad] count as one, of which the best is kept.
     """
 
     surface_samples: int = 300
     lines_per_sample: int = 3
-    friction: float = 0.3
-    spacing_m: float = 0.012
-    spacing_rad: float = math.radians(14.0)
-
-    @property
-    def cone_cosine(self) -> float:
-        """Cosine of the half angle of the friction cone."""
-        return cone_cosine(self.friction)
 
 
 def contact_pairs(
@@ -83,7 +72,7 @@ def contact_pairs(
                 ends = (origin + entry.distance * direction, origin + end.distance * direction)
                 found.append(ContactPair(*ends, alignment))
     found.sort(key=lambda pair: (-round(pair.alignment, ALIGNMENT_DIGITS), pair.distance_from(centroid)))
-    return distinct_pairs(found, settings.spacing_m, settings.spacing_rad)
+    return distinct_pairs(found, settings)
 
 
 def _samples(mesh: TriangleMesh, count: int, generator: np.random.Generator) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from modular_framework_core.grasp_generation.contact_pair import ContactPair, cone_cosine, distinct_pairs
+from modular_framework_core.grasp_generation.contact_pair import ContactPair, PairRules, distinct_pairs
 
 Array = npt.NDArray[np.float64]
 
@@ -18,27 +18,16 @@ NARROWEST_M = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class CloudPairSettings:
+class CloudPairSettings(PairRules):
     """What counts as a pair of contacts, and how many are looked for.
 
     Attributes:
         contact_samples: Contacts that are drawn; all pairs of them are looked at.
         max_pairs: Greatest number of pairs that are kept, the best aligned and most central ones.
-        friction: Coefficient of friction between pad and object; its cone has the half angle atan(friction).
-        spacing_m: Pairs whose middles are nearer than this ...
-        spacing_rad: ... and whose axes differ by less than this [rad] count as one, of which the best is kept.
     """
 
     contact_samples: int = 800
     max_pairs: int = 3000
-    friction: float = 0.3
-    spacing_m: float = 0.012
-    spacing_rad: float = math.radians(14.0)
-
-    @property
-    def cone_cosine(self) -> float:
-        """Cosine of the half angle of the friction cone."""
-        return cone_cosine(self.friction)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,4 +86,4 @@ def sample_pairs(
         ContactPair(points[one], points[other], float(alignment))
         for one, other, alignment in zip(first[best], second[best], alignments[best], strict=True)
     )
-    return FoundPairs(distinct_pairs(found, settings.spacing_m, settings.spacing_rad), narrowest)
+    return FoundPairs(distinct_pairs(found, settings), narrowest)

@@ -35,7 +35,7 @@ TOPIC_PARAMETERS = ("~point_cloud_topic", "pointcloud_topic_name")
 
 
 class PointCloudMethod(ParameterisedMethod):
-    """Antipodal grasps on a point cloud, which is taken for every object anew.
+    """Antipodal grasps on a point cloud, of which a new one is taken for every object.
 
     Parameters: those of :func:`read_cloud_settings`, read again for every object; ``~point_cloud_topic`` (empty: what
         ``pointcloud_topic_name`` says), ``~cloud_timeout`` [s], ``~robot_padding`` [m], ``origin_frame_name``,

@@ -49,24 +49,38 @@ class ContactPair:
         return float(np.linalg.norm(offset - self.axis * (offset @ self.axis)))
 
 
-def cone_cosine(friction: float) -> float:
-    """Returns the cosine of the half angle of the friction cone of a coefficient of friction."""
-    return 1.0 / math.hypot(1.0, friction)
+@dataclass(frozen=True, slots=True)
+class PairRules:
+    """Which contacts make a pair, and which pairs are nearly the same.
+
+    Attributes:
+        friction: Coefficient of friction between pad and object; its cone has the half angle atan(friction).
+        spacing_m: Pairs whose middles are nearer than this ...
+        spacing_rad: ... and whose axes differ by less than this [rad] count as one, of which the best is kept.
+    """
+
+    friction: float = 0.3
+    spacing_m: float = 0.012
+    spacing_rad: float = math.radians(14.0)
+
+    @property
+    def cone_cosine(self) -> float:
+        """Cosine of the half angle of the friction cone."""
+        return 1.0 / math.hypot(1.0, self.friction)
 
 
-def distinct_pairs(pairs: Iterable[ContactPair], spacing_m: float, spacing_rad: float) -> list[ContactPair]:
+def distinct_pairs(pairs: Iterable[ContactPair], rules: PairRules) -> list[ContactPair]:
     """Keeps the first of all pairs that are nearly the same.
 
     Args:
         pairs: The pairs, best first.
-        spacing_m: Pairs whose middles are nearer than this ...
-        spacing_rad: ... and whose axes differ by less than this [rad] count as the same.
+        rules: Which are nearly the same.
     """
     kept: list[ContactPair] = []
     middles, axes = np.zeros((0, 3)), np.zeros((0, 3))
-    least = math.cos(spacing_rad)
+    least = math.cos(rules.spacing_rad)
     for pair in pairs:
-        near = np.linalg.norm(middles - pair.middle, axis=1) < spacing_m
+        near = np.linalg.norm(middles - pair.middle, axis=1) < rules.spacing_m
         if not (near & (np.abs(axes @ pair.axis) > least)).any():
             kept.append(pair)
             middles, axes = np.vstack([middles, pair.middle]), np.vstack([axes, pair.axis])

@@ -42,8 +42,8 @@ from modular_framework_simulation.models.sdf_reader import STANDARD_GRAVITY, rea
 from modular_framework_simulation.models.sdf_resources import RESOURCE_PATH, Resources, folders_of, model_folders
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
+from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
 from modular_framework_simulation.sensors.robot_visuals import read_robot_visuals
 from modular_framework_simulation.sensors.sensor_reader import read_robot_sensors
 from modular_framework_simulation.sensors.visible_scene import SceneTracker
@@ -154,7 +154,7 @@ class SimulationNode:
         name = parameters.robot_name or description.name
         positions = description.initial_positions | parameters.starting_positions
         robot = RobotBody(self._world, description, name, Pose(), positions)
-        hardware = PyBulletRobotHW(robot)
+        hardware = SimulatedRobotHW(robot)
         handle = RosNodeHandle("/")
         hardware.init(handle, handle)
         self._controllers = RosControllerManager(hardware)

@@ -17,8 +17,8 @@ from modular_framework_simulation.loop.time_holds import TimeHolds
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.model_changes import set_joint_positions
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.pybullet_robot_hw import PyBulletRobotHW
 from modular_framework_simulation.physics.robot_body import RobotBody
+from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
 
 _PAUSED_TICK_S = 0.05
 _HELD_TICK_S = 0.004
@@ -59,7 +59,7 @@ class Actors:
     """The robot in the world and what drives it; a world without a robot has none."""
 
     robot: RobotBody
-    hardware: PyBulletRobotHW
+    hardware: SimulatedRobotHW
     controllers: Controllers
 
 

@@ -459,7 +459,7 @@ class PhysicsWorld:
         """Continues from a saved state, bit for bit as before.
 
         Raises:
-            SimulationError: Models came, went or were made anew since.
+            SimulationError: Models came, went or were made again since.
         """
         if state.numbers != self._numbers():
             raise SimulationError("the models have changed since the state was saved; restore it before they do")

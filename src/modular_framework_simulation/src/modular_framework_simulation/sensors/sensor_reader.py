@@ -132,7 +132,7 @@ def _read(parts: ModelParts, elements: Iterable[SensorElement], seed: int) -> Se
 
 
 def _kind(node: XmlNode, fault: str) -> str:
-    """Returns what a fault is told by: models that are spawned many times have it once."""
+    """Returns what identifies a fault: models that are spawned many times have it once."""
     return fault if node.tag == "plugin" else f"{node.attributes.get('name', '')}: {fault}"
 
 

@@ -61,7 +61,7 @@ class RealTimeFactor:
         self._seen: deque[tuple[float, int]] = deque()
 
     def note(self, now_s: float, time_ns: int) -> None:
-        """Takes simulated time [ns] at an instant of real time [s]; time that goes back starts anew."""
+        """Takes simulated time [ns] at an instant of real time [s]; time that goes back starts again."""
         if self._seen and time_ns < self._seen[-1][1]:
             self._seen.clear()
         self._seen.append((now_s, time_ns))

@@ -40,7 +40,7 @@ _ROUNDING = 1.0 + 1e-6
 _MODES = {interface.type_name: mode for mode, interface in _INTERFACES.items()}
 
 
-class PyBulletRobotHW(RobotHW):
+class SimulatedRobotHW(RobotHW):
     """Joint states and commands of a robot in the simulated world.
 
     A joint obeys the interface its running controller claimed; before any controller did, it holds its position.
