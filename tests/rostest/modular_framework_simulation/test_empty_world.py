@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import functools
+import time
 from typing import Any
 
 import pytest
@@ -22,7 +23,7 @@ PUBLIC_ARGUMENTS = {
     "output", "world_name", "respawn_gazebo", "use_clock_frequency", "pub_clock_frequency", "enable_ros_network",
     "server_required", "gui_required",
 }  # fmt: skip
-STEPS = """<launch><arg name="time_step"/>
+STEPS = """<launch><arg name="time_step"/><arg name="real_time_factor" default="1.0"/>
   <include file="$(find modular_framework_simulation)/launch/simulation.launch" pass_all_args="true"/></launch>"""
 LAUNCH = """<launch><include file="$(find gazebo_ros)/launch/empty_world.launch">{}</include></launch>"""
 
@@ -120,6 +121,21 @@ def test_the_time_step_is_chosen_and_a_wrong_one_is_refused(ros_session: Any) ->
     launch = ros_session.launch(STEPS, time_step=1)
     launch.wait(60.0)
     assert "parameter ~time_step: got 1 s; allowed: 0.0001 to 0.01 s" in launch.log()
+
+
+def test_faster_than_real_time_the_clock_is_published_at_most_250_times_a_second(ros_session: Any) -> None:
+    launch = ros_session.launch(STEPS, time_step=0.01, real_time_factor=0)
+    until(lambda: rospy.wait_for_message("/clock", Clock, 40.0).clock.to_sec() > 1.0, "simulated time")
+    stamps: list[float] = []
+    begun_s = time.monotonic()
+    subscriber = rospy.Subscriber("/clock", Clock, lambda message: stamps.append(message.clock.to_sec()))
+    time.sleep(2.0)
+    subscriber.unregister()
+    count, passed_s = len(stamps), time.monotonic() - begun_s
+    assert stamps == sorted(stamps)
+    assert stamps[-1] - stamps[0] > 4.0 * passed_s, "the simulation was not faster than real time"
+    assert 10 < count < 250 * passed_s + 20
+    launch.stop()
 
 
 def test_a_required_window_that_cannot_be_is_an_error(ros_session: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,6 @@ from modular_framework_control.ros.ros_controller_manager import RosControllerMa
 from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_simulation.errors import SimulationError
-from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.gazebo_ros.camera_process import CameraProcess, configured_cameras
 from modular_framework_simulation.gazebo_ros.gazebo_services import GazeboServices
 from modular_framework_simulation.gazebo_ros.parameters import SimulationParameters, read_parameters
@@ -26,7 +25,7 @@ from modular_framework_simulation.gazebo_ros.sensor_topics import SensorTopics, 
 from modular_framework_simulation.gazebo_ros.time_services import TimeServices
 from modular_framework_simulation.gazebo_ros.visible_scene_topics import VisibleSceneTopics
 from modular_framework_simulation.gazebo_ros.world_files import find_world_file
-from modular_framework_simulation.gazebo_ros.world_topics import ClockTopic, WorldTopics
+from modular_framework_simulation.gazebo_ros.world_topics import ClockTopic, WorldTopics, init_node
 from modular_framework_simulation.loop.pacing import Pacer
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.simulation_loop import Actors, Hook, SimulationLoop
@@ -175,7 +174,9 @@ class SimulationNode:
         def every(rate_hz: float) -> int:
             return round(1e9 / rate_hz) if rate_hz else 0
 
-        self._loop.add_hook(Hook(every(clock_rate_hz), self._clock.publish))
+        self._loop.add_hook(
+            Hook(every(clock_rate_hz), self._clock.publish_within_limit if clock_rate_hz else self._clock.publish)
+        )
         if self._topics is not None:
             self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_models))
             self._loop.add_hook(Hook(every(_STATES_RATE_HZ), self._topics.publish_links))
@@ -283,7 +284,7 @@ def main() -> int:
     Returns:
         Exit code: 0 after an ordinary shutdown, 1 when the world could not be built or the loop failed.
     """
-    rospy.init_node(ros_names.NODE)
+    init_node()
     try:
         parameters = read_parameters()
         if parameters.verbose:

@@ -19,6 +19,11 @@ from modular_framework_simulation.physics.simulated_body import BodyState
 
 _QUEUE_SIZE = 50
 """Messages that wait for a subscriber: time that runs faster than real time sends them in bursts."""
+_CLOCK_LIMIT_HZ = 250.0
+"""Most messages of /clock in a second of real time: each one wakes every node, which at 10 times real time took more
+than a processor."""
+_CLOCK_BURST = 5.0
+"""Messages of /clock that may follow each other at once: the loop makes steps in groups, and catches up."""
 
 
 def stamp_of(world: PhysicsWorld) -> rospy.Time:
@@ -26,8 +31,15 @@ def stamp_of(world: PhysicsWorld) -> rospy.Time:
     return rospy.Time(*divmod(world.time_ns, 1_000_000_000))
 
 
+def init_node() -> None:
+    """Makes this process the simulation's node, which sets its own time and does not subscribe to /clock."""
+    rospy.init_node(ros_names.NODE, disable_rostime=True)
+    if rospy.get_param("/use_sim_time", False):
+        rospy.rostime._set_rostime(rospy.Time())
+
+
 class ClockTopic:
-    """Publishes /clock (rosgraph_msgs/Clock); used by the loop's thread.
+    """Publishes /clock (rosgraph_msgs/Clock) and sets rospy's time in this node; used by the loop's thread.
 
     Args:
         world: Whose time is published.
@@ -36,10 +48,24 @@ class ClockTopic:
     def __init__(self, world: PhysicsWorld) -> None:
         self._world = world
         self._clock = rospy.Publisher(ros_names.CLOCK, Clock, queue_size=10, tcp_nodelay=True)
+        self._credit = _CLOCK_BURST
+        self._credited_s = time.monotonic()
 
     def publish(self) -> None:
         """Publishes simulated time."""
-        self._clock.publish(Clock(stamp_of(self._world)))
+        stamp = stamp_of(self._world)
+        if not rospy.rostime.is_wallclock():
+            rospy.rostime._set_rostime(stamp)
+        self._clock.publish(Clock(stamp))
+
+    def publish_within_limit(self) -> None:
+        """Publishes simulated time, at most 250 times in a second of real time."""
+        now_s = time.monotonic()
+        self._credit = min(self._credit + (now_s - self._credited_s) * _CLOCK_LIMIT_HZ, _CLOCK_BURST)
+        self._credited_s = now_s
+        if self._credit >= 1.0:
+            self._credit -= 1.0
+            self.publish()
 
 
 class WorldTopics:
