@@ -38,8 +38,11 @@ def make_world(convex_parts: ConvexParts, engine: str) -> Iterator[Callable[...,
     """Makes worlds with a floor at z = 0 and takes them down at the end."""
     worlds: list[PhysicsWorld] = []
 
-    def make(time_step_ns: int = 2_000_000, gravity: Vector3 = (0.0, 0.0, -9.81)) -> PhysicsWorld:
-        world = PhysicsWorld(PhysicsSettings(time_step_ns), convex_parts, gravity, engine=engine)
+    def make(
+        time_step_ns: int = 2_000_000, gravity: Vector3 = (0.0, 0.0, -9.81), rest_speed: float = 0.003
+    ) -> PhysicsWorld:
+        settings = PhysicsSettings(time_step_ns, rest_speed=rest_speed)
+        world = PhysicsWorld(settings, convex_parts, gravity, engine=engine)
         world.spawn(solid("floor", specs.Plane((0, 0, 1), (10, 10)), Pose(), static=True))
         worlds.append(world)
         return world

@@ -113,7 +113,7 @@ def test_models_that_come_and_go_leave_the_motion_of_others_alone(make_world: Ma
 
 def busy_world(make_world: MakeWorld) -> PhysicsWorld:
     """Boxes that fall on each other, and a pendulum."""
-    world = make_world()
+    world = make_world(rest_speed=0.0)
     for number in range(4):
         world.spawn(
             solid(f"box_{number}", CUBE, Pose.from_xyz_rpy((0.01 * number, 0, 0.1 + 0.07 * number), (0.3, 0.2, 0)))

@@ -162,7 +162,7 @@ def set_joint_positions(world: PhysicsWorld, model: str, positions: dict[str, fl
         found = measured_joint(world.engine, body, name).position
         if not abs(found - position) <= _ROUNDING + _SAME * abs(position):
             raise ModelChangeError(f"joint '{model}::{name}' was put at {position:g} and is at {found:g}")
-    world.revision += 1
+    world.note_change()
 
 
 def _unit(joint: JointMeasurement) -> str:

@@ -135,6 +135,9 @@ class MujocoEngine(PhysicsEngine):
         tree = read_tree(text, name, fixed, self._log)
         number = self._last_number + 1
         every = range(BASE_INDEX, len(tree.links) - 1)
+    def wake(self) -> None:
+        """Does nothing: every body is computed in every step."""
+
         touching = frozenset(frozenset((a, b)) for a in every for b in every if a < b and self_collision)
         try:
             self._compile(self._bodies | {number: _Body(tree, tree.links[0].mass.centre_in_link, touching)})

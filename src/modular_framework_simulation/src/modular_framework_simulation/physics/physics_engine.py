@@ -186,8 +186,16 @@ class PhysicsEngine(ABC):
         """Advances the physics by one time step; forces and efforts that were applied end with it."""
 
     @abstractmethod
+    def wake(self) -> None:
+        """Computes the motion of bodies at rest again: something has changed that they would not feel."""
+
+    @abstractmethod
     def save_state(self) -> Any:
-        """Returns the state of motion of everything, for `restore_state` while the same bodies are there."""
+        """Returns the state of motion of everything, for `restore_state` while the same bodies are there.
+
+        Raises:
+            SimulationError: The engine leaves bodies at rest out (`rest_speed`), which is no part of its state.
+        """
 
     @abstractmethod
     def restore_state(self, state: Any) -> None:

@@ -178,6 +178,11 @@ class PhysicsWorld:
         """All models by name, in order of appearance; a view."""
         return MappingProxyType(self._bodies)
 
+    def note_change(self) -> None:
+        """Says that a request has changed something in the world."""
+        self.revision += 1
+        self.engine.wake()
+
     def carry(self, robot: SimulatedBody, held: Sequence[tuple[str, str]]) -> None:
         """Sets which models move with a hand from now on: those that are held.
 
@@ -270,7 +275,7 @@ class PhysicsWorld:
         self._remove(old)
         self._bodies[model.name] = body
         self._names_by_number.update({part.number: model.name for part in body.parts})
-        self.revision += 1
+        self.note_change()
 
     def _remove(self, body: SimulatedBody) -> None:
         for part in body.parts:
@@ -289,7 +294,7 @@ class PhysicsWorld:
         self._instances[body.name] = self._last_instance
         self._names_by_number.update({part.number: body.name for part in body.parts})
         self._initial_poses[body.name] = pose_in_world
-        self.revision += 1
+        self.note_change()
 
     def delete(self, name: str) -> None:
         """Removes a model.
@@ -301,7 +306,7 @@ class PhysicsWorld:
         self._remove(body)
         del self._bodies[name], self._initial_poses[name], self._instances[name]
         self.forces.forget_model(name)
-        self.revision += 1
+        self.note_change()
 
     def entity_state(self, entity: str) -> BodyState:
         """Returns where a model or a link ("model::link") is in the world and how it moves.
@@ -352,7 +357,7 @@ class PhysicsWorld:
         """
         body = self.body(name)
         body.set_state(self.state_in_world(state, reference))
-        self.revision += 1
+        self.note_change()
 
     def state_in_world(self, state: BodyState, reference: str) -> BodyState:
         """Returns a state as seen from a reference as one in the world.
@@ -420,7 +425,7 @@ class PhysicsWorld:
             if body.spec is not None:
                 body.reset_joints({})
                 body.put_together(self._initial_poses[name])
-        self.revision += 1
+        self.note_change()
 
     def instance(self, name: str) -> int:
         """Returns a number that no other model has or had, also after a restart.
@@ -445,7 +450,7 @@ class PhysicsWorld:
         for model, prepared in self._initial:
             self.spawn(model, prepared)
         self.reset_time()
-        self.revision += 1
+        self.note_change()
 
     def save_state(self) -> WorldState:
         """Returns the motion of everything, time and forces of requests, to continue from there once or more often.
@@ -466,7 +471,7 @@ class PhysicsWorld:
         self.engine.restore_state(state.engine)
         self._steps, self._time_ns = state.steps, state.time_ns
         self.forces.restore(state.forces)
-        self.revision += 1
+        self.note_change()
 
     def forget_state(self, state: WorldState) -> None:
         """Frees a saved state, which cannot be restored any more."""

@@ -36,6 +36,7 @@ from modular_framework_simulation.physics.physics_engine import (
     refuse_long_names,
 )
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
+from modular_framework_simulation.physics.pybullet_rest import Rest
 from modular_framework_simulation.physics.simulated_body import add, cross
 from modular_framework_simulation.physics.surfaces import softness_of
 from modular_framework_urdf.rotations import Quaternion, Vector3, rotate_vector
@@ -93,6 +94,7 @@ class PyBulletEngine(PhysicsEngine):
         self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
         self._files_written = 0
         self._configure(gravity)
+        self._rest = Rest(self.api, self.client, settings)
 
     def _open_window(self, log: Log) -> None:
         if not os.environ.get("DISPLAY"):
@@ -141,6 +143,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def engine_coefficient(self, coefficient: float) -> float:
         """Returns what to give a surface of the engine for a coefficient of friction or restitution."""
+        self._rest.adjust(settings)
         return coefficient if self._smaller_counts else math.sqrt(coefficient)
 
     def restart(self, gravity: Vector3) -> None:
@@ -153,6 +156,7 @@ class PyBulletEngine(PhysicsEngine):
         self._configure(gravity)
 
     def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
+        self._rest = Rest(self.api, self.client, self.settings)
         """Loads a body; see `PhysicsEngine`."""
         flags = self.api.URDF_USE_SELF_COLLISION if self_collision else 0
         refuse_long_names(text, f"model '{name[:SHOWN_CHARACTERS]}'")
@@ -176,6 +180,8 @@ class PyBulletEngine(PhysicsEngine):
         return body
 
     def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
+        has_joints = any(info[2] != self.api.JOINT_FIXED for info in self.joint_infos(body))
+        self._rest.add(body, fixed, has_joints)
         """Returns the engine's record of every joint of a body, in the order of the link numbers."""
         count = self.api.getNumJoints(body, physicsClientId=self.client)
         return [self.api.getJointInfo(body, index, physicsClientId=self.client) for index in range(count)]
@@ -186,6 +192,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def close(self) -> None:
         """Ends the connection; may be called twice."""
+        self._rest.after_step()
         if self.client >= 0:
             with contextlib.suppress(self.api.error):
                 self.api.disconnect(physicsClientId=self.client)
@@ -193,8 +200,20 @@ class PyBulletEngine(PhysicsEngine):
             self._urdf_folder.cleanup()
 
     def save_state(self) -> int:
-        """Saves the state in the memory of the engine, contacts and their caches too."""
+        """Saves the state in the memory of the engine, contacts and their caches too.
+
+        Raises:
+            SimulationError: Bodies may be at rest.
+        """
+        if self.settings.rest_speed > 0.0:
+            raise SimulationError(
+                "the state of a world whose bodies rest cannot be saved bit for bit; make it with rest_speed 0"
+            )
         state: int = self.api.saveState(physicsClientId=self.client)
+    def wake(self) -> None:
+        """Computes the motion of bodies at rest again."""
+        self._rest.wake_all()
+
         return state
 
     def restore_state(self, state: int) -> None:
@@ -210,6 +229,7 @@ class PyBulletEngine(PhysicsEngine):
         self.api.removeBody(number, physicsClientId=self.client)
 
     def root_link(self, number: int) -> str:
+        self._rest.remove(number)
         """Returns the name of the root link."""
         name: str = self.api.getBodyInfo(number, physicsClientId=self.client)[0].decode()
         return name
@@ -301,8 +321,13 @@ class PyBulletEngine(PhysicsEngine):
         self.api.resetBasePositionAndOrientation(number, pose.position, pose.quaternion, physicsClientId=self.client)
 
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
+        self._rest.wake_at_rest(number)
         """Sets the velocity of the root link's centre."""
-        self.api.resetBaseVelocity(number, linear, angular, physicsClientId=self.client)
+
+        def give() -> None:
+            self.api.resetBaseVelocity(number, linear, angular, physicsClientId=self.client)
+
+        self._rest.disturb(number, give)
 
     def link_motion(self, number: int, index: int) -> LinkMotion:
         """Returns where a link is and how it moves."""
@@ -311,7 +336,11 @@ class PyBulletEngine(PhysicsEngine):
 
     def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
         """Lets a force act at a point of a link."""
-        self.api.applyExternalForce(number, index, force, point, self.api.WORLD_FRAME, physicsClientId=self.client)
+
+        def push() -> None:
+            self.api.applyExternalForce(number, index, force, point, self.api.WORLD_FRAME, physicsClientId=self.client)
+
+        self._rest.disturb(number, push)
 
     def touches(self, number: int, index: int) -> list[Touch]:
         """Returns where a link touches others."""

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Bodies that an engine leaves out while they lie still move again when they would have moved anyway."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from simulated_samples import run, solid
+
+from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.physics.applied_forces import Interval, LinkWrench
+from modular_framework_simulation.physics.engine_choice import ENGINES, PYBULLET
+from modular_framework_simulation.physics.part_names import PartName
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
+from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+
+GRAVITY = 9.81
+CUBE = specs.Box((0.05, 0.05, 0.05))
+LONG_S = 4.0
+TRAY = """<robot name="tray"><link name="world"/>
+  <link name="plate"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+    </inertial><collision><geometry><box size="0.2 0.2 0.02"/></geometry></collision></link>
+  <joint name="lift" type="prismatic"><parent link="world"/><child link="plate"/><origin xyz="0 0 0.5"/>
+    <axis xyz="0 0 1"/><limit lower="-0.45" upper="0.5" effort="500" velocity="1"/></joint>
+  <transmission name="t"><type>transmission_interface/SimpleTransmission</type>
+    <joint name="lift"><hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint>
+    <actuator name="a"/></transmission></robot>"""
+TOP = Pose((0, 0, 0.575))
+
+MakeWorld = Callable[..., PhysicsWorld]
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    """Every engine."""
+    name: str = request.param
+    return name
+
+
+@pytest.fixture
+def table(world: PhysicsWorld, engine: str) -> PhysicsWorld:
+    """A world with a cube of 0.2 kg at rest on a table."""
+    world.spawn(solid("table", specs.Box((1, 1, 0.1)), Pose((0, 0, 0.5)), static=True))
+    world.spawn(solid("cube", CUBE, TOP))
+    run(world, LONG_S)
+    if engine == PYBULLET:
+        assert world.entity_state("cube").twist == Twist()
+    return world
+
+
+def height(world: PhysicsWorld, name: str = "cube") -> float:
+    return world.entity_state(name).pose.position[2]
+
+
+def test_contact_forces_of_a_body_at_rest_are_its_weight(table: PhysicsWorld) -> None:
+    assert sum(each.force for each in table.contacts(table.body("cube"), BASE_INDEX)) == pytest.approx(
+        0.2 * GRAVITY, rel=0.01
+    )
+
+
+def test_what_lay_on_a_model_falls_when_that_is_deleted(table: PhysicsWorld) -> None:
+    table.delete("table")
+    run(table, 1.0)
+    assert height(table) == pytest.approx(0.025, abs=0.002)
+
+
+def test_what_lay_on_a_model_falls_when_that_is_moved(table: PhysicsWorld) -> None:
+    table.set_state("table", BodyState(Pose((3, 0, 0.5)), Twist()))
+    run(table, 1.0)
+    assert height(table) == pytest.approx(0.025, abs=0.002)
+
+
+def test_what_lay_on_a_box_falls_when_that_is_moved(table: PhysicsWorld) -> None:
+    table.spawn(solid("upper", CUBE, Pose((0, 0, 0.6251))))
+    run(table, LONG_S)
+    table.set_state("cube", BodyState(Pose((3, 0, 0.025)), Twist()))
+    run(table, 0.5)
+    assert height(table, "upper") == pytest.approx(0.575, abs=0.001)
+
+
+def test_a_body_at_rest_that_is_set_in_motion_moves(make_world: MakeWorld) -> None:
+    space = make_world(gravity=(0.0, 0.0, 0.0))
+    space.spawn(solid("cube", CUBE, Pose((0, 0, 1))))
+    run(space, LONG_S)
+    space.set_state("cube", BodyState(Pose((0, 0, 1)), Twist((1.0, 0, 0), (0, 0, 2.0))))
+    run(space, 0.5)
+    state = space.entity_state("cube")
+    assert state.pose.position[0] == pytest.approx(0.5, abs=0.003)
+    assert state.twist.linear == pytest.approx((1.0, 0, 0), abs=1e-6)
+    assert state.twist.angular == pytest.approx((0, 0, 2.0), abs=1e-6)
+
+
+def test_a_body_at_rest_that_is_hit_takes_up_the_momentum(make_world: MakeWorld) -> None:
+    space = make_world(gravity=(0.0, 0.0, 0.0))
+    space.spawn(solid("cube", CUBE, Pose((0, 0, 1)), mass=0.2))
+    run(space, LONG_S)
+    space.spawn(solid("other", CUBE, Pose((-0.2, 0, 1)), mass=0.4))
+    run(space, LONG_S)
+    space.set_state("other", BodyState(Pose((-0.2, 0, 1)), Twist((0.5, 0, 0), (0, 0, 0))))
+    run(space, 1.0)
+    momentum = sum(mass * space.entity_state(name).twist.linear[0] for name, mass in (("cube", 0.2), ("other", 0.4)))
+    assert space.entity_state("cube").twist.linear[0] > 0.3
+    assert momentum == pytest.approx(0.2, rel=1e-3)
+
+
+def test_a_force_on_a_body_at_rest_accelerates_it(make_world: MakeWorld) -> None:
+    space = make_world(gravity=(0.0, 0.0, 0.0))
+    space.spawn(solid("cube", CUBE, Pose((0, 0, 1)), mass=0.2))
+    run(space, LONG_S)
+    interval = Interval(space.time_ns, space.time_ns + 500_000_000)
+    space.forces.add_wrench(LinkWrench(PartName("cube", "link"), (0.1, 0, 0), (0, 0, 0), interval))
+    run(space, 1.0)
+    assert space.entity_state("cube").twist.linear[0] == pytest.approx(0.1 * 0.5 / 0.2, rel=1e-3)
+
+
+def test_a_body_at_rest_feels_another_gravity(table: PhysicsWorld) -> None:
+    table.set_physics(table.settings, (0.0, 0.0, 2.0))
+    run(table, 0.5)
+    assert height(table) > 0.575 + 0.5 * 2.0 * 0.45**2
+
+
+def test_a_slow_slip_that_begins_is_not_stopped(make_world: MakeWorld) -> None:
+    tilted = make_world(gravity=(0.82 * GRAVITY, 0.0, -GRAVITY))  # friction 0.8: 0.2 m/s^2 are left
+    tilted.spawn(solid("cube", CUBE, Pose((0, 0, 0.025))))
+    run(tilted, LONG_S)
+    assert tilted.entity_state("cube").twist.linear[0] > 0.3
+
+
+def test_what_a_robot_carried_falls_when_the_robot_is_gone_at_once(
+    make_world: MakeWorld, convex_parts: ConvexParts
+) -> None:
+    world = make_world()
+    tray = RobotBody(world, read_robot(TRAY, str, convex_parts, False), "tray", Pose(), {})
+    world.spawn(solid("cube", CUBE, Pose((0, 0, 0.5351))))
+
+    def stand(lift_m: float, seconds: float) -> None:
+        for _ in range(round(seconds / world.settings.time_step_s)):
+            tray.read()
+            tray.drive({"lift": Drive(Mode.POSITION, lift_m, 0.0, 500.0)})
+            world.step()
+
+    stand(0.0, LONG_S)
+    assert height(world) == pytest.approx(0.535, abs=0.001)
+    tray.body.set_joints({"lift": -0.4})
+    stand(-0.4, 0.2)
+    assert height(world) == pytest.approx(0.535 - 0.5 * GRAVITY * 0.2**2, abs=0.01)
+
+
+def test_the_state_of_a_world_with_bodies_at_rest_is_not_saved(table: PhysicsWorld, engine: str) -> None:
+    if engine == PYBULLET:
+        with pytest.raises(SimulationError, match="make it with rest_speed 0"):
+            table.save_state()
+    else:
+        table.save_state()
