@@ -37,6 +37,7 @@ class SimulationParameters:
         verbose: `~verbose`: whether to log details too (false).
         unsupported: `~unsupported`: arguments of a launch file that have no effect here, for a warning.
         physics_engine: `~physics_engine`: which engine moves the bodies [pybullet, mujoco] (pybullet).
+        weld_grasps: `~weld_grasps`: whether held objects are fastened to the hand; else friction holds them (false).
     """
 
     robot_description: str
@@ -56,6 +57,7 @@ class SimulationParameters:
     verbose: bool = False
     unsupported: str = ""
     physics_engine: str = PYBULLET
+    weld_grasps: bool = False
 
 
 def read_parameters() -> SimulationParameters:
@@ -93,6 +95,7 @@ def read_parameters() -> SimulationParameters:
         verbose=_read("~verbose", False, (bool,)),
         unsupported=_read("~unsupported", "", (str,)),
         physics_engine=_physics_engine(),
+        weld_grasps=_read("~weld_grasps", False, (bool,)),
     )
 
 

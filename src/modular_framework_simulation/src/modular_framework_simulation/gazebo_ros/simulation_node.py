@@ -134,7 +134,17 @@ class SimulationNode:
             if spec.ignored:
                 rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))
         engine = parameters.physics_engine
-        world = PhysicsWorld(self._settings, self._parts, spec.gravity, parameters.gui, rospy.logwarn, engine)
+        world = PhysicsWorld(
+            self._settings,
+            self._parts,
+            spec.gravity,
+            parameters.gui,
+            rospy.logwarn,
+            engine,
+            parameters.weld_grasps,
+        )
+        if parameters.weld_grasps:
+            rospy.logwarn("~weld_grasps is true: what a gripper holds is fastened to it, and cannot slip")
         if parameters.gui_required and not world.engine.has_window:
             raise SimulationError("~gui_required is true and there is no window; set it to false to run without one")
         for model in spec.models:
@@ -197,7 +207,8 @@ class SimulationNode:
             self._topics.publish_grasped(sorted({name for name in held if name is not None}))
         for was, now in zip(before, held, strict=True):
             if now != was:
-                rospy.loginfo("the gripper %s", f"holds '{now}'" if now else f"let go of '{was}'")
+                how = " by a weld" if self._world.weld_grasps else ""
+                rospy.loginfo("the gripper %s", f"holds '{now}'{how}" if now else f"let go of '{was}'")
         if held != before:
             self._show_snapshot()
 

@@ -286,6 +286,17 @@ class SpecWriter:
                 if frozenset((a, b)) not in touching:
                     self._spec.add_exclude(bodyname1=body_name(number, a), bodyname2=body_name(number, b))
 
+    def weld(self, number: int, index: int, other: int, other_in_link: Pose) -> None:
+        """Fastens the root link of a body to a link of another one; the pose is that of its centre in the link."""
+        anchor, torque_scale = (0.0, 0.0, 0.0), 1.0
+        self._spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_WELD,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            name1=body_name(number, index),
+            name2=body_name(other, -1),
+            data=(*anchor, *other_in_link.position, *wxyz(other_in_link.quaternion), torque_scale),
+        )
+
     def _add_link(
         self,
         above: mujoco.MjsBody,

@@ -32,6 +32,7 @@ SLIDING, SPINNING, ROLLING, BOUNCING, YIELDING, CORRECTION = range(6)
 stiffness [m/N], and the share of a penetration that is corrected in one step; 0 and 0 of one that is rigid."""
 
 _LIMIT, _MOTOR = int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT), int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
+_WELD = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
 _SINGLE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 """Joints with one degree of freedom."""
 
@@ -192,6 +193,8 @@ class MujocoDynamics:
             self._set_shares(shares)
         # What is apart may come as near as to touch; of what is inside each other, a share comes out.
         wanted = -np.where(data.efc_pos < 0.0, shares, 1.0) / step_s * data.efc_pos
+        welds = kinds == _WELD
+        wanted[welds] = -settings.hardest_erp / step_s * data.efc_pos[welds]
         motors = np.flatnonzero(kinds == _MOTOR)
         positions = np.zeros(self.model.nv)
         positions[self._single_dofs] = data.qpos[self._single_positions]

@@ -74,6 +74,16 @@ class _Body:
 
 
 @dataclass(frozen=True, slots=True)
+class _Weld:
+    """A link, by numbers of its body and its own, and the body that is fastened to it."""
+
+    number: int
+    index: int
+    other: int
+    other_in_link: Pose
+
+
+@dataclass(frozen=True, slots=True)
 class _State:
     """A saved state.
 
@@ -105,7 +115,8 @@ class MujocoEngine(PhysicsEngine):
             log("a window of the simulation was asked for; the physics engine mujoco has none here: running headless")
         self.settings, self._gravity, self._log = settings, gravity, log
         self._bodies: dict[int, _Body] = {}
-        self._last_number = -1
+        self._last_number = self._last_weld = -1
+        self._welds: dict[int, _Weld] = {}
         self._dynamics = MujocoDynamics(mujoco.MjSpec().compile(), settings, gravity)
         self._number_of = np.full(1, -1)
 
@@ -117,12 +128,15 @@ class MujocoEngine(PhysicsEngine):
     def restart(self, gravity: Vector3) -> None:
         """Takes everything out."""
         self._gravity = gravity
-        self._bodies = {}
+        self._bodies, self._welds = {}, {}
         self._compile(self._bodies)
 
     def step(self) -> None:
         """Advances the physics by one time step."""
         self._dynamics.step()
+
+    def wake(self) -> None:
+        """Does nothing: every body is computed in every step."""
 
     def close(self) -> None:
         """Does nothing: MuJoCo's memory is freed with this object."""
@@ -135,9 +149,6 @@ class MujocoEngine(PhysicsEngine):
         tree = read_tree(text, name, fixed, self._log)
         number = self._last_number + 1
         every = range(BASE_INDEX, len(tree.links) - 1)
-    def wake(self) -> None:
-        """Does nothing: every body is computed in every step."""
-
         touching = frozenset(frozenset((a, b)) for a in every for b in every if a < b and self_collision)
         try:
             self._compile(self._bodies | {number: _Body(tree, tree.links[0].mass.centre_in_link, touching)})
@@ -158,6 +169,8 @@ class MujocoEngine(PhysicsEngine):
         writer = SpecWriter(spec)
         for number, body in bodies.items():
             writer.add(number, body.tree, body.pose, body.touching)
+        for weld in self._welds.values():
+            writer.weld(weld.number, weld.index, weld.other, weld.other_in_link)
         before, now = self._dynamics, MujocoDynamics(spec.compile(), self.settings, self._gravity)
         now.measures_loads = before.measures_loads and bool(bodies)
         self._number_of = np.full(now.model.nbody, -1)
@@ -274,6 +287,21 @@ class MujocoEngine(PhysicsEngine):
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body, velocity, 0)
         wx, wy, wz, vx, vy, vz = velocity.tolist()
         return LinkMotion(centre, frame, (vx, vy, vz), (wx, wy, wz))
+
+    def weld(self, number: int, index: int, other: int) -> int:
+        """Fastens a body to a link."""
+        self._dynamics.locate()
+        data, link = self._dynamics.data, self._bodies[number].ids[index + 1]
+        other_in_link = _pose(data.xpos[link], data.xquat[link]).inverse() @ self.base_centre(other)
+        self._last_weld += 1
+        self._welds[self._last_weld] = _Weld(number, index, other, other_in_link)
+        self._compile(self._bodies)
+        return self._last_weld
+
+    def remove_weld(self, weld: int) -> None:
+        """Ends a weld."""
+        del self._welds[weld]
+        self._compile(self._bodies)
 
     def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
         """Lets a force act at a point of a link."""

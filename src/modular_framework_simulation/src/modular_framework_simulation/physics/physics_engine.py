@@ -299,6 +299,18 @@ class PhysicsEngine(ABC):
         """Returns where a link other than the root is and how it moves."""
 
     @abstractmethod
+    def weld(self, number: int, index: int, other: int) -> int:
+        """Fastens the root link of another body to a link, as both are now.
+
+        Returns:
+            The number of the weld.
+        """
+
+    @abstractmethod
+    def remove_weld(self, weld: int) -> None:
+        """Ends a weld; to be called before one of its bodies is taken out."""
+
+    @abstractmethod
     def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
         """Lets a force [N] act at a point of a link in the coming step, both in the world frame."""
 

@@ -20,7 +20,7 @@ from modular_framework_simulation.physics.body_forces import BodyForce, forces_o
 from modular_framework_simulation.physics.body_joints import apply_settings, copy_joint_motion
 from modular_framework_simulation.physics.body_links import centre_in_world, tree_with_link
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
-from modular_framework_simulation.physics.carried_object import CarriedObject
+from modular_framework_simulation.physics.carried_object import CarriedObject, WeldedObject
 from modular_framework_simulation.physics.engine_choice import PYBULLET, make_engine
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.part_names import SCOPE
@@ -77,6 +77,7 @@ class WorldState:
     Attributes:
         engine: What the engine saved.
         numbers: Its numbers of the bodies, by model.
+        welded: What is fastened to hands: model and link.
         steps: Physics steps until then.
         time_ns: Simulated time [ns].
         forces: Of requests.
@@ -84,6 +85,7 @@ class WorldState:
 
     engine: Any
     numbers: dict[str, tuple[int, ...]]
+    welded: tuple[tuple[str, str], ...]
     steps: int
     time_ns: int
     forces: SavedForces
@@ -99,6 +101,7 @@ class PhysicsWorld:
         gui: Whether to open a window, if there is a display.
         log: Takes lines of text about what was decided.
         engine: Name of the physics engine, see `engine_choice`.
+        weld_grasps: Whether objects that a gripper holds are fastened to it; else friction alone holds them.
 
     Raises:
         SimulationError: There is no such engine, or it cannot be used.
@@ -112,6 +115,7 @@ class PhysicsWorld:
         gui: bool = False,
         log: Log = print,
         engine: str = PYBULLET,
+        weld_grasps: bool = False,
     ) -> None:
         self.settings = settings
         self.gravity = gravity
@@ -128,7 +132,8 @@ class PhysicsWorld:
         self._last_instance = 0
         self._initial: list[tuple[specs.Model, BodyUrdf]] = []
         self._forces: dict[int, tuple[BodyForce, ...]] = {}
-        self._carried: dict[tuple[str, str], CarriedObject] = {}
+        self.weld_grasps = weld_grasps
+        self._carried: dict[tuple[str, str], CarriedObject | WeldedObject] = {}
         self._steps = self._time_ns = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
@@ -173,15 +178,15 @@ class PhysicsWorld:
                 for joint, values in body.joint_settings.items():
                     apply_settings(self.engine, body, joint, values)
 
-    @property
-    def bodies(self) -> Mapping[str, SimulatedBody]:
-        """All models by name, in order of appearance; a view."""
-        return MappingProxyType(self._bodies)
-
     def note_change(self) -> None:
         """Says that a request has changed something in the world."""
         self.revision += 1
         self.engine.wake()
+
+    @property
+    def bodies(self) -> Mapping[str, SimulatedBody]:
+        """All models by name, in order of appearance; a view."""
+        return MappingProxyType(self._bodies)
 
     def carry(self, robot: SimulatedBody, held: Sequence[tuple[str, str]]) -> None:
         """Sets which models move with a hand from now on: those that are held.
@@ -191,11 +196,18 @@ class PhysicsWorld:
             held: Model and the robot's link that carries it, of each.
         """
         if tuple(self._carried) != tuple(held):
+            self._let_go()
+            carry = WeldedObject if self.weld_grasps else CarriedObject
             self._carried = {
-                (name, link): CarriedObject(self.engine, self.body(name), robot, robot.link_indices[link])
+                (name, link): carry(self.engine, self.body(name), robot, robot.link_indices[link])
                 for name, link in held
-                if robot.link_indices[link] != BASE_INDEX
+                if self.weld_grasps or robot.link_indices[link] != BASE_INDEX
             }
+
+    def _let_go(self, name: str = "") -> None:
+        """Lets hands carry a model no more; without a name, all of them."""
+        for key in [each for each in self._carried if name in ("", each[0])]:
+            self._carried.pop(key).let_go()
 
     def names(self) -> list[str]:
         """Returns the names of all models, in order of appearance."""
@@ -278,11 +290,11 @@ class PhysicsWorld:
         self.note_change()
 
     def _remove(self, body: SimulatedBody) -> None:
+        self._let_go(body.name)
         for part in body.parts:
             self.engine.remove_body(part.number)
             del self._names_by_number[part.number]
             self._forces.pop(part.number, None)
-        self._carried = {key: carried for key, carried in self._carried.items() if key[0] != body.name}
 
     def add(self, body: SimulatedBody, pose_in_world: Pose) -> None:
         """Adds a body that is already in the engine, at a pose in the world frame."""
@@ -420,7 +432,7 @@ class PhysicsWorld:
     def reset_poses(self) -> None:
         """Puts every model where it first appeared, at rest; joints of models go to 0; forces of requests end."""
         self.forces.clear()
-        self._carried.clear()
+        self._let_go()
         for name, body in self._bodies.items():
             if body.spec is not None:
                 body.reset_joints({})
@@ -437,6 +449,7 @@ class PhysicsWorld:
 
     def restart(self) -> None:
         """Empties the engine, adds the models to keep, and starts time at 0; robots must load themselves."""
+        self._let_go()
         self.settings, self.gravity = self._initial_physics
         self.engine.settings = self.settings
         self.engine.restart(self.gravity)
@@ -444,7 +457,6 @@ class PhysicsWorld:
         self._bodies.clear()
         self._names_by_number.clear()
         self._forces.clear()
-        self._carried.clear()
         self._initial_poses.clear()
         self._instances.clear()
         for model, prepared in self._initial:
@@ -458,7 +470,7 @@ class PhysicsWorld:
         Not part of it: controllers and their commands, and settings that requests changed.
         """
         forces = self.forces.saved()
-        return WorldState(self.engine.save_state(), self._numbers(), self._steps, self._time_ns, forces)
+        return WorldState(self.engine.save_state(), self._numbers(), self._welded(), self._steps, self._time_ns, forces)
 
     def restore_state(self, state: WorldState) -> None:
         """Continues from a saved state, bit for bit as before.
@@ -468,6 +480,8 @@ class PhysicsWorld:
         """
         if state.numbers != self._numbers():
             raise SimulationError("the models have changed since the state was saved; restore it before they do")
+        if state.welded != self._welded():
+            raise SimulationError("what the hands hold has changed since the state was saved; restore it before")
         self.engine.restore_state(state.engine)
         self._steps, self._time_ns = state.steps, state.time_ns
         self.forces.restore(state.forces)
@@ -476,6 +490,9 @@ class PhysicsWorld:
     def forget_state(self, state: WorldState) -> None:
         """Frees a saved state, which cannot be restored any more."""
         self.engine.forget_state(state.engine)
+
+    def _welded(self) -> tuple[tuple[str, str], ...]:
+        return tuple(self._carried) if self.weld_grasps else ()
 
     def _numbers(self) -> dict[str, tuple[int, ...]]:
         return {name: tuple(part.number for part in body.parts) for name, body in self._bodies.items()}

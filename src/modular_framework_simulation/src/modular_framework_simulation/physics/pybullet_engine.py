@@ -44,6 +44,9 @@ from modular_framework_urdf.rotations import Quaternion, Vector3, rotate_vector
 _RIGID_DAMPING = 1e9
 """Damping of a contact [N s/m] that does not give way, with which only the share of correction is chosen."""
 
+_WELD_FORCE = 1e5
+"""Most that a weld holds [N, and Nm]: anything."""
+
 
 @contextlib.contextmanager
 def _silenced() -> Iterator[None]:
@@ -91,10 +94,10 @@ class PyBulletEngine(PhysicsEngine):
                 "this build of the physics engine multiplies coefficients of friction and bounce: between two "
                 "different surfaces their geometric mean counts, not the smaller one"
             )
+        self._rest = Rest(self.api, self.client, settings)
         self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
         self._files_written = 0
         self._configure(gravity)
-        self._rest = Rest(self.api, self.client, settings)
 
     def _open_window(self, log: Log) -> None:
         if not os.environ.get("DISPLAY"):
@@ -140,10 +143,10 @@ class PyBulletEngine(PhysicsEngine):
         """
         self.settings = settings
         self._set_parameters(gravity)
+        self._rest.adjust(settings)
 
     def engine_coefficient(self, coefficient: float) -> float:
         """Returns what to give a surface of the engine for a coefficient of friction or restitution."""
-        self._rest.adjust(settings)
         return coefficient if self._smaller_counts else math.sqrt(coefficient)
 
     def restart(self, gravity: Vector3) -> None:
@@ -153,10 +156,10 @@ class PyBulletEngine(PhysicsEngine):
             gravity: [m/s^2]
         """
         self.api.resetSimulation(physicsClientId=self.client)
+        self._rest = Rest(self.api, self.client, self.settings)
         self._configure(gravity)
 
     def load_urdf(self, text: str, name: str, fixed: bool, self_collision: bool = False) -> int:
-        self._rest = Rest(self.api, self.client, self.settings)
         """Loads a body; see `PhysicsEngine`."""
         flags = self.api.URDF_USE_SELF_COLLISION if self_collision else 0
         refuse_long_names(text, f"model '{name[:SHOWN_CHARACTERS]}'")
@@ -177,11 +180,11 @@ class PyBulletEngine(PhysicsEngine):
         except self.api.error as error:
             problem = f"is refused by the physics engine ({error})"
             raise DescriptionError(f"model '{name}'", problem, "check its shapes and joints") from error
+        has_joints = any(info[2] != self.api.JOINT_FIXED for info in self.joint_infos(body))
+        self._rest.add(body, fixed, has_joints)
         return body
 
     def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
-        has_joints = any(info[2] != self.api.JOINT_FIXED for info in self.joint_infos(body))
-        self._rest.add(body, fixed, has_joints)
         """Returns the engine's record of every joint of a body, in the order of the link numbers."""
         count = self.api.getNumJoints(body, physicsClientId=self.client)
         return [self.api.getJointInfo(body, index, physicsClientId=self.client) for index in range(count)]
@@ -189,15 +192,19 @@ class PyBulletEngine(PhysicsEngine):
     def step(self) -> None:
         """Advances the physics by one time step."""
         self.api.stepSimulation(physicsClientId=self.client)
+        self._rest.after_step()
 
     def close(self) -> None:
         """Ends the connection; may be called twice."""
-        self._rest.after_step()
         if self.client >= 0:
             with contextlib.suppress(self.api.error):
                 self.api.disconnect(physicsClientId=self.client)
             self.client = -1
             self._urdf_folder.cleanup()
+
+    def wake(self) -> None:
+        """Computes the motion of bodies at rest again."""
+        self._rest.wake_all()
 
     def save_state(self) -> int:
         """Saves the state in the memory of the engine, contacts and their caches too.
@@ -210,10 +217,6 @@ class PyBulletEngine(PhysicsEngine):
                 "the state of a world whose bodies rest cannot be saved bit for bit; make it with rest_speed 0"
             )
         state: int = self.api.saveState(physicsClientId=self.client)
-    def wake(self) -> None:
-        """Computes the motion of bodies at rest again."""
-        self._rest.wake_all()
-
         return state
 
     def restore_state(self, state: int) -> None:
@@ -226,10 +229,10 @@ class PyBulletEngine(PhysicsEngine):
 
     def remove_body(self, number: int) -> None:
         """Takes a body out."""
+        self._rest.remove(number)
         self.api.removeBody(number, physicsClientId=self.client)
 
     def root_link(self, number: int) -> str:
-        self._rest.remove(number)
         """Returns the name of the root link."""
         name: str = self.api.getBodyInfo(number, physicsClientId=self.client)[0].decode()
         return name
@@ -318,10 +321,10 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_base_centre(self, number: int, pose: Pose) -> None:
         """Puts a body somewhere."""
+        self._rest.wake_at_rest(number)
         self.api.resetBasePositionAndOrientation(number, pose.position, pose.quaternion, physicsClientId=self.client)
 
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
-        self._rest.wake_at_rest(number)
         """Sets the velocity of the root link's centre."""
 
         def give() -> None:
@@ -333,6 +336,29 @@ class PyBulletEngine(PhysicsEngine):
         """Returns where a link is and how it moves."""
         record = self.api.getLinkState(number, index, 1, 1, physicsClientId=self.client)
         return LinkMotion(Pose(record[0], record[1]), Pose(record[4], record[5]), record[6], record[7])
+
+    def weld(self, number: int, index: int, other: int) -> int:
+        """Fastens a body to a link."""
+        link = self.base_centre(number) if index == BASE_INDEX else self.link_motion(number, index).centre
+        other_in_link = link.inverse() @ self.base_centre(other)
+        weld: int = self.api.createConstraint(
+            number,
+            index,
+            other,
+            BASE_INDEX,
+            self.api.JOINT_FIXED,
+            (0.0, 0.0, 0.0),
+            other_in_link.position,
+            (0.0, 0.0, 0.0),
+            other_in_link.quaternion,
+            physicsClientId=self.client,
+        )
+        self.api.changeConstraint(weld, maxForce=_WELD_FORCE, physicsClientId=self.client)
+        return weld
+
+    def remove_weld(self, weld: int) -> None:
+        """Ends a weld."""
+        self.api.removeConstraint(weld, physicsClientId=self.client)
 
     def apply_force(self, number: int, index: int, force: Sequence[float], point: Vector3) -> None:
         """Lets a force act at a point of a link."""
