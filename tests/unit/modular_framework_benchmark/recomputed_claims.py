@@ -93,6 +93,9 @@ def check_summary(claim: dict[str, Any], metric: dict[str, Any], episodes: list[
     assert counts["counted"] == len(values), where
     assert counts["censored"] == sum(censored for _, censored in pairs), where
     assert counts["missing"] == len(episodes) - len(values), where
+    if not len(values):
+        assert claim["estimate"] is None, where
+        return
     estimate, interval = claim["estimate"], claim["estimate"]["interval"]
     assert math.isclose(estimate["value"], values.mean(), rel_tol=1e-9), where
     if metric["kind"] == "rate":
@@ -105,6 +108,9 @@ def check_summary(claim: dict[str, Any], metric: dict[str, Any], episodes: list[
 
 def check_interval(interval: dict[str, Any], values: np.ndarray, where: str) -> None:
     """Checks the interval of a mean against that of the normal distribution, which skewed values may make wider."""
+    if not np.ptp(values):
+        assert interval["low"] == interval["high"] == values[0], where
+        return
     half = NORMAL_975 * values.std(ddof=1) / math.sqrt(len(values))
     assert interval["low"] < values.mean() < interval["high"], where
     if len(values) >= 50:
@@ -130,6 +136,10 @@ def check_comparison(
     kept = np.array([(one, two) for one, two in pairs if one is not None and two is not None])
     assert claim["counts"]["pairs"] == len(kept), where
     assert claim["counts"]["missing"] == len(pairs) - len(kept), where
+    if not len(kept):
+        assert claim["difference"] is None, where
+        assert claim["verdict"] == "no_data", where
+        return
     differences = kept[:, 0] - kept[:, 1]
     assert math.isclose(claim["difference"]["value"], differences.mean(), rel_tol=1e-9, abs_tol=1e-12), where
     interval = claim["difference"]["interval"]
