@@ -321,7 +321,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_base_centre(self, number: int, pose: Pose) -> None:
         """Puts a body somewhere."""
-        self._rest.wake_at_rest(number)
+        self._rest.wake(number)
         self.api.resetBasePositionAndOrientation(number, pose.position, pose.quaternion, physicsClientId=self.client)
 
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:

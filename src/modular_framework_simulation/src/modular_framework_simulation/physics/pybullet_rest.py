@@ -68,33 +68,29 @@ class Rest:
             body, BASE_INDEX, activationState=activation, sleepThreshold=threshold, physicsClientId=self._client
         )
 
-    def _wake(self, body: int) -> None:
-        self._woken[body] = self._steps
-        self._change(body, self._api.ACTIVATION_STATE_WAKE_UP)
+    def wake(self, body: int) -> None:
+        """Lets a body move again; one that always does is left alone."""
+        if body in self._woken:
+            if self._rests(body):
+                self._waking.add(body)
+            self._woken[body] = self._steps
+            self._change(body, self._api.ACTIVATION_STATE_WAKE_UP)
 
     def wake_all(self) -> None:
         """Lets every body move again."""
         for body in self._woken:
-            self.wake_at_rest(body)
-            self._wake(body)
+            self.wake(body)
 
     def _rests(self, body: int) -> bool:
         """Whether a body rests: the engine gives those no velocity at all."""
-        woken = self._woken.get(body)
-        if woken is None or (self._steps - woken) * self._settings.time_step_s < _REST_AFTER_S:
+        if (self._steps - self._woken[body]) * self._settings.time_step_s < _REST_AFTER_S:
             return False
         linear, angular = self._api.getBaseVelocity(body, physicsClientId=self._client)
         return not any(linear) and not any(angular)
 
-    def wake_at_rest(self, body: int) -> None:
-        """Wakes a body if it rests."""
-        if self._rests(body):
-            self._waking.add(body)
-            self._wake(body)
-
     def disturb(self, body: int, action: Callable[[], None]) -> None:
         """Does something to a body, which wakes; what a body at rest would lose is done again after the step."""
-        self.wake_at_rest(body)
+        self.wake(body)
         action()
         if body in self._waking:
             self._lost.append((body, action))
@@ -110,4 +106,4 @@ class Rest:
             for body in self._jointed:
                 points = self._api.getContactPoints(bodyA=body, physicsClientId=self._client)
                 for touched in sorted({point[2] for point in points} & self._woken.keys()):
-                    self._wake(touched)
+                    self.wake(touched)
