@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,6 +27,9 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.simulated_time import SimulatedTime
 
+sys.path.insert(0, str(Path(__file__).parent))
+from simulated_ur5 import ARM, BALL  # noqa: E402
+
 LAUNCH = """<launch>
   <param name="wait_for_planning" value="true"/>
   <include file="$(find ur5_ezgripper_robot)/launch/ur5_upload.launch"/>
@@ -37,10 +41,6 @@ LAUNCH = """<launch>
   <node name="spawner" pkg="modular_framework_core" type="robot_controllers_spawner"
         args="ur5_ezgripper_robot ur5_ezgripper_controller_simulation.yaml"/>
 </launch>"""
-ARM = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
-BALL = """<sdf version="1.6"><model name="ball"><link name="link"><inertial><mass>0.1</mass><inertia><ixx>4e-5</ixx>
-  <iyy>4e-5</iyy><izz>4e-5</izz></inertia></inertial><collision name="c"><geometry><sphere><radius>0.03</radius>
-  </sphere></geometry></collision></link></model></sdf>"""
 HOLDER = """
 import time
 import rospy
