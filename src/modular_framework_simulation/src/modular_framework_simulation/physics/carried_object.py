@@ -58,34 +58,6 @@ class CarriedObject:
         self._engine.set_base_centre(self._thing, Pose((x, y, z), rotated.quaternion))
         self._engine.set_base_twist(self._thing, *twist)  # the line above sets it to 0
 
-    def let_go(self) -> None:
-        """Does nothing: only friction holds the object."""
-
-
-class WeldedObject:
-    """Fastens one object to one hand by a constraint of the engine: what friction would do is not simulated.
-
-    Args:
-        engine: Where both are.
-        thing: The object.
-        robot: The robot that holds it.
-        palm_index: The engine's number of the link that the fingers are fastened to.
-    """
-
-    def __init__(self, engine: PhysicsEngine, thing: SimulatedBody, robot: SimulatedBody, palm_index: int) -> None:
-        self._engine = engine
-        self._weld = engine.weld(robot.number, palm_index, thing.number)
-
-    def before_step(self) -> None:
-        """Does nothing."""
-
-    def after_step(self) -> None:
-        """Does nothing."""
-
-    def let_go(self) -> None:
-        """Ends the weld."""
-        self._engine.remove_weld(self._weld)
-
 
 def _difference(a: Vector3, b: Vector3) -> Vector3:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

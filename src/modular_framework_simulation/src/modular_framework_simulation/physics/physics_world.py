@@ -20,7 +20,7 @@ from modular_framework_simulation.physics.body_forces import BodyForce, forces_o
 from modular_framework_simulation.physics.body_joints import apply_settings, copy_joint_motion
 from modular_framework_simulation.physics.body_links import centre_in_world, tree_with_link
 from modular_framework_simulation.physics.body_urdf import STATIC_LINK, BodyUrdf, model_to_urdf
-from modular_framework_simulation.physics.carried_object import CarriedObject, WeldedObject
+from modular_framework_simulation.physics.carried_object import CarriedObject
 from modular_framework_simulation.physics.engine_choice import PYBULLET, make_engine
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.part_names import SCOPE
@@ -133,7 +133,8 @@ class PhysicsWorld:
         self._initial: list[tuple[specs.Model, BodyUrdf]] = []
         self._forces: dict[int, tuple[BodyForce, ...]] = {}
         self.weld_grasps = weld_grasps
-        self._carried: dict[tuple[str, str], CarriedObject | WeldedObject] = {}
+        self._carried: dict[tuple[str, str], CarriedObject] = {}
+        self._welds: dict[tuple[str, str], int] = {}
         self._steps = self._time_ns = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
@@ -195,19 +196,22 @@ class PhysicsWorld:
             robot: The robot that holds them.
             held: Model and the robot's link that carries it, of each.
         """
-        if tuple(self._carried) != tuple(held):
-            self._let_go()
-            carry = WeldedObject if self.weld_grasps else CarriedObject
-            self._carried = {
-                (name, link): carry(self.engine, self.body(name), robot, robot.link_indices[link])
-                for name, link in held
-                if self.weld_grasps or robot.link_indices[link] != BASE_INDEX
-            }
+        if tuple(self._welds if self.weld_grasps else self._carried) == tuple(held):
+            return
+        self._let_go()
+        for name, link in held:
+            thing, index = self.body(name), robot.link_indices[link]
+            if self.weld_grasps:
+                self._welds[name, link] = self.engine.weld(robot.number, index, thing.number)
+            elif index != BASE_INDEX:
+                self._carried[name, link] = CarriedObject(self.engine, thing, robot, index)
 
     def _let_go(self, name: str = "") -> None:
         """Lets hands carry a model no more; without a name, all of them."""
-        for key in [each for each in self._carried if name in ("", each[0])]:
-            self._carried.pop(key).let_go()
+        for key in [each for each in (*self._carried, *self._welds) if name in ("", each[0])]:
+            self._carried.pop(key, None)
+            if key in self._welds:
+                self.engine.remove_weld(self._welds.pop(key))
 
     def names(self) -> list[str]:
         """Returns the names of all models, in order of appearance."""
@@ -470,7 +474,9 @@ class PhysicsWorld:
         Not part of it: controllers and their commands, and settings that requests changed.
         """
         forces = self.forces.saved()
-        return WorldState(self.engine.save_state(), self._numbers(), self._welded(), self._steps, self._time_ns, forces)
+        return WorldState(
+            self.engine.save_state(), self._numbers(), tuple(self._welds), self._steps, self._time_ns, forces
+        )
 
     def restore_state(self, state: WorldState) -> None:
         """Continues from a saved state, bit for bit as before.
@@ -480,7 +486,7 @@ class PhysicsWorld:
         """
         if state.numbers != self._numbers():
             raise SimulationError("the models have changed since the state was saved; restore it before they do")
-        if state.welded != self._welded():
+        if state.welded != tuple(self._welds):
             raise SimulationError("what the hands hold has changed since the state was saved; restore it before")
         self.engine.restore_state(state.engine)
         self._steps, self._time_ns = state.steps, state.time_ns
@@ -490,9 +496,6 @@ class PhysicsWorld:
     def forget_state(self, state: WorldState) -> None:
         """Frees a saved state, which cannot be restored any more."""
         self.engine.forget_state(state.engine)
-
-    def _welded(self) -> tuple[tuple[str, str], ...]:
-        return tuple(self._carried) if self.weld_grasps else ()
 
     def _numbers(self) -> dict[str, tuple[int, ...]]:
         return {name: tuple(part.number for part in body.parts) for name, body in self._bodies.items()}

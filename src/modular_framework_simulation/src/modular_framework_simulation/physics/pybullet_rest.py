@@ -2,7 +2,7 @@
 """Which bodies PyBullet leaves out of its steps because they lie still, and what makes it compute them again.
 
 The engine lets a body rest that was slow for two seconds, and wakes it when a moving body touches it. What it does not
-notice is told to it here:
+notice is handled here:
 
 - A body that a hand has held still for two seconds would stay in the air when the hand opens: in the step in which the
   contact ends it has no velocity yet. So whatever touches a body with joints is woken now and then.
