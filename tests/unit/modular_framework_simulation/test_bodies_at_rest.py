@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from simulated_samples import run, solid
@@ -63,6 +64,19 @@ def test_contact_forces_of_a_body_at_rest_are_its_weight(table: PhysicsWorld) ->
     assert sum(each.force for each in table.contacts(table.body("cube"), BASE_INDEX)) == pytest.approx(
         0.2 * GRAVITY, rel=0.01
     )
+
+
+def test_the_load_on_a_joint_of_a_body_that_lies_still_is_measured(world: PhysicsWorld) -> None:
+    crate = solid("crate", CUBE, Pose((0, 0, 0.025)))
+    lid = replace(crate.links[0], name="lid", pose=Pose((0, 0, 0.05)))
+    bolt = specs.Joint("bolt", specs.JointType.FIXED, "link", "lid", Pose(), (0, 0, 1), 0.0, 0.0)
+    world.spawn(replace(crate, links=(*crate.links, lid), joints=(bolt,)))
+    (tree,) = world.body("crate").parts
+    (joint,) = world.engine.joints(tree.number)
+    world.engine.measure_joint_load(tree.number, joint.index)
+    run(world, LONG_S)
+    force, _ = world.engine.joint_load(tree.number, joint.index)
+    assert force == pytest.approx((0.0, 0.0, -0.2 * GRAVITY), abs=0.01)
 
 
 def test_what_lay_on_a_model_falls_when_that_is_deleted(table: PhysicsWorld) -> None:

@@ -455,6 +455,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def measure_joint_load(self, number: int, index: int) -> None:
         """Lets the engine measure the load on a joint."""
+        self._rest.keep_awake(number)
         self.api.enableJointForceTorqueSensor(number, index, True, physicsClientId=self.client)
 
     def joint_load(self, number: int, index: int) -> tuple[Vector3, Vector3]:

@@ -8,6 +8,7 @@ notice is handled here:
   contact ends it has no velocity yet. So whatever touches a body with joints is woken now and then.
 - What lies on a body that a request takes away, or feels another gravity, is woken by `wake_all`.
 - A body wakes at the end of a step, in which a new velocity and forces are lost; they are given again after it.
+- The load on a joint of a body at rest would read zero, so a body in which one is measured never rests.
 """
 
 from __future__ import annotations
@@ -53,6 +54,11 @@ class Rest:
         elif not fixed and self._settings.rest_speed > 0.0:
             self._woken[body] = self._steps
             self._change(body, self._api.ACTIVATION_STATE_ENABLE_SLEEPING)
+
+    def keep_awake(self, body: int) -> None:
+        """Lets a body never rest."""
+        if self._woken.pop(body, None) is not None:
+            self._change(body, self._api.ACTIVATION_STATE_DISABLE_SLEEPING)
 
     def remove(self, body: int) -> None:
         """Forgets a body."""
