@@ -27,6 +27,7 @@ from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSp
 TASK_RECORDS = "task_records"
 PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
 """Parts of an episode in their order, and the moment at which each ends."""
+KEPT_OF_ANSWER = ("shake_fault", "video_fault", "recording_fault", "world_digest")
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +141,7 @@ def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
         "settings": dict(end.spec.settings),
         "parameters": end.answer.get("parameters_digest", ""),
         "final_objects": end.answer.get("final", {}),
-        **{key: end.answer[key] for key in ("shake_fault", "video_fault", "world_digest") if end.answer.get(key)},
+        **{key: end.answer[key] for key in KEPT_OF_ANSWER if end.answer.get(key)},
         **({"metric_faults": dict(faults)} if faults else {}),
     }
 

@@ -37,6 +37,8 @@ from modular_framework_ros.calls import CallError, request_service, wait_until
 from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
 
 LIST_CONTROLLERS = "/controller_manager/list_controllers"
+JOINT_STATE_CONTROLLER, JOINT_STATE_RATE = "joint_state_controller/JointStateController", 50.0
+"""Its type, and its rate where no parameter says another one [1/s]."""
 GENERATION_SIGNAL = "/grasp_generated"
 GENERATION_SERVICE_S = 30.0
 """How long after the signal a method's service is waited for [s]: on a busy machine it connects for seconds."""
@@ -114,7 +116,8 @@ class EpisodeRecorder:
                 answer["aborted"] = True
                 self._stop_task()
             spawned = {entry["name"]: entry["model"] for entry in request.objects}
-            answer |= write_recording(folder, self._samples, spawned, answer)
+            turns = _joint_state_rate() if self._time.enabled else None
+            answer |= write_recording(folder, self._samples, spawned, answer, turns)
         answer["parameters_digest"] = write_parameters(folder)
         self._reached(request, answer, "recorded")
         return answer
@@ -215,7 +218,7 @@ class EpisodeRecorder:
         wanted = {START_SERVICE, *([SPAWN_SERVICE] if request.objects else [])}
         wanted |= {LIST_CONTROLLERS} if request.controllers else set()
         self._wait(lambda: wanted <= _services())
-        self._wait(lambda: set(request.controllers) <= _running_controllers())
+        self._wait(lambda: set(request.controllers) <= _running_controllers().keys())
         if request.method:
             self._wait(lambda: _is_published(GENERATION_SIGNAL))
             # a method offers the service soon after, or it has none
@@ -245,9 +248,16 @@ def _is_subscribed(topic: str, node: str) -> bool:
     return any(name == topic and node in nodes for name, nodes in rosgraph.Master(rospy.get_name()).getSystemState()[1])
 
 
-def _running_controllers() -> set[str]:
+def _running_controllers() -> dict[str, str]:
+    """Returns the types of the controllers that run, by name."""
     answer = request_service(LIST_CONTROLLERS, ListControllers, ListControllers._request_class(), timeout_s=30.0)
-    return {controller.name for controller in answer.controller if controller.state == "running"}
+    return {controller.name: controller.type for controller in answer.controller if controller.state == "running"}
+
+
+def _joint_state_rate() -> float | None:
+    """Returns how often the simulation publishes joint states [1/s]; None where no controller does."""
+    names = [name for name, kind in _running_controllers().items() if kind == JOINT_STATE_CONTROLLER]
+    return float(rospy.get_param(f"/{names[0]}/publish_rate", JOINT_STATE_RATE)) if names else None
 
 
 def _has_clock_parameter() -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import rosgraph
 import rospy
+from numpy.typing import NDArray
 
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.metrics.recording_files import PARAMETERS, RECORDING, TRACKING, TRAJECTORY
@@ -27,7 +28,7 @@ POSE_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def write_recording(
-    folder: Path, samples: Samples, spawned: Mapping[str, str], answer: Mapping[str, Any]
+    folder: Path, samples: Samples, spawned: Mapping[str, str], answer: Mapping[str, Any], turns: float | None
 ) -> dict[str, Any]:
     """Writes the files of an episode.
 
@@ -37,14 +38,18 @@ def write_recording(
         spawned: The models of the objects that were put into the world, by name.
         answer: `zero`: ROS time at which the recording begins [s]; `task_started_s`, `checked_s`,
             `simulated_s`: when the task was started, success was checked, everything had ended [s since then].
+        turns: How often joint states are published while simulated time passes [1/s]; None: all count, see
+            `joint_states_in_turn`.
 
     Returns:
-        `final`: pose of each object then; `lifted`: how much higher each of `spawned` was than when the task started.
+        `final`: pose of each object then; `lifted`: how much higher each of `spawned` was than when the task started;
+        `recording_fault`: what is missing in the recording, "" for nothing.
     """
     zero, end_s = float(answer["zero"]), float(answer.get("simulated_s", np.inf))
     poses = _object_poses(samples, list(spawned), answer)
     tracking = _within(_tracking(samples, zero), end_s)
-    trajectory = _with_objects(_within(_trajectory(samples, tracking, zero), end_s), poses)
+    joints = samples.joints if turns is None else joint_states_in_turn(samples.joints, turns)
+    trajectory = _with_objects(_within(_trajectory(joints, tracking, zero), end_s), poses)
     trajectory.to_parquet(folder / TRAJECTORY)
     tracking.to_parquet(folder / TRACKING)
     content = {
@@ -57,7 +62,9 @@ def write_recording(
     final = {name: _at(rows, checked_s) for name, rows in poses.items() if len(rows)}
     started_s = float(answer.get("task_started_s", 0.0))
     lifted = {name: final[name][2] - _at(poses[name], started_s)[2] for name in spawned if name in final}
-    return {"final": final, "lifted": lifted}
+    missing = 0 if turns is None else missing_turns(trajectory["time_s"].to_numpy() + zero, turns)
+    fault = f"{missing} joint states of {len(trajectory) + missing} did not arrive" if missing else ""
+    return {"final": final, "lifted": lifted, "recording_fault": fault}
 
 
 def write_parameters(folder: Path) -> str:
@@ -136,10 +143,42 @@ def _tracking(samples: Samples, zero: float) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["time_s", "controller", "joint", "desired", "actual"])
 
 
-def _trajectory(samples: Samples, tracking: pd.DataFrame, zero: float) -> pd.DataFrame:
+def joint_states_in_turn(messages: Sequence[Any], turns: float) -> list[Any]:
+    """Returns the joint states that are published at a fixed rate, without those of moments when time stood still.
+
+    A simulation whose time is held also publishes the state in which it stands still. Whether time does so between two
+    requests for it to pass depends on the load of the machine, so that these states would differ from run to run.
+
+    Args:
+        messages: sensor_msgs/JointState, in the order of their stamps.
+        turns: The rate [1/s]; the first turn is at time 0.
+    """
+    in_turn: dict[tuple[int, tuple[str, ...]], Any] = {}
+    for message in messages:
+        turn = int(_turns_of(message.header.stamp.to_sec(), turns))
+        in_turn.setdefault((turn, tuple(message.name)), message)
+    return list(in_turn.values())
+
+
+def missing_turns(times_s: NDArray[np.float64], turns: float) -> int:
+    """Returns how many turns there are between the first and the last time in which there is none.
+
+    Args:
+        times_s: Ascending [s], at most one in a turn.
+        turns: Their rate [1/s].
+    """
+    numbers = _turns_of(times_s, turns)
+    return int(numbers[-1] - numbers[0]) + 1 - len(numbers) if len(numbers) else 0
+
+
+def _turns_of(times_s: Any, turns: float) -> Any:
+    return np.floor(times_s * turns + SAME_TIME_S)
+
+
+def _trajectory(joints: Sequence[Any], tracking: pd.DataFrame, zero: float) -> pd.DataFrame:
     """Returns a row for each time: `time_s`, and position, velocity, effort and command of each joint."""
     rows: dict[float, dict[str, float]] = {}
-    for message in samples.joints:
+    for message in joints:
         row = rows.setdefault(message.header.stamp.to_sec() - zero, {})
         for kind, values in (
             ("position", message.position),

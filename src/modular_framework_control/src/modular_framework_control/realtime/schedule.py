@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import math
 
+SAME_TIME_S = 1e-6
+"""Times that differ by less are the same [s]: sums of periods are not exact."""
+
 
 class Schedule:
     """Turns at a fixed rate; missed ones are not made up for.
@@ -24,8 +27,8 @@ class Schedule:
 
     def take_turn(self, time_s: float) -> bool:
         """Returns whether a turn is due at `time_s` [s]; if so it is taken, and the next one is due a period later."""
-        if time_s < self._next_s:
+        if time_s < self._next_s - SAME_TIME_S:
             return False
         following_s = self._next_s + self._period_s
-        self._next_s = following_s if following_s > time_s else time_s + self._period_s
+        self._next_s = following_s if following_s > time_s + SAME_TIME_S else time_s + self._period_s
         return True

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The trajectory of an episode does not depend on how often simulated time stood still."""
+
+from __future__ import annotations
+
+import numpy as np
+import rospy
+from sensor_msgs.msg import JointState
+
+from modular_framework_benchmark.episodes.ros_recording import joint_states_in_turn, missing_turns
+
+RATE = 50.0
+STEP_S = 1.0 / 240.0
+
+
+def states(times_s: list[float], names: tuple[str, ...] = ("pan",)) -> list[JointState]:
+    messages = [JointState(name=list(names), position=[time_s] * len(names)) for time_s in times_s]
+    for message, time_s in zip(messages, times_s, strict=True):
+        message.header.stamp = rospy.Time.from_sec(time_s)
+    return messages
+
+
+def published(seconds: float) -> list[float]:
+    """The physics steps in which a controller publishes: the first one in each turn."""
+    turns = np.arange(0, round(seconds * RATE))
+    return (np.ceil(turns / RATE / STEP_S - 1e-9) * STEP_S).tolist()
+
+
+def test_states_of_moments_when_time_stood_still_are_left_out() -> None:
+    in_turn = published(4.0)
+    stood_still = [round(time_s / STEP_S) * STEP_S + 2 * STEP_S for time_s in (0.5, 0.52, 1.234, 3.0)]
+    mixed = states(sorted(in_turn + stood_still))
+    kept = joint_states_in_turn(mixed, RATE)
+    assert [state.position[0] for state in kept] == in_turn
+
+
+def test_controllers_of_different_joints_have_a_state_each() -> None:
+    times_s = published(1.0)
+    mixed = [*states(times_s, ("pan",)), *states(times_s, ("finger", "thumb"))]
+    assert len(joint_states_in_turn(mixed, RATE)) == 2 * len(times_s)
+
+
+def test_lost_states_are_counted() -> None:
+    times_s = np.array(published(2.0))
+    assert missing_turns(times_s, RATE) == 0
+    assert missing_turns(np.delete(times_s, [10, 11, 40]), RATE) == 3
+    assert missing_turns(times_s[:0], RATE) == 0
