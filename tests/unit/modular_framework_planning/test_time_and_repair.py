@@ -36,7 +36,6 @@ from modular_framework_planning.planning_pipeline.trajectory_validator import GR
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.robot_model.urdf_document import package_resolver
-from modular_framework_planning.trajectory_processing.path_shortening import pull_vertices
 from modular_framework_planning.trajectory_processing.time_parameterization import parameterize
 
 GROUP = "arm_and_manipulator"
@@ -292,13 +291,3 @@ def test_of_many_goals_no_more_are_looked_at_than_time_allows(model: RobotModel,
     with pytest.raises(PlanningError, match="1 of 3 alternatives were looked at.*'block'") as caught:
         found(hit, hit, *free)
     assert caught.value.code == ErrorCode.TIMED_OUT
-
-
-def test_a_corner_is_pulled_towards_the_line_between_its_neighbours_as_far_as_edges_stay_free() -> None:
-    path = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]])
-    free = pull_vertices(path, lambda first, second: True, np.inf)
-    assert np.allclose(free, [[0.0, 0.0], [1.0, 0.25], [2.0, 0.0]]), "half of the way, twice"
-    around = pull_vertices(path, lambda first, second: max(first[1], second[1]) >= 0.4, np.inf)
-    assert np.allclose(around, [[0.0, 0.0], [1.0, 0.5], [2.0, 0.0]])
-    assert np.array_equal(pull_vertices(path, lambda first, second: False, np.inf), path)
-    assert np.array_equal(pull_vertices(path, lambda first, second: True, 0.0), path), "the time is over"

@@ -6,6 +6,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from modular_framework_planning.collision_detection.kernels.compiled_edges import (
+    BLOCKED,
+    FREE,
+    UNKNOWN,
+    EdgeMemory,
+    GroupEdges,
+    new_memory,
+    recall,
+    remember,
+)
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.trajectory_processing.compiled_polylines import pieces_on_edges
@@ -18,6 +28,9 @@ class MotionChecker:
     """Checks joint vectors of one group; all other joints stay at given positions.
 
     Edges that were checked finely are remembered: what lies on a free one is not checked again.
+
+    Attributes:
+        memory: of these edges.
     """
 
     def __init__(
@@ -36,9 +49,8 @@ class MotionChecker:
         self._rest = np.array(rest, dtype=float)
         self._state, self._edge = self._rest[None].copy(), np.tile(self._rest, (2, 1))
         self._remembered_step = remembered_step
-        self._verdicts: dict[tuple[bytes, bytes, float], bool] = {}  # of edges, by both ends and the step
-        self._free: list[Array] = []  # edges, shape (2, joints)
-        self._edges = np.zeros((0, 2, len(indices)))  # the same
+        self.memory: EdgeMemory = new_memory(len(indices))
+        self._motions: tuple[Array, Array] | None = None  # see GroupEdges
         model = checker.model
         members = {int(number) for number in indices}
         self._members = members if any(leader in members for _, leader, _, _ in model.mimics) else set()
@@ -48,6 +60,14 @@ class MotionChecker:
         result = self._rest.copy()
         result[self._indices] = values
         return self._checker.model.with_mimics(result, self._members) if self._members else result
+
+    def edges(self, step: float) -> GroupEdges:
+        """Returns how compiled loops check straight motions at samples at most `step` [rad or m, any joint] apart."""
+        if self._motions is None:
+            rest = self.full_positions(np.zeros(len(self._indices)))
+            columns = [self.full_positions(row) - rest for row in np.eye(len(self._indices))]
+            self._motions = rest, np.array(columns).T.copy()
+        return GroupEdges(*self._motions, step)
 
     def state_is_free(self, values: Array) -> bool:
         """Whether the state is free of collisions."""
@@ -63,13 +83,11 @@ class MotionChecker:
         """
         if step > self._remembered_step:
             return self._edge_is_free(start, end, step)
-        key = start.tobytes(), end.tobytes(), step
-        verdict = self._verdicts.get(key)
-        if verdict is None:
-            verdict = self._verdicts[key] = self._edge_is_free(start, end, step)
-            if verdict:
-                self._free.append(np.array([start, end]))
-        return verdict
+        verdict = recall(self.memory, start, end, step)
+        if verdict == UNKNOWN:
+            verdict = FREE if self._edge_is_free(start, end, step) else BLOCKED
+            remember(self.memory, start, end, step, verdict)
+        return bool(verdict == FREE)
 
     def _edge_is_free(self, start: Array, end: Array, step: float) -> bool:
         if self._members:
@@ -92,11 +110,10 @@ class MotionChecker:
 
     def _unchecked(self, polyline: Array, step: float) -> list[Array]:
         """Returns a polyline without its pieces on free edges; all of its vertices stay."""
-        if step < self._remembered_step or not self._free:
+        free = self.memory.ends[self.memory.verdicts == FREE]
+        if step < self._remembered_step or not len(free):
             return [polyline]
-        if len(self._edges) < len(self._free):
-            self._edges = np.array(self._free)
-        known = pieces_on_edges(np.ascontiguousarray(polyline), self._edges, KNOWN_STEPS * step, ON_EDGE)
+        known = pieces_on_edges(np.ascontiguousarray(polyline), free, KNOWN_STEPS * step, ON_EDGE)
         return np.split(polyline, known + 1) if len(known) else [polyline]
 
     def full_path(self, path: Array) -> Array:

@@ -11,12 +11,13 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World
 from modular_framework_planning.constraints.constrained_motion import ConstrainedMotion
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CompiledChecks
 from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.phase_times import GOALS, PhaseTimes
@@ -109,6 +110,13 @@ class PlanningProblem:
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the group's joints within the request's workspace, each of shape (joints,)."""
         return group_bounds(self.model, self.group, self.request.workspace)
+
+    @property
+    def compiled_world(self) -> World | None:
+        """The world in which compiled loops may check straight motions; None where these have to do more than that."""
+        if self.constraints is not None or not isinstance(self.checker, CompiledChecks):
+            return None
+        return self.checker.compiled_world
 
     def search_bounds(self, around: Array) -> tuple[Array, Array]:
         """Returns the bounds, no wider than two turns around joint vectors; a workspace is kept whole.

@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 
 from modular_framework_planning.contacts import describe_contacts
@@ -16,7 +15,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.phase_times import REPAIR, SEARCH, SHORTENING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.trajectory_processing.constrained_shortening import cut_along
-from modular_framework_planning.trajectory_processing.path_shortening import EdgeTest, drop_vertices, shorten
+from modular_framework_planning.trajectory_processing.path_shortening import CompiledTest, EdgeTest, shorten
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
@@ -49,14 +48,14 @@ class PathSearch:
             return path
         simplify, vertices = problem.settings.sampling.simplify_solutions, path.vertices
         if simplify:  # first, so that fewer edges have to be repaired
-            vertices = _shortened(problem, vertices, drop_vertices)
+            vertices = _shortened(problem, vertices, _without_vertices)
         if self.repairs:
             with problem.phases.measured(REPAIR):
                 vertices = self._planner.repaired(problem, vertices)  # type: ignore[attr-defined]
         if simplify and problem.constraints is not None:
-            vertices = _shortened(problem, vertices, partial(_cut_along_constraints, problem))
+            vertices = _shortened(problem, vertices, _cut_along_constraints)
         if simplify:
-            vertices = _shortened(problem, vertices, partial(shorten, rng=problem.rng))
+            vertices = _shortened(problem, vertices, _short)
         self._found = replace(path, vertices=vertices)
         return self._found
 
@@ -90,20 +89,37 @@ def _require_start(problem: PlanningProblem) -> None:
         )
 
 
-def _shortened(problem: PlanningProblem, path: Array, shorten_path: Callable[..., Array]) -> Array:
+def _shortened(
+    problem: PlanningProblem, path: Array, shorten_path: Callable[[PlanningProblem, Array, float], Array]
+) -> Array:
     """Shortens a path; what it accepts was checked as finely as the solution validator does."""
-    now, fine = time.monotonic(), problem.settings.finest_step
+    now = time.monotonic()
     limit = min(max(problem.deadline_s, now + SHORTENING_SHARE * (problem.end_s - now)), now + MAX_SHORTENING_S)
     with problem.phases.measured(SHORTENING):
-        return shorten_path(
-            path,
-            lambda first, second: problem.edge_is_valid(first, second, fine),
-            math.inf if problem.repeatable else limit,
-        )
+        return shorten_path(problem, path, math.inf if problem.repeatable else limit)
 
 
-def _cut_along_constraints(problem: PlanningProblem, path: Array, _: EdgeTest, deadline: float) -> Array:
-    """Shortens a path along its constraints; what it accepts was checked as finely as the solution validator does."""
+def _short(problem: PlanningProblem, path: Array, deadline: float) -> Array:
+    return shorten(path, _edge_test(problem), deadline, problem.rng, _compiled_test(problem))
+
+
+def _without_vertices(problem: PlanningProblem, path: Array, deadline: float) -> Array:
+    return shorten(path, _edge_test(problem), deadline, None, _compiled_test(problem))
+
+
+def _edge_test(problem: PlanningProblem) -> EdgeTest:
+    fine = problem.settings.finest_step
+    return lambda first, second: problem.edge_is_valid(first, second, fine)
+
+
+def _compiled_test(problem: PlanningProblem) -> CompiledTest | None:
+    world = problem.compiled_world
+    if world is None:
+        return None
+    return CompiledTest(problem.motion.edges(problem.settings.finest_step), problem.motion.memory, world)
+
+
+def _cut_along_constraints(problem: PlanningProblem, path: Array, deadline: float) -> Array:
     fine = problem.settings.finest_step
 
     def is_valid(polyline: Array) -> bool:

@@ -29,7 +29,7 @@ from modular_framework_planning.planning_scene.planning_scene import (
     empty_scene,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
-from modular_framework_planning.trajectory_processing import compiled_polylines, time_parameterization
+from modular_framework_planning.trajectory_processing import compiled_polylines, path_shortening, time_parameterization
 
 LINKS = 4
 MOTION_STEP = 0.05  # [rad]
@@ -102,6 +102,8 @@ def _check_motions(scene: PlanningScene) -> None:
     checker.contacts(scene.positions)
     checker.collision_costs(np.array([scene.positions]))
     rrt_connect.warm_up(checker, scene.positions)
+    assert checker.compiled_world is not None
+    path_shortening.warm_up(checker.compiled_world, scene.positions)
 
 
 def main() -> None:

@@ -6,17 +6,54 @@ from __future__ import annotations
 import time
 from bisect import bisect_right
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+from modular_framework_planning.collision_detection.kernels.compiled_collision import World, arguments
+from modular_framework_planning.collision_detection.kernels.compiled_edges import (
+    BLOCKED,
+    FREE,
+    UNKNOWN,
+    EdgeMemory,
+    GroupEdges,
+    new_memory,
+    recall,
+    remember,
+)
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
+from modular_framework_planning.trajectory_processing.compiled_shortening import (
+    FINISHED,
+    LEAST_GAIN,
+    PATIENCE,
+    SAME,
+    SIZE,
+    UNDECIDED,
+    Shortening,
+    answer,
+    ask,
+    begin,
+    shorten_in,
+)
 
-LEAST_GAIN = 0.01  # of a cut, as a share of the path's length
-LEAST_PULL = 0.003  # gain of a vertex that is moved, as a share of the path's length
-PULLS = 2  # of each vertex at most
+CUTS = 60  # that are tried
 EdgeTest = Callable[[Array, Array], bool]
 Join = Callable[[Array, Array, float], Array | None]
+
+
+class CompiledTest(NamedTuple):
+    """The same test as an EdgeTest on the arrays of a collision checker, which may leave an edge undecided.
+
+    Attributes:
+        edges: how they are checked.
+        memory: of edges that were checked, those by the EdgeTest among them.
+        world: where.
+    """
+
+    edges: GroupEdges
+    memory: EdgeMemory
+    world: World
 
 
 def path_length(path: Array) -> float:
@@ -24,20 +61,54 @@ def path_length(path: Array) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def drop_vertices(path: Array, edge_is_free: EdgeTest, deadline: float) -> Array:
-    """Leaves out every vertex whose neighbours can be joined directly, longest jumps first."""
-    kept = [0]
-    while kept[-1] < len(path) - 1:
-        here = kept[-1]
-        following = here + 1
-        for candidate in range(len(path) - 1, here + 1, -1):
-            if time.monotonic() > deadline:
-                break
-            if edge_is_free(path[here], path[candidate]):
-                following = candidate
-                break
-        kept.append(following)
-    return path[kept]
+def shorten(
+    path: Array,
+    edge_is_free: EdgeTest,
+    deadline: float,
+    rng: np.random.Generator | None,
+    compiled: CompiledTest | None = None,
+) -> Array:
+    """Returns a path with the same ends, not longer than the given one.
+
+    Args:
+        path: polyline of shape (n, joints).
+        edge_is_free: whether a straight motion may be part of the path.
+        deadline: monotonic time [s] at which to stop.
+        rng: source of the random choices; None: vertices are left out, and nothing else is done.
+        compiled: decides on most edges in place of `edge_is_free`.
+    """
+    path = without_repeats(path)
+    if len(path) < 3:
+        return path
+    draws = np.empty((0, 2)) if rng is None else rng.random((CUTS, 2))
+    room = np.empty((len(path) + 2 * len(draws), path.shape[1]))
+    room[: len(path)] = path
+    work = Shortening(room, np.empty((2, path.shape[1])), np.zeros(6, np.int64), draws, np.zeros(1))
+    work.at[SIZE] = len(path)
+    begin(work)
+
+    def is_free() -> bool:
+        return time.monotonic() <= deadline and edge_is_free(work.edge[0].copy(), work.edge[1].copy())
+
+    if compiled is not None:
+        _shorten_compiled(work, is_free, deadline, compiled)
+    while ask(work):
+        answer(work, is_free())
+    return room[: work.at[SIZE]].copy()
+
+
+def _shorten_compiled(work: Shortening, is_free: Callable[[], bool], deadline: float, compiled: CompiledTest) -> None:
+    """Shortens a path as far as the time goes."""
+    world, verdict = arguments(compiled.world), UNKNOWN
+    while time.monotonic() <= deadline:
+        status = shorten_in(work, compiled.edges, compiled.memory, verdict, *world)
+        if status == FINISHED:
+            return
+        verdict = UNKNOWN
+        if status == UNDECIDED:
+            verdict = FREE if is_free() else BLOCKED
+    if verdict != UNKNOWN:
+        answer(work, verdict == FREE)
 
 
 def _lengths(path: Array) -> list[float]:
@@ -52,14 +123,7 @@ def _point_at(path: Array, lengths: list[float], position: float) -> tuple[int, 
     return number, path[number] + share * (path[number + 1] - path[number])
 
 
-def cut_pieces(
-    path: Array,
-    join: Join,
-    deadline: float,
-    rng: np.random.Generator,
-    attempts: int = 60,
-    patience: int = 20,
-) -> Array:
+def cut_pieces(path: Array, join: Join, deadline: float, rng: np.random.Generator) -> Array:
     """Joins random pairs of points of the path by shorter pieces.
 
     Args:
@@ -67,12 +131,10 @@ def cut_pieces(
         join: gives a valid polyline between two points, both included, that is no longer than a length; or None.
         deadline: monotonic time [s] at which to stop.
         rng: source of the random choices.
-        attempts: most tries.
-        patience: tries without success in a row after which it stops.
     """
     failures, lengths = 0, _lengths(path)
-    for _ in range(attempts):
-        if len(path) < 3 or failures >= patience or time.monotonic() > deadline:
+    for _ in range(CUTS):
+        if len(path) < 3 or failures >= PATIENCE or time.monotonic() > deadline:
             break
         low, high = sorted(rng.uniform(0.0, lengths[-1], 2).tolist())
         first, start = _point_at(path, lengths, low)
@@ -86,38 +148,7 @@ def cut_pieces(
     return path
 
 
-def cut_corners(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator) -> Array:
-    """Joins random pairs of points of the path directly where that is shorter and free; see cut_pieces."""
-
-    def straight(start: Array, end: Array, longest: float) -> Array | None:
-        is_short = float(np.linalg.norm(end - start)) <= longest
-        return np.array([start, end]) if is_short and edge_is_free(start, end) else None
-
-    return without_repeats(cut_pieces(path, straight, deadline, rng))
-
-
-def pull_vertices(path: Array, edge_is_free: EdgeTest, deadline: float) -> Array:
-    """Moves inner vertices half of the way to the line between their neighbours where both new edges are free."""
-    path = path.copy()
-    least = LEAST_PULL * path_length(path)
-    for _ in range(PULLS):
-        has_moved = False
-        for number in range(1, len(path) - 1):
-            before, vertex, after = path[number - 1 : number + 2].copy()
-            way = after - before
-            along = float((vertex - before) @ way) / max(float(way @ way), 1e-30)
-            moved = 0.5 * (vertex + before + min(max(along, 0.0), 1.0) * way)
-            ways = (np.array([before, vertex, after]), np.array([before, moved, after]))
-            if path_length(ways[0]) - path_length(ways[1]) < least or time.monotonic() > deadline:
-                continue
-            if edge_is_free(before, moved) and edge_is_free(moved, after):
-                path[number], has_moved = moved, True
-        if not has_moved:
-            break
-    return path
-
-
-def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
+def without_repeats(path: Array, tolerance: float = SAME) -> Array:
     """Drops vertices equal to their predecessor and those in the middle of a straight line; keeps both ends.
 
     Of a path that stays where it is, the first vertex is left.
@@ -129,11 +160,14 @@ def without_repeats(path: Array, tolerance: float = 1e-9) -> Array:
     return path[needed_vertices(np.ascontiguousarray(path), tolerance)]
 
 
-def shorten(path: Array, edge_is_free: EdgeTest, deadline: float, rng: np.random.Generator) -> Array:
-    """Returns a path with the same ends, not longer than the given one."""
-    path = without_repeats(path)
-    if len(path) < 3:
-        return path
-    path = drop_vertices(path, edge_is_free, deadline)
-    path = cut_corners(path, edge_is_free, deadline, rng)
-    return pull_vertices(drop_vertices(path, edge_is_free, deadline), edge_is_free, deadline)
+def warm_up(world: World, positions: Array) -> None:
+    """Compiles the loop, or loads it from the cache.
+
+    Args:
+        world: of a scene.
+        positions: of the whole robot.
+    """
+    state, memory = np.zeros(1), new_memory(1)
+    remember(memory, state, state, 0.1, recall(memory, state, state, 0.1))
+    compiled = CompiledTest(GroupEdges(positions, np.zeros((len(positions), 1)), 0.1), memory, world)
+    shorten(np.array([[0.0], [1.0], [0.0]]), lambda first, second: False, np.inf, np.random.default_rng(), compiled)

@@ -21,21 +21,18 @@ from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
 from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
-from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOO_CLOSE, TOUCHING
-from modular_framework_planning.collision_detection.kernels.compiled_paths import (
-    Samples,
-    check_samples,
-    count_verdict,
-    new_workspace,
-    number_samples,
-    release,
+from modular_framework_planning.collision_detection.kernels.compiled_edges import (
+    FREE,
+    UNKNOWN,
+    GroupEdges,
+    check_edge,
+    new_edge,
 )
+from modular_framework_planning.collision_detection.kernels.compiled_paths import new_workspace, release
 from modular_framework_planning.geometry.spatial import Array
 
 # What `grow` returns
 FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED, PAUSED, AT_LIMIT = range(6)
-# What is known of the edge that it was about to add
-UNKNOWN, FREE, BLOCKED = 0, 1, 2
 EXTENDS, CONNECTS = 0, 1
 NEW = -1  # target, for which the nearest state is not known yet
 EDGES = 200  # that are checked in one call, so that the clock and a cancellation are looked at in between
@@ -70,17 +67,13 @@ class Space(NamedTuple):
         weights: of each joint in a length; shape (joints,).
         longest: most a tree grows by at once, in weighted length.
         domain: how far a sample may be from a blocked state that is extended to it, in weighted length.
-        step: distance of the checks along an edge, of any joint [rad or m].
-        rest: positions of the whole robot where the group's are 0; shape (all,).
-        map: change of the robot's positions by the group's, mimic joints included; shape (all, joints).
+        edges: how the edges of the trees are checked.
     """
 
     weights: Array
     longest: float
     domain: float
-    step: float
-    rest: Array
-    map: Array
+    edges: GroupEdges
 
 
 @njit(cache=True, nogil=True)
@@ -121,27 +114,6 @@ def write_step(here, target, space, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_positions(space, state, out):  # type: ignore[no-untyped-def]
-    """Writes the positions (all,) of the whole robot for a joint vector of the group."""
-    for row in range(len(out)):
-        out[row] = space.rest[row]
-        for joint in range(len(state)):
-            out[row] += space.map[row, joint] * state[joint]
-
-
-@njit(cache=True, nogil=True)
-def _check_edge(space, world, start, end, samples, undecided, workspace):  # type: ignore[no-untyped-def]
-    """Returns FREE, BLOCKED, or UNKNOWN where the bounds do not decide; the start of the edge is not checked."""
-    _write_positions(space, start, samples.vertices[0])
-    _write_positions(space, end, samples.vertices[1])
-    number_samples(samples, space.step)
-    status, _ = check_samples(world, samples, 1, undecided, workspace)
-    if status != TOO_CLOSE:  # else it is asked again elsewhere
-        count_verdict(world.counts, status)
-    return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
-
-
-@njit(cache=True, nogil=True)
 def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def]
     """Grows the trees until they meet.
 
@@ -158,8 +130,7 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
         grows to `target`, `longest` of it at most. PAUSED: EDGES edges were checked; to be called again.
     """
     bodies = world_of(world)
-    workspace, all_joints = new_workspace(bodies), len(space.rest)
-    edge = Samples(np.empty((2, all_joints)), np.empty(2, np.int64), np.empty((2, all_joints)))
+    workspace, edge = new_workspace(bodies), new_edge(space.edges)
     status = _grow(borrowed(trees), borrowed(space), samples, verdict, bodies, borrowed(edge), borrowed(workspace))
     release(workspace)
     edge.numbers[0] = 0
@@ -199,7 +170,7 @@ def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: igno
         reached = write_step(here, target, space, state)
         if verdict == UNKNOWN:
             counts[0] += 1
-            verdict = _check_edge(space, world, here, state, edge, no_rows, workspace)
+            verdict = check_edge(space.edges, world, here, state, edge, no_rows, workspace)
             if verdict == UNKNOWN:
                 return UNDECIDED
         is_free, verdict = verdict == FREE, UNKNOWN

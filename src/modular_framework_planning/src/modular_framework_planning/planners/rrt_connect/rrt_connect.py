@@ -10,20 +10,23 @@ import numpy as np
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import World, arguments
 from modular_framework_planning.collision_detection.kernels.compiled_distance_field import DistanceField
+from modular_framework_planning.collision_detection.kernels.compiled_edges import (
+    BLOCKED,
+    FREE,
+    UNKNOWN,
+    GroupEdges,
+)
 from modular_framework_planning.collision_detection.reaches import reaches
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import (
     AT_LIMIT,
-    BLOCKED,
     EXTENDS,
     FOUND,
-    FREE,
     NEEDS_ROOM,
     NEEDS_SAMPLES,
     NEW,
     PAUSED,
     UNDECIDED,
-    UNKNOWN,
     Space,
     Trees,
     grow,
@@ -45,8 +48,7 @@ WIDE_EVERY = 8  # how many batches of samples there are to one from the whole bo
 
 def can_search(problem: PlanningProblem) -> bool:
     """Whether a problem has no path constraints and a checker whose arrays decide all pairs."""
-    checker = problem.checker
-    return problem.constraints is None and isinstance(checker, CompiledChecks) and checker.compiled_world is not None
+    return problem.compiled_world is not None
 
 
 def warm_up(checker: CompiledChecks, positions: Array) -> None:
@@ -56,7 +58,7 @@ def warm_up(checker: CompiledChecks, positions: Array) -> None:
         checker: of a scene.
         positions: of the whole robot.
     """
-    space = Space(np.ones(1), 1.0, 1.0, 0.1, positions, np.zeros((len(positions), 1)))
+    space = Space(np.ones(1), 1.0, 1.0, GroupEdges(positions, np.zeros((len(positions), 1)), 0.1))
     assert checker.compiled_world is not None
     grow(_trees(np.zeros(1), np.ones((1, 1)), 1), space, np.zeros((1, 1)), UNKNOWN, *arguments(checker.compiled_world))
 
@@ -110,9 +112,8 @@ class RrtConnect:
         """
         self._problem = problem
         start = problem.start_values
-        checker = problem.checker
-        assert isinstance(checker, CompiledChecks) and checker.compiled_world is not None
-        world = checker.compiled_world
+        world = problem.compiled_world
+        assert world is not None
         if number > 0:
             world = world._replace(
                 field=empty_field(world.field),
@@ -174,23 +175,20 @@ class RrtConnect:
     def _space_of(self, world: World, step: float, longest: float, is_weighted: bool) -> Space:
         problem = self._problem
         count = len(self._low)
-        rest = problem.motion.full_positions(np.zeros(count))
-        columns = [problem.motion.full_positions(row) - rest for row in np.eye(count)]
-        motions = np.array(columns).T.copy()
-        weights = np.ones(count)
+        edges, weights = problem.motion.edges(step), np.ones(count)
         if is_weighted:
-            weights = np.sqrt((np.abs(motions) * reaches(world)[:, None]).max(axis=0))
+            weights = np.sqrt((np.abs(edges.map) * reaches(world)[:, None]).max(axis=0))
             weights = np.maximum(weights / (weights.max() or 1.0), LEAST_WEIGHT)
         squares = (weights * (self._near[1] - self._near[0])) ** 2
         near = squares.sum() / 6.0 - DEVIATIONS * np.sqrt(7.0 / 180.0 * (squares**2).sum())  # of two random states
         domain = max(LEAST_DOMAIN * longest, float(np.sqrt(max(near, 0.0))))
-        return Space(weights, longest, domain, step, rest, motions)
+        return Space(weights, longest, domain, edges)
 
     def _undecided_edge_is_free(self) -> bool:
         trees = self._trees
         here, end = trees.states[trees.position[1], trees.position[3]], np.empty_like(trees.target)
         write_step(here, trees.target, self._space, end)
-        return self._problem.motion.edge_is_free(here, end, self._space.step)
+        return self._problem.motion.edge_is_free(here, end, self._space.edges.step)
 
     def _add_room(self) -> None:
         trees = self._trees
