@@ -44,13 +44,13 @@ class EdgeMemory(NamedTuple):
         ends: joint vectors at the start and the end of each; shape (room, 2, joints).
         steps: at which each was checked [rad or m]; shape (room,).
         verdicts: FREE or BLOCKED; shape (room,).
-        count: of all edges that were ever remembered; the latest take the places of the oldest; shape (1,).
+        total: of all edges that were ever remembered; the latest take the places of the oldest; shape (1,).
     """
 
     ends: Array
     steps: Array
     verdicts: NDArray[np.int64]
-    count: NDArray[np.int64]
+    total: NDArray[np.int64]
 
 
 def new_memory(joints: int) -> EdgeMemory:
@@ -63,8 +63,8 @@ def new_memory(joints: int) -> EdgeMemory:
 @njit(cache=True, nogil=True)
 def recall(memory, start, end, step):  # type: ignore[no-untyped-def]
     """Returns the verdict about an edge at a step: FREE, BLOCKED, or UNKNOWN."""
-    ends, steps, verdicts, count = memory
-    for number in range(min(count[0], len(verdicts))):
+    ends, steps, verdicts, total = memory
+    for number in range(min(total[0], len(verdicts))):
         is_same = steps[number] == step
         for joint in range(len(start)):
             is_same = is_same and ends[number, 0, joint] == start[joint] and ends[number, 1, joint] == end[joint]
@@ -78,10 +78,10 @@ def recall(memory, start, end, step):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def remember(memory, start, end, step, verdict):  # type: ignore[no-untyped-def]
     """Remembers the verdict about an edge at a step."""
-    ends, steps, verdicts, count = memory
-    number = count[0] % len(verdicts)
+    ends, steps, verdicts, total = memory
+    number = total[0] % len(verdicts)
     ends[number, 0], ends[number, 1], steps[number], verdicts[number] = start, end, step, verdict
-    count[0] += 1
+    total[0] += 1
 
 
 @njit(cache=True, nogil=True)
