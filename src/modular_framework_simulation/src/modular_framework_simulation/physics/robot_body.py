@@ -10,14 +10,15 @@ that it gives way when an object presses against it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, IntEnum
+from typing import NamedTuple
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import RobotDescription, RobotJoint
 from modular_framework_simulation.models.sdf_specs import JointDynamics
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
-from modular_framework_simulation.physics.physics_engine import Surface
+from modular_framework_simulation.physics.physics_engine import JointState, Surface
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 
@@ -37,12 +38,12 @@ class Role(Enum):
     FREE = "free"
 
 
-class Mode(Enum):
+class Mode(IntEnum):
     """Control mode of a driven joint."""
 
-    POSITION = "position"
-    VELOCITY = "velocity"
-    EFFORT = "effort"
+    POSITION = 0
+    VELOCITY = 1
+    EFFORT = 2
 
 
 @dataclass(slots=True)
@@ -77,12 +78,12 @@ class Gripper:
     fingers: tuple[tuple[int, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class JointReading:
-    """Measured state of one joint, in SI units."""
+class _Follows(NamedTuple):
+    """How a mimic joint follows its leader: `multiplier` times its position plus `offset`, with an effort [Nm or N]."""
 
-    position: float
-    velocity: float
+    leader: int
+    multiplier: float
+    offset: float
     effort: float
 
 
@@ -119,7 +120,8 @@ class RobotBody:
         self._joints = [joint for joint in description.joints if joint.name in self.body.joint_indices]
         self._indices = [self.body.joint_indices[name] for name in self.joint_names]
         self._rank = {joint_name: rank for rank, joint_name in enumerate(self.joint_names)}
-        self.readings = [JointReading(0.0, 0.0, 0.0)] * len(self._indices)
+        self.readings = [JointState(0.0, 0.0, 0.0)] * len(self._indices)
+        self._follows = [self._how_it_follows(joint) for joint in self._joints]
         self.grippers = self._grippers()
         self.starting_positions = self._complete(positions)
         self._set_up()
@@ -155,6 +157,12 @@ class RobotBody:
         """The engine's link numbers of each finger of every gripper."""
         return [finger for gripper in self.grippers for finger in gripper.fingers]
 
+    def _how_it_follows(self, joint: RobotJoint) -> _Follows | None:
+        if joint.mimic is None or joint.mimic.leader not in self._rank:
+            return None
+        effort = joint.effort * (_COUPLING_FACTOR if self.roles[joint.name] is Role.COUPLED else 1.0)
+        return _Follows(self._rank[joint.mimic.leader], joint.mimic.multiplier, joint.mimic.offset, effort)
+
     def _grippers(self) -> tuple[Gripper, ...]:
         """Sorts the joints of grippers by the link below which their leaders' fingers begin."""
         joints = self.gripper_joints
@@ -187,12 +195,11 @@ class RobotBody:
         self.body.reset_joints(self.starting_positions)
         self.read()
 
-    def read(self) -> list[JointReading]:
+    def read(self) -> list[JointState]:
         """Measures all joints; the result is in the order of `joint_names`."""
         if not self._indices:  # the engine answers for no joints with nothing at all
             return self.readings
-        records = self.world.engine.joint_states(self.body.number, self._indices)
-        self.readings = [JointReading(*record) for record in records]
+        self.readings = self.world.engine.joint_states(self.body.number, self._indices)
         return self.readings
 
     def drive(self, drives: dict[str, Drive]) -> None:
@@ -203,35 +210,29 @@ class RobotBody:
         """
         if not self._indices:
             return
-        step_s = self.world.settings.time_step_s
-        indices: list[int] = []
+        reach_s = self.world.settings.time_step_s / _POSITION_GAIN
         targets: list[float] = []
         velocities: list[float] = []
         efforts: list[float] = []
-        for rank, joint in enumerate(self._joints):
-            position = self.readings[rank].position
-            # A joint that nothing drives is held by its friction alone.
-            target, velocity, effort = position, 0.0, self._dynamics[joint.name].friction
-            drive = drives.get(joint.name)
+        for joint, reading, follows in zip(self._joints, self.readings, self._follows, strict=True):
+            position, drive = reading.position, drives.get(joint.name)
             if drive is not None and drive.mode is Mode.POSITION:
                 target, velocity, effort = drive.command, drive.feed_forward, drive.effort_limit
             elif drive is not None and drive.mode is Mode.VELOCITY:
-                velocity, effort = drive.command, drive.effort_limit
-            elif joint.mimic is not None and joint.mimic.leader in self._rank:
-                leader = self.readings[self._rank[joint.mimic.leader]].position
-                target = joint.mimic.multiplier * leader + joint.mimic.offset
-                effort = joint.effort * (_COUPLING_FACTOR if self.roles[joint.name] is Role.COUPLED else 1.0)
+                target, velocity, effort = position, drive.command, drive.effort_limit
+            elif follows is not None:
+                target = follows.multiplier * self.readings[follows.leader].position + follows.offset
+                velocity, effort = 0.0, follows.effort
+            else:  # a joint that nothing drives is held by its friction alone
+                target, velocity, effort = position, 0.0, self._dynamics[joint.name].friction
             # The drive adds the velocity that corrects the position to the one fed forward; the sum stays in bounds.
-            ahead, behind = (
-                max(0.0, speed) * step_s / _POSITION_GAIN
-                for speed in (joint.velocity - velocity, joint.velocity + velocity)
-            )
-            indices.append(self._indices[rank])
-            targets.append(max(position - behind, min(position + ahead, target)))
+            ahead = position + max(0.0, joint.velocity - velocity) * reach_s
+            behind = position - max(0.0, joint.velocity + velocity) * reach_s
+            targets.append(max(behind, min(ahead, target)))
             velocities.append(velocity)
             efforts.append(effort)
         engine = self.world.engine
-        engine.set_position_motors(self.body.number, indices, targets, velocities, efforts, _POSITION_GAIN)
+        engine.set_position_motors(self.body.number, self._indices, targets, velocities, efforts, _POSITION_GAIN)
         self._apply_efforts(drives)
 
     def _apply_efforts(self, drives: dict[str, Drive]) -> None:
