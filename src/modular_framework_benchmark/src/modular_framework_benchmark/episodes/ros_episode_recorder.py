@@ -105,6 +105,7 @@ class EpisodeRecorder:
             rospy.set_param(name, value)
         self._wait_for_stack(request)
         self._reached(request, answer, "up")
+        turns = _joint_state_rate() if self._time.enabled and request.controllers else None
         self._samples.connect()
         folder = Path(request.folder)
         with self._bag(folder, request.bag), self._time.held("episode"):
@@ -116,7 +117,6 @@ class EpisodeRecorder:
                 answer["aborted"] = True
                 self._stop_task()
             spawned = {entry["name"]: entry["model"] for entry in request.objects}
-            turns = _joint_state_rate() if self._time.enabled else None
             answer |= write_recording(folder, self._samples, spawned, answer, turns)
         answer["parameters_digest"] = write_parameters(folder)
         self._reached(request, answer, "recorded")
