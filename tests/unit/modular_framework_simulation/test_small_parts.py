@@ -48,6 +48,17 @@ def test_the_pacer_holds_simulated_time_back_to_real_time_and_sleeps_seldom() ->
     assert report.step_cost_s == pytest.approx(0.0005)
 
 
+def test_while_the_robot_stands_still_the_pacer_sleeps_half_as_often_and_keeps_the_rate() -> None:
+    time, sleeps = FakeTime(), []
+    pacer = Pacer(1.0, time.clock, lambda duration_s: (sleeps.append(duration_s), time.sleep(duration_s)))
+    for step in range(1, 601):
+        time.now += 0.0005
+        pacer.keep(step * 0.002, calm=True)
+        assert -1e-9 <= step * 0.002 - (time.now - 50.0) <= 0.018 + 1e-9
+    assert len(sleeps) <= 600 / 10
+    assert time.now == pytest.approx(51.2, abs=0.018)
+
+
 def test_the_pacer_makes_good_a_short_stall_and_forgives_a_long_one() -> None:
     time = FakeTime()
     pacer = Pacer(1.0, time.clock, time.sleep)

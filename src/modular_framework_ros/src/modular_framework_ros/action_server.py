@@ -18,8 +18,33 @@ CLOSING_DELAY_S = 0.15
 """For a result to get out: to close a topic drops what rospy's threads have still to write [s]."""
 
 
+class _StatusTimer(threading.Thread):
+    """Publishes the status of goals at a fixed rate of real time.
+
+    rospy's timers wake at every message of /clock, and stop when time is held.
+
+    Args:
+        server: Whose goals.
+        period_s: Real time between two messages [s].
+    """
+
+    def __init__(self, server: ActionServer, period_s: float) -> None:
+        super().__init__(daemon=True, name=f"status of {server.ns}")
+        self._server, self._period_s = server, period_s
+        self._ended = threading.Event()
+
+    def run(self) -> None:
+        """Publishes until the end."""
+        while not self._ended.wait(self._period_s) and not rospy.is_shutdown():
+            self._server.publish_status_async(None)
+
+    def shutdown(self) -> None:
+        """Ends it; does not wait."""
+        self._ended.set()
+
+
 class SteadyActionServer(ActionServer):
-    """An action server whose status topic survives a reset of the simulated clock, and whose clients hear of every end.
+    """An action server whose status topic does not depend on simulated time, and whose clients hear of every end.
 
     The result of a goal that ends at once is published EARLIEST_END_S after the goal arrived.
     """
@@ -32,8 +57,8 @@ class SteadyActionServer(ActionServer):
         timer: rospy.Timer | None = getattr(self, "status_timer", None)
         if timer is not None:
             timer.shutdown()
-            period = rospy.Duration(1.0 / self.status_frequency)
-            self.status_timer = rospy.Timer(period, self.publish_status_async, reset=True)
+            self.status_timer = _StatusTimer(self, 1.0 / self.status_frequency)
+            self.status_timer.start()
 
     def internal_goal_callback(self, goal: Any) -> None:
         self._arrival_s[goal.goal_id.id] = time.monotonic()

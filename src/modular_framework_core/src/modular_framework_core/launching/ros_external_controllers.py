@@ -35,7 +35,7 @@ def main() -> int:
     Returns:
         0 when ROS shuts down, 1 when the node died, 2 when the parameters are incomplete.
     """
-    rospy.init_node("external_controllers_spawner", anonymous=True)
+    rospy.init_node("external_controllers_spawner", anonymous=True, disable_rostime=True)  # it needs no /clock
     try:
         keys = (PACKAGE_KEY, TYPE_KEY, NAME_KEY)
         node = controller_node({key: rospy.get_param(key) for key in keys if rospy.has_param(key)})

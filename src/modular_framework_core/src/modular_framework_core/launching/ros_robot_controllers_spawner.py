@@ -208,7 +208,7 @@ def _set_when_true(message: Bool, event: threading.Event) -> None:
 
 def main() -> int:
     """Runs the node: 0 when all controllers run, 1 when not, 2 for a wrong call."""
-    rospy.init_node("custom_controller_spawner")
+    rospy.init_node("custom_controller_spawner", disable_rostime=True)  # it needs no /clock
     arguments = rospy.myargv(sys.argv)[1:]
     if len(arguments) != 2:
         rospy.logfatal("usage: robot_controllers_spawner ROBOT_PACKAGE CONTROLLER_FILE; got %s", arguments)

@@ -191,25 +191,26 @@ class SimulationLoop:
         self.pacer.start(self._time_s())
         while not self._stop.is_set():
             self.requests.run_pending()
+            moving = self._actors is not None and self._actors.controllers.moving
             if self._paused:
                 self._on_paused_tick()
                 if self._actors is not None:
                     # Controllers can be loaded and started while time is paused.
                     self._update_controllers(self._actors.controllers, 0.0)
                 self.requests.wait(_PAUSED_TICK_S)
-            elif self.holds.may_pass(self.world.steps, self._actors is not None and self._actors.controllers.moving):
-                self._pass_time()
+            elif self.holds.may_pass(self.world.steps, moving):
+                self._pass_time(calm=not moving and self._is_at_rest())
             else:
                 self._stand_still()
         if self._actors is not None and not self._paused:
             self._halt(self._actors.robot)
 
-    def _pass_time(self) -> None:
+    def _pass_time(self, calm: bool) -> None:
         if self.held:
             self._held_at = -1
             self.pacer.start(self._time_s())
         self.step()
-        self.pacer.keep(self._time_s(), idle=not self.holds.owners)
+        self.pacer.keep(self._time_s(), idle=not self.holds.owners, calm=calm)
 
     def _stand_still(self) -> None:
         """Lets the controllers take up goals while time is held; at first, lets them report the state of now."""
@@ -233,8 +234,13 @@ class SimulationLoop:
             while self._time_s() - begun_s < shortest_s:
                 self.step()
                 self.pacer.keep(self._time_s())
-            if all(abs(reading.velocity) < _AT_REST for reading in robot.read()):
+            robot.read()
+            if self._is_at_rest():
                 return
+
+    def _is_at_rest(self) -> bool:
+        """Whether no joint of the robot moved when they were last measured."""
+        return self._actors is None or all(abs(joint.velocity) < _AT_REST for joint in self._actors.robot.readings)
 
     def _update_controllers(self, controllers: Controllers, period_s: float) -> None:
         reason, self._reset_reason = self._reset_reason, ""
