@@ -13,6 +13,7 @@ from modular_framework_simulation.errors import UnknownEntityError
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
+from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
 from modular_framework_simulation.sensors.force_torque import (
@@ -32,6 +33,12 @@ TRANSMISSION = """<transmission name="t_{joint}"><type>transmission_interface/Si
 LIMIT = '<limit lower="-3" upper="3" effort="500" velocity="5"/>'
 PLUGIN = """<gazebo><plugin name="ft" filename="libgazebo_ros_ft_sensor.so"><updateRate>250</updateRate>
   <topicName>wrist/wrench</topicName><jointName>wrist</jointName></plugin></gazebo>"""
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    """Every engine."""
+    return str(request.param)
 
 
 def urdf(kind: str, plugin: str = PLUGIN) -> str:

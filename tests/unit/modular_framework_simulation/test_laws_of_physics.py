@@ -198,6 +198,16 @@ def test_joint_damping_takes_the_velocity_exponentially_however_strong(make_worl
     assert joint_state(world, "wheel", "hinge")[1] == pytest.approx(10 * math.exp(-rate * 0.1), rel=0.01, abs=1e-3)
 
 
+def test_joint_damping_is_right_on_a_base_with_moments_that_no_body_can_have(make_world: MakeWorld) -> None:
+    world = make_world(gravity=(0.0, 0.0, 0.0))
+    model = jointed("wheel", 0.0, dynamics=specs.JointDynamics(damping=0.005), pose=Pose((0, 0, 1)))
+    base = specs.Link("base", Pose(), specs.Inertial(Pose(), 100.0, (1, 0, 0, 100, 0, 1)), (), ())
+    world.spawn(replace(model, links=(base, *model.links), joints=(replace(model.joints[0], parent="base"),)))
+    set_joint_velocity(world, "wheel", "hinge", 10.0)
+    run(world, 0.1)
+    assert joint_state(world, "wheel", "hinge")[1] == pytest.approx(10 * math.exp(-0.1 * 0.005 / 0.001), rel=0.01)
+
+
 def test_joint_friction_takes_the_same_from_the_velocity_every_second_and_holds(make_world: MakeWorld) -> None:
     world = make_world(gravity=(0.0, 0.0, 0.0))
     world.spawn(jointed("wheel", 0.0, dynamics=specs.JointDynamics(friction=0.02)))

@@ -9,7 +9,12 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_frames import FrameTree
 from modular_framework_simulation.models.sdf_notes import Notes
 from modular_framework_simulation.models.sdf_surface import non_negative
-from modular_framework_simulation.models.solid_inertia import inertial_of_shapes, principal_moments, with_mass
+from modular_framework_simulation.models.solid_inertia import (
+    inertial_of_shapes,
+    is_impossible,
+    principal_moments,
+    with_mass,
+)
 from modular_framework_simulation.models.xml_nodes import XmlNode
 
 WATER_KG_PER_M3 = 1000.0
@@ -70,7 +75,7 @@ def usable(
     least, middle, largest = principal_moments(inertial.inertia)
     given = f"its principal moments are {least:g}, {middle:g}, {largest:g} kg m^2"
     if least > 0:
-        if largest > (least + middle) * (1 + _ROUNDING):
+        if is_impossible(inertial.inertia, _ROUNDING):
             notes.add(node, f"{given}: no rigid body has such moments, they are used as they are")
         return inertial
     solid = inertial_of_shapes([(shape, WATER_KG_PER_M3) for shape in collisions])

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import load_mesh
@@ -63,6 +64,31 @@ def principal_moments(inertia: tuple[float, float, float, float, float, float]) 
     xx, xy, xz, yy, yz, zz = inertia
     values = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     return (float(values[0]), float(values[1]), float(values[2]))
+
+
+def is_impossible(inertia: tuple[float, float, float, float, float, float], tolerance: float = 0.0) -> bool:
+    """Whether no rigid body has such an inertia: its largest principal moment is above the sum of the others.
+
+    Args:
+        inertia: xx, xy, xz, yy, yz, zz [kg m^2].
+        tolerance: Share by which it may be above that.
+    """
+    least, middle, largest = principal_moments(inertia)
+    return largest > (least + middle) * (1.0 + tolerance)
+
+
+def along_principal_axes(inertial: specs.Inertial) -> specs.Inertial:
+    """Returns the same inertia in a frame of its principal axes."""
+    xx, xy, xz, yy, yz, zz = inertial.inertia
+    if (xy, xz, yz) == (0.0, 0.0, 0.0):
+        return inertial
+    moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    axes[:, 0] *= np.linalg.det(axes)
+    x, y, z, w = Rotation.from_matrix(axes).as_quat().tolist()
+    one, two, three = moments.tolist()
+    return specs.Inertial(
+        inertial.pose @ Pose((0.0, 0.0, 0.0), (x, y, z, w)), inertial.mass, (one, 0.0, 0.0, two, 0.0, three)
+    )
 
 
 def _six(tensor: Array) -> tuple[float, float, float, float, float, float]:

@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
@@ -180,9 +181,24 @@ class PyBulletEngine(PhysicsEngine):
         except self.api.error as error:
             problem = f"is refused by the physics engine ({error})"
             raise DescriptionError(f"model '{name}'", problem, "check its shapes and joints") from error
+        self._set_dropped_moments(body, text)
         has_joints = any(info[2] != self.api.JOINT_FIXED for info in self.joint_infos(body))
         self._rest.add(body, fixed, has_joints)
         return body
+
+    def _set_dropped_moments(self, body: int, text: str) -> None:
+        """Gives links their moments of inertia where the loader set them to 0: where no rigid body can have them."""
+        names = [self.root_link(body), *(joint.child_link for joint in self.joints(body))]
+        dropped = {}
+        for index, name in enumerate(names, BASE_INDEX):
+            mass, _, moments, *_ = self.api.getDynamicsInfo(body, index, physicsClientId=self.client)
+            if mass > 0.0 and not any(moments):
+                dropped[name] = index
+        for link in ElementTree.fromstring(text).findall("link") if dropped else ():
+            inertia, number = link.find("inertial/inertia"), dropped.get(link.get("name", ""))
+            if inertia is not None and number is not None:
+                moments = [float(inertia.get(key, "0")) for key in ("ixx", "iyy", "izz")]
+                self.api.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=self.client)
 
     def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
         """Returns the engine's record of every joint of a body, in the order of the link numbers."""
