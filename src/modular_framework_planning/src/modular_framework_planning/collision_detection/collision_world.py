@@ -101,7 +101,6 @@ def _link_bounding_geometries(model: RobotModel) -> tuple[BoundingGeometry, ...]
     return tuple(result)
 
 
-@lru_cache(maxsize=KEPT_GROUPINGS)
 def _link_surfaces(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple[int, ...]]:
     """Surfaces of groups of links that share a joint, and the root of each group."""
     shapes = _link_bounding_geometries(model)
@@ -195,8 +194,8 @@ def compile_world(
         check_interrupt: called between shapes; raises an exception to stop.
     """
     groups = _groups(model, parts, pairs)
-    robot, roots = _link_surfaces(model, groups)
-    members, member_of = _link_members(model, parts, groups, robot, roots)
+    robot, joined, member_of_link = _link_members(model, groups)
+    members, member_of = list(joined), dict(member_of_link)
     scene = _add_others(model, parts, pairs, members, member_of, check_interrupt)
     of_part = np.zeros(len(parts), dtype=np.int64)
     of_part[list(member_of.keys())] = list(member_of.values())
@@ -240,17 +239,17 @@ def _distinct(
     return chosen[first[order]], rows
 
 
-def _link_members(
-    model: RobotModel, parts: Sequence[PlacedGeometry], groups: Grouping, robot: Surfaces, roots: Sequence[int]
-) -> tuple[list[_Member], dict[int, int]]:
+@lru_cache(maxsize=KEPT_GROUPINGS)
+def _link_members(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple[_Member, ...], dict[int, int]]:
+    """Returns the surfaces of groups of links, a body for each group, and which one each link is part of."""
     members, member_of = [], {}
+    robot, roots = _link_surfaces(model, groups)
     for group, root in zip(groups, roots, strict=True):
-        shapes = [_link_bounding_geometries(model)[number] for number in group]
-        closed = all(shape.is_closed for shape in shapes)
-        shape = BoundingGeometry(None, is_closed=closed)
-        members.append(_Member(shape, parts[group[0]].joint_id - 1, np.eye(4)[:3], root, False, robot.spheres[root]))
+        closed = all(_link_bounding_geometries(model)[number].is_closed for number in group)
+        joint, shape = model.link_geometries[group[0]].joint_id - 1, BoundingGeometry(None, is_closed=closed)
+        members.append(_Member(shape, joint, np.eye(4)[:3], root, False, robot.spheres[root]))
         member_of.update(dict.fromkeys(group, len(members) - 1))
-    return members, member_of
+    return robot, tuple(members), member_of
 
 
 def _add_others(
@@ -419,27 +418,28 @@ def _with_field(world: World) -> World:
     bodies, solids_of = world.pairs[solid_pairs].T
     pair_of = np.full((len(world.joints), len(world.joints)), -1)
     pair_of[bodies, solids_of] = solid_pairs
-    partners = {body: tuple(np.flatnonzero(pair_of[body] >= 0).tolist()) for body in dict.fromkeys(bodies.tolist())}
-    counts = Counter(partners.values())
-    solids = max(counts, key=lambda item: (counts[item] * len(item), item), default=())
-    chosen = list(solids)
-    replaced: list[NDArray[np.int64]] = []
-    rows = []
-    for body in partners if len(solids) > 1 else ():
-        numbers = pair_of[body, chosen]
-        if numbers.min() >= 0 and np.ptp(world.margins[numbers]) == 0.0:
-            replaced.append(numbers)
-            rows.append((body, FIELD))
-    if not replaced:
+    partners: dict[int, list[int]] = {}
+    for body, solid in zip(bodies.tolist(), solids_of.tolist(), strict=True):
+        partners.setdefault(body, []).append(solid)
+    counts: Counter[tuple[int, ...]] = Counter(tuple(sorted(solids)) for solids in partners.values())
+    chosen = np.array(max(counts, key=lambda item: (counts[item] * len(item), item), default=()), dtype=np.int64)
+    if len(chosen) < 2:
         return world
-    count, represented = len(world.pairs), np.array(replaced)
+    moving = np.array(list(partners))
+    numbers = pair_of[np.ix_(moving, chosen)]
+    margins = world.margins[numbers]
+    is_joined = (numbers >= 0).all(axis=1) & (margins == margins[:, :1]).all(axis=1)
+    if not is_joined.any():
+        return world
+    rows = np.column_stack([moving[is_joined], np.full(np.count_nonzero(is_joined), FIELD)])
+    count, represented = len(world.pairs), numbers[is_joined]
     field = _field(
         world.kinds[chosen], world.sizes[chosen], world.poses[chosen], min(farthest_end(world), FIELD_REACH_M)
     )
     is_watched = np.ones(count, dtype=bool)
     is_watched[represented] = False
     return world._replace(
-        pairs=np.concatenate([world.pairs, np.array(rows, dtype=np.int64)]),
+        pairs=np.concatenate([world.pairs, rows]),
         margins=np.concatenate([world.margins, world.margins[represented[:, 0]]]),
         excess=np.concatenate([world.excess, world.excess[represented].max(axis=1)]),
         table_of=np.concatenate([world.table_of, np.full(len(rows), -1)]),

@@ -207,7 +207,7 @@ class ExactCollisionChecker:
     def fixed_contacts(self, positions: Array) -> list[Contact]:
         """Returns contacts of watched pairs the moving joints cannot change."""
         numbers = np.flatnonzero(self._pairs.fixed).tolist()
-        return [contact for _, contact in self._exact.contacts(positions, numbers)]
+        return [contact for _, contact in self._exact.contacts(positions, numbers)] if numbers else []
 
     def distance(self, positions: Array) -> float:
         """Returns the smallest distance [m] between bodies that may not touch; 0 or less when they do."""

@@ -110,10 +110,10 @@ class MotionChecker:
 
     def _unchecked(self, polyline: Array, step: float) -> list[Array]:
         """Returns a polyline without its pieces on free edges; all of its vertices stay."""
-        free = self.memory.ends[self.memory.verdicts == FREE]
-        if step < self._remembered_step or not len(free):
+        if step < self._remembered_step:
             return [polyline]
-        known = pieces_on_edges(np.ascontiguousarray(polyline), free, KNOWN_STEPS * step, ON_EDGE)
+        is_free = self.memory.verdicts == FREE
+        known = pieces_on_edges(np.ascontiguousarray(polyline), self.memory.ends, is_free, KNOWN_STEPS * step, ON_EDGE)
         return np.split(polyline, known + 1) if len(known) else [polyline]
 
     def full_path(self, path: Array) -> Array:

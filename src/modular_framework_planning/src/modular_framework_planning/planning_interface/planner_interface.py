@@ -17,7 +17,7 @@ from modular_framework_planning.constraints.kinematic_constraints import Kinemat
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
-from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CompiledChecks
+from modular_framework_planning.planning_interface.collision_checker import CollisionChecker
 from modular_framework_planning.planning_interface.goals import GoalResolver
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.phase_times import GOALS, PhaseTimes
@@ -114,9 +114,10 @@ class PlanningProblem:
     @property
     def compiled_world(self) -> World | None:
         """The world in which compiled loops may check straight motions; None where these have to do more than that."""
-        if self.constraints is not None or not isinstance(self.checker, CompiledChecks):
+        if self.constraints is not None:
             return None
-        return self.checker.compiled_world
+        world: World | None = getattr(self.checker, "compiled_world", None)  # see the protocol CompiledChecks
+        return world
 
     def search_bounds(self, around: Array) -> tuple[Array, Array]:
         """Returns the bounds, no wider than two turns around joint vectors; a workspace is kept whole.

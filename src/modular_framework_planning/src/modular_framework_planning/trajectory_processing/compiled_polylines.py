@@ -50,12 +50,15 @@ def needed_vertices(path: Array, tolerance: float) -> NDArray[np.int64]:
 
 
 @njit(cache=True, nogil=True)
-def pieces_on_edges(path: Array, edges: Array, shortest: float, tolerance: float) -> NDArray[np.int64]:
+def pieces_on_edges(
+    path: Array, edges: Array, counts: NDArray[np.bool_], shortest: float, tolerance: float
+) -> NDArray[np.int64]:
     """Returns the numbers of the pieces of a polyline that lie on an edge.
 
     Args:
         path: polyline of shape (n, joints).
         edges: both ends of each, shape (m, 2, joints).
+        counts: whether an edge is one of those, shape (m,).
         shortest: of the pieces that are looked for, by the joint that moves farthest [rad or m].
         tolerance: distance of a point from an edge, of any joint, at which it lies on it [rad or m].
     """
@@ -68,7 +71,11 @@ def pieces_on_edges(path: Array, edges: Array, shortest: float, tolerance: float
         if widest <= shortest:
             continue
         for edge in range(len(edges)):
-            if _is_on(path[number], edges[edge], tolerance) and _is_on(path[number + 1], edges[edge], tolerance):
+            if (
+                counts[edge]
+                and _is_on(path[number], edges[edge], tolerance)
+                and _is_on(path[number + 1], edges[edge], tolerance)
+            ):
                 found[used] = number
                 used += 1
                 break
@@ -93,4 +100,4 @@ def warm_up() -> None:
     """Compiles the loops of this module, or loads them."""
     path = np.array([[0.0, 0.0], [1.0, 0.0]])
     needed_vertices(path, 0.0)
-    pieces_on_edges(path, path[None], 0.0, 0.0)
+    pieces_on_edges(path, path[None], np.ones(1, dtype=bool), 0.0, 0.0)
