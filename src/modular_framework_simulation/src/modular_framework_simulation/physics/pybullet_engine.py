@@ -13,7 +13,6 @@ import tempfile
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +39,7 @@ from modular_framework_simulation.physics.physics_settings import PhysicsSetting
 from modular_framework_simulation.physics.pybullet_rest import Rest
 from modular_framework_simulation.physics.simulated_body import add, cross
 from modular_framework_simulation.physics.surfaces import softness_of
+from modular_framework_urdf import xml_text
 from modular_framework_urdf.rotations import Quaternion, Vector3, rotate_vector
 
 _RIGID_DAMPING = 1e9
@@ -194,7 +194,7 @@ class PyBulletEngine(PhysicsEngine):
             mass, _, moments, *_ = self.api.getDynamicsInfo(body, index, physicsClientId=self.client)
             if mass > 0.0 and not any(moments):
                 dropped[name] = index
-        for link in ElementTree.fromstring(text).findall("link") if dropped else ():
+        for link in xml_text.parse(text, f"body {body}").findall("link") if dropped else ():
             inertia, number = link.find("inertial/inertia"), dropped.get(link.get("name", ""))
             if inertia is not None and number is not None:
                 moments = [float(inertia.get(key, "0")) for key in ("ixx", "iyy", "izz")]
