@@ -142,7 +142,7 @@ class SeededPlanning:
         """Returns when an answer begins to arrive; raises PlanningError when the caller gives up before."""
         end = time.monotonic() + request.allowed_time_s + GRACE_S
         begun = time.monotonic()
-        while not connection.poll(POLL_S):
+        while True:
             if request.cancelled():
                 raise PlanningError(
                     ErrorCode.PREEMPTED, f"planning was cancelled after {time.monotonic() - begun:.2f} s"
@@ -152,3 +152,5 @@ class SeededPlanning:
                     ErrorCode.TIMED_OUT,
                     f"the process of a seeded plan gave no answer within {request.allowed_time_s + GRACE_S:.0f} s",
                 )
+            if connection.poll(POLL_S):
+                return
