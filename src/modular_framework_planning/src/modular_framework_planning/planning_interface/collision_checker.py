@@ -122,7 +122,6 @@ class CollisionCostEstimator(Protocol):
         ...
 
 
-@runtime_checkable
 class CompiledChecks(Protocol):
     """An optional property of checkers for searches that are compiled; without it they call `path_is_free`."""
 

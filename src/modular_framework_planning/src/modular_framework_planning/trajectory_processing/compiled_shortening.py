@@ -7,7 +7,7 @@ Three things are done to a path, one after the other:
 - Random pairs of points of the path are joined directly where that is shorter.
 - Each inner vertex is moved half of the way to the line between its neighbours.
 
-`ask` goes on to the next edge that would change the path, and `answer` tells it whether that one is free.
+`ask` goes on to the next edge that would change the path, and `answer` takes whether that one is free.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ LEAST_PULL = 0.003  # gain of a vertex that is moved, as a share of the path's l
 MOST_PULLS = 2  # of each vertex
 PATIENCE = 20  # cuts without success in a row after which no more are tried
 SAME = 1e-9  # [rad or m]; shortest edge, and least turn of a unit vector at a vertex
-EDGES = 100  # that are checked in one call, so that the clock is looked at in between
+EDGES = 100  # that are checked in one call, so that the time is checked in between
 
 # What is being done to the path
 DROPS, CUTS, PULLS, DONE = range(4)

@@ -72,10 +72,10 @@ def usable(
         node: The element the moments stand in.
         notes: Takes what was replaced.
     """
-    least, middle, largest = principal_moments(inertial.inertia)
-    given = f"its principal moments are {least:g}, {middle:g}, {largest:g} kg m^2"
-    if least > 0:
-        if is_impossible(inertial.inertia, _ROUNDING):
+    moments = principal_moments(inertial.inertia)
+    given = "its principal moments are {:g}, {:g}, {:g} kg m^2".format(*moments)
+    if moments[0] > 0:
+        if is_impossible(moments, _ROUNDING):
             notes.add(node, f"{given}: no rigid body has such moments, they are used as they are")
         return inertial
     solid = inertial_of_shapes([(shape, WATER_KG_PER_M3) for shape in collisions])

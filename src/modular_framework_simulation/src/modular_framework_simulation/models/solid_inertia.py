@@ -66,14 +66,14 @@ def principal_moments(inertia: tuple[float, float, float, float, float, float]) 
     return (float(values[0]), float(values[1]), float(values[2]))
 
 
-def is_impossible(inertia: tuple[float, float, float, float, float, float], tolerance: float = 0.0) -> bool:
-    """Whether no rigid body has such an inertia: its largest principal moment is above the sum of the others.
+def is_impossible(moments: tuple[float, float, float], tolerance: float = 0.0) -> bool:
+    """Whether no rigid body has such principal moments: the largest one is above the sum of the others.
 
     Args:
-        inertia: xx, xy, xz, yy, yz, zz [kg m^2].
+        moments: In any order [kg m^2].
         tolerance: Share by which it may be above that.
     """
-    least, middle, largest = principal_moments(inertia)
+    least, middle, largest = sorted(moments)
     return largest > (least + middle) * (1.0 + tolerance)
 
 
@@ -83,7 +83,8 @@ def along_principal_axes(inertial: specs.Inertial) -> specs.Inertial:
     if (xy, xz, yz) == (0.0, 0.0, 0.0):
         return inertial
     moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    axes[:, 0] *= np.linalg.det(axes)
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
     x, y, z, w = Rotation.from_matrix(axes).as_quat().tolist()
     one, two, three = moments.tolist()
     return specs.Inertial(

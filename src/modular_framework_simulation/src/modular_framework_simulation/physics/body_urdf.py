@@ -17,7 +17,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.joint_trees import JointTree, joint_trees
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.solid_inertia import along_principal_axes, is_impossible
+from modular_framework_simulation.models.solid_inertia import along_principal_axes, is_impossible, principal_moments
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_urdf.rotations import rpy_from_quaternion
 
@@ -113,7 +113,9 @@ class _Writer:
     def inertial(self, link: specs.Link, shift: Pose) -> str:
         """Writes the mass properties of a link."""
         inertial = link.inertial or specs.Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
-        if is_impossible(inertial.inertia):  # the engine takes moments of such a link, but no products
+        if is_impossible(
+            principal_moments(inertial.inertia)
+        ):  # the engine takes moments of such a link, but no products
             inertial = along_principal_axes(inertial)
         names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         moments = " ".join(f'{name}="{value!r}"' for name, value in zip(names, inertial.inertia, strict=True))

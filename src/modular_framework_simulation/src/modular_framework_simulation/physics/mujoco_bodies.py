@@ -18,6 +18,8 @@ import trimesh
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.models.sdf_specs import Inertial
+from modular_framework_simulation.models.solid_inertia import along_principal_axes, is_impossible
 from modular_framework_simulation.physics.physics_engine import (
     BASE_INDEX,
     EngineJoint,
@@ -179,21 +181,16 @@ def _mass(inertial: Element | None, where: str, log: Log) -> MassProperties:
         return MassProperties(0.0, (0.0, 0.0, 0.0), Pose())
     record = inertial.find("inertia")
     xx, xy, xz, yy, yz, zz = (float(record.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    centre, moments = _origin(inertial), np.array([xx, yy, zz])
-    if (xy, xz, yz) != (0.0, 0.0, 0.0):
-        moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-        if np.linalg.det(axes) < 0.0:
-            axes[:, 0] *= -1.0
-        centre = centre @ Pose((0.0, 0.0, 0.0), _quaternion(axes))
-    largest = int(np.argmax(moments))
-    if moments[largest] > (moments.sum() - moments[largest]) * (1.0 + _LEAST_IMBALANCE):
+    mass = float(inertial.find("mass").get("value"))
+    turned = along_principal_axes(Inertial(_origin(inertial), mass, (xx, xy, xz, yy, yz, zz)))
+    moments = turned.inertia[0], turned.inertia[3], turned.inertia[5]
+    if is_impossible(moments, _LEAST_IMBALANCE):
         log(
-            f"{where}: no rigid body has the moments of inertia {[float(each) for each in moments]}: the largest is "
-            "above the sum of the others. MuJoCo refuses them; their mean stands for all three"
+            f"{where}: no rigid body has the moments of inertia {list(moments)}: the largest is above the sum of the "
+            "others. MuJoCo refuses them; their mean stands for all three"
         )
-        moments = np.full(3, moments.mean())
-    x, y, z = moments.tolist()
-    return MassProperties(float(inertial.find("mass").get("value")), (x, y, z), centre)
+        moments = (sum(moments) / 3.0,) * 3
+    return MassProperties(mass, moments, turned.pose)
 
 
 def _shape(collision: Element, model: str, link: str) -> Shape:
@@ -233,13 +230,6 @@ def _origin(element: Element) -> Pose:
     origin, zero = element.find("origin"), (0.0, 0.0, 0.0)
     (x, y, z), (roll, pitch, yaw) = _numbers(origin, "xyz", zero), _numbers(origin, "rpy", zero)
     return Pose.from_xyz_rpy((x, y, z), (roll, pitch, yaw))
-
-
-def _quaternion(matrix: np.ndarray) -> Quaternion:
-    result = np.zeros(4)
-    mujoco.mju_mat2Quat(result, np.ascontiguousarray(matrix).reshape(9))
-    w, x, y, z = result.tolist()
-    return (x, y, z, w)
 
 
 def _rotation_to(normal: Iterable[float]) -> Quaternion:
