@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bodies that an engine leaves out while they lie still move again when they would have moved anyway."""
+"""Bodies, and whole worlds, that are left out while they lie still move again when they would have moved anyway."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
-from modular_framework_simulation.physics.applied_forces import Interval, LinkWrench
+from modular_framework_simulation.models.sdf_reader import read_model_text
+from modular_framework_simulation.models.sdf_resources import Resources
+from modular_framework_simulation.physics.applied_forces import Interval, JointEffort, LinkWrench
 from modular_framework_simulation.physics.engine_choice import ENGINES, PYBULLET
+from modular_framework_simulation.physics.model_changes import JointChange, set_joint, set_joint_positions
 from modular_framework_simulation.physics.part_names import PartName
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import Drive, Mode, RobotBody
-from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_simulation.physics.simulated_body import BodyState, JointSettings, Twist
 
 GRAVITY = 9.81
 CUBE = specs.Box((0.05, 0.05, 0.05))
@@ -34,6 +37,11 @@ TRAY = """<robot name="tray"><link name="world"/>
     <joint name="lift"><hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint>
     <actuator name="a"/></transmission></robot>"""
 TOP = Pose((0, 0, 0.575))
+WHEEL = """<sdf version='1.6'><model name='wheel'><pose>2 0 1 0 0 0</pose><link name='disc'>
+  <inertial><mass>1</mass><inertia><ixx>.01</ixx><iyy>.01</iyy><izz>.01</izz></inertia></inertial></link>
+  <joint name='axle' type='revolute'><parent>world</parent><child>disc</child>
+  <axis><xyz>0 0 1</xyz><dynamics><friction>0.01</friction></dynamics></axis></joint></model></sdf>"""
+AXLE = PartName("wheel", "axle")
 
 MakeWorld = Callable[..., PhysicsWorld]
 
@@ -165,6 +173,116 @@ def test_what_a_robot_carried_falls_when_the_robot_is_gone_at_once(
     tray.body.set_joints({"lift": -0.4})
     stand(-0.4, 0.2)
     assert height(world) == pytest.approx(0.535 - 0.5 * GRAVITY * 0.2**2, abs=0.01)
+
+
+class Lift:
+    """A world with a tray that a controller holds, a cube on the floor and a wheel on an axle."""
+
+    def __init__(self, world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+        self.world = world
+        self.tray = RobotBody(world, read_robot(TRAY, str, convex_parts, False), "tray", Pose(), {})
+        self.target_m = 0.0
+        self.computed_steps = 0
+        world.spawn(solid("cube", CUBE, Pose((1, 0, 0.025))))
+        world.spawn(read_model_text(WHEEL, "text", Resources()))
+        self._engine_step = world.engine.step
+
+    def count_steps(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Counts the steps that the engine computes from now on."""
+
+        def step() -> None:
+            self.computed_steps += 1
+            self._engine_step()
+
+        monkeypatch.setattr(self.world.engine, "step", step)
+
+    def run(self, seconds: float) -> None:
+        """Lets time pass, with the controller on."""
+        for _ in range(round(seconds / self.world.settings.time_step_s)):
+            self.tray.read()
+            self.tray.drive({"lift": Drive(Mode.POSITION, self.target_m, 0.0, 500.0)})
+            self.world.step()
+
+    def positions(self) -> tuple[float, ...]:
+        """Height of the tray and of the cube, position of the cube, angle of the wheel."""
+        wheel = self.world.body("wheel")
+        cube = self.world.entity_state("cube").pose.position
+        angle = self.world.engine.joint_states(wheel.number, [wheel.joint_indices["axle"]])[0].position
+        return (self.world.entity_state("tray::plate").pose.position[2], *cube, angle)
+
+
+@pytest.fixture
+def lift(world: PhysicsWorld, convex_parts: ConvexParts, monkeypatch: pytest.MonkeyPatch) -> Lift:
+    """A lift at rest."""
+    made = Lift(world, convex_parts)
+    made.run(LONG_S)
+    made.count_steps(monkeypatch)
+    return made
+
+
+def test_steps_of_a_world_at_rest_are_not_computed(lift: Lift) -> None:
+    before, time_ns, steps = lift.positions(), lift.world.time_ns, lift.world.steps
+    lift.run(2.0)
+    assert lift.computed_steps == 0
+    assert lift.positions() == before
+    assert lift.world.time_ns == time_ns + 2_000_000_000
+    assert lift.world.steps == steps + 1000
+    assert [reading.effort for reading in lift.tray.read()] == pytest.approx([GRAVITY], rel=1e-3)
+
+
+def command(lift: Lift) -> None:
+    lift.target_m = 0.1
+
+
+def push(lift: Lift) -> None:
+    begin = lift.world.time_ns + 200_000_000
+    wrench = LinkWrench(PartName("cube", "link"), (5.0, 0, 0), (0, 0, 0), Interval(begin, begin + 100_000_000))
+    lift.world.forces.add_wrench(wrench)
+
+
+def turn(lift: Lift) -> None:
+    lift.world.forces.add_effort(JointEffort(AXLE, 0.1, Interval(lift.world.time_ns, None)))
+
+
+def start_motor(lift: Lift) -> None:
+    set_joint(lift.world, AXLE, JointChange(None, None, JointSettings(None, 1.0, 5.0)))
+
+
+def put_wheel(lift: Lift) -> None:
+    set_joint_positions(lift.world, "wheel", {"axle": 0.5})
+
+
+def throw(lift: Lift) -> None:
+    lift.world.set_state("cube", BodyState(Pose((1, 0, 0.5)), Twist((0.2, 0, 0))))
+
+
+def tilt(lift: Lift) -> None:
+    lift.world.set_physics(lift.world.settings, (20.0, 0.0, -GRAVITY))
+
+
+def hit(lift: Lift) -> None:
+    lift.world.spawn(solid("ball", specs.Sphere(0.05), Pose((0.8, 0, 0.05)), mass=2.0))
+    lift.world.set_state("ball", BodyState(Pose((0.8, 0, 0.05)), Twist((1.0, 0, 0))))
+
+
+@pytest.mark.parametrize("action", [command, push, turn, start_motor, put_wheel, throw, tilt, hit])
+def test_what_is_done_to_a_world_at_rest_moves_it(lift: Lift, action: Callable[[Lift], None]) -> None:
+    lift.run(0.5)
+    before = lift.positions()
+    action(lift)
+    lift.run(1.0)
+    assert lift.computed_steps > 50
+    assert max(abs(a - b) for a, b in zip(lift.positions(), before, strict=True)) > 0.005
+
+
+def test_a_body_at_the_top_of_its_flight_is_not_taken_for_one_at_rest(make_world: MakeWorld) -> None:
+    for steps in (49, 50, 51, 99, 100, 101):
+        world = make_world()
+        world.spawn(solid("cube", CUBE, Pose((0, 0, 1))))
+        upwards = GRAVITY * world.settings.time_step_s * steps
+        world.set_state("cube", BodyState(Pose((0, 0, 1)), Twist((0, 0, upwards))))
+        run(world, 2 * steps * world.settings.time_step_s)
+        assert world.entity_state("cube").twist.linear[2] == pytest.approx(-upwards, rel=0.02)
 
 
 def test_the_state_of_a_world_with_bodies_at_rest_is_not_saved(table: PhysicsWorld, engine: str) -> None:

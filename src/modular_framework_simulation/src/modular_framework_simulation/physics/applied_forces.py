@@ -85,6 +85,11 @@ class AppliedForces:
         self._wrenches: list[LinkWrench] = []
         self._efforts: list[JointEffort] = []
 
+    @property
+    def pending(self) -> bool:
+        """Whether something acts or will act."""
+        return bool(self._wrenches or self._efforts)
+
     def add_wrench(self, wrench: LinkWrench) -> None:
         """Adds a force and a torque; several on one link add up."""
         self._wrenches.append(wrench)
@@ -129,7 +134,7 @@ class AppliedForces:
             time_ns: Simulated time at the beginning of the step [ns].
             bodies: The models by name.
         """
-        if not (self._wrenches or self._efforts):
+        if not self.pending:
             return
         self._wrenches = [each for each in self._wrenches if not each.interval.is_over(time_ns)]
         self._efforts = [each for each in self._efforts if not each.interval.is_over(time_ns)]

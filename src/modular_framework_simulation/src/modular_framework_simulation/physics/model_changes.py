@@ -142,6 +142,7 @@ def set_joint(world: PhysicsWorld, joint: PartName, change: JointChange) -> None
         )
         _recreate(world, replace(body.spec, joints=joints))
     apply_settings(world.engine, world.body(joint.model), joint.part, change.settings)
+    world.rest.disturb()
 
 
 def set_joint_positions(world: PhysicsWorld, model: str, positions: dict[str, float]) -> None:

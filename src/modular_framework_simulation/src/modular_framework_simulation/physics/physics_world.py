@@ -28,6 +28,7 @@ from modular_framework_simulation.physics.physics_engine import BASE_INDEX, Log
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
 from modular_framework_simulation.physics.surfaces import surface_of
+from modular_framework_simulation.physics.world_rest import WorldRest
 from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 WORLD_FRAMES = ("", "world", "map", "/map")
@@ -121,6 +122,7 @@ class PhysicsWorld:
         self.gravity = gravity
         self.engine = make_engine(engine, settings, gravity, gui, log)
         self.forces = AppliedForces(self.engine)
+        self.rest = WorldRest(self.engine)
         self._initial_physics = (settings, gravity)
         self._convex_parts = convex_parts
         self._log = log
@@ -150,7 +152,16 @@ class PhysicsWorld:
         return self._steps
 
     def step(self) -> None:
-        """Advances the world by one time step."""
+        """Advances the world by one time step; what is at rest stays where it is, and is not computed."""
+        if self.forces.pending:
+            self.rest.disturb()
+        if not self.rest.holds:
+            self._compute_step()
+            self.rest.after_step(self._bodies.values())
+        self._steps += 1
+        self._time_ns += self.settings.time_step_ns
+
+    def _compute_step(self) -> None:
         for forces in self._forces.values():
             for force in forces:
                 force.apply(self.gravity)
@@ -160,8 +171,6 @@ class PhysicsWorld:
         self.engine.step()
         for carried in self._carried.values():
             carried.after_step()
-        self._steps += 1
-        self._time_ns += self.settings.time_step_ns
 
     def set_physics(self, settings: PhysicsSettings, gravity: Vector3) -> None:
         """Continues with other settings, until `restart`.
@@ -171,6 +180,7 @@ class PhysicsWorld:
             gravity: [m/s^2]
         """
         self.engine.adjust(settings, gravity)
+        self.rest.disturb()
         self.settings, self.gravity = settings, gravity
         for body in self._bodies.values():  # how surfaces and joints resist depends on the step
             if body.spec is not None:
@@ -182,6 +192,7 @@ class PhysicsWorld:
     def note_change(self) -> None:
         """Says that a request has changed something in the world."""
         self.revision += 1
+        self.rest.disturb()
         self.engine.wake()
 
     @property
@@ -198,6 +209,7 @@ class PhysicsWorld:
         """
         if tuple(self._welds if self.weld_grasps else self._carried) == tuple(held):
             return
+        self.rest.disturb()
         self._let_go()
         for name, link in held:
             thing, index = self.body(name), robot.link_indices[link]

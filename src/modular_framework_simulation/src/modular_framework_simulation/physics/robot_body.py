@@ -121,6 +121,7 @@ class RobotBody:
         self._indices = [self.body.joint_indices[name] for name in self.joint_names]
         self._rank = {joint_name: rank for rank, joint_name in enumerate(self.joint_names)}
         self.readings = [JointState(0.0, 0.0, 0.0)] * len(self._indices)
+        self._commands: list[tuple[Mode, float, float, float]] = []
         self._follows = [self._how_it_follows(joint) for joint in self._joints]
         self.grippers = self._grippers()
         self.starting_positions = self._complete(positions)
@@ -209,6 +210,12 @@ class RobotBody:
             drives: Commands of the driven joints by name; joints that are not named are free.
         """
         if not self._indices:
+            return
+        commands = [(each.mode, each.command, each.feed_forward, each.effort_limit) for each in drives.values()]
+        if commands != self._commands:
+            self.world.rest.disturb()
+            self._commands = commands
+        elif self.world.rest.holds:
             return
         reach_s = self.world.settings.time_step_s / _POSITION_GAIN
         targets: list[float] = []
