@@ -64,14 +64,19 @@ def sensors_of(text: str) -> tuple[list[ForceTorqueSensor], list[str]]:
     return [each for each in sensors.found if isinstance(each, ForceTorqueSensor)], list(sensors.faults.values())
 
 
-def weighed(world: PhysicsWorld, robot: RobotBody, load: JointLoad) -> Wrench:
-    """What the sensor says when the arm has come to rest."""
+def settle(world: PhysicsWorld, robot: RobotBody) -> None:
+    """Lets the arm come to rest."""
     targets = {"shoulder": 0.4, "wrist": 0.3}
-    load.measure()
     for _ in range(750):
         robot.read()
         robot.drive({name: Drive(Mode.POSITION, targets[name], 0.0, 500.0) for name in robot.joint_names})
         world.step()
+
+
+def weighed(world: PhysicsWorld, robot: RobotBody, load: JointLoad) -> Wrench:
+    """What the sensor says when the arm has come to rest."""
+    load.measure()
+    settle(world, robot)
     wrench = load.measure()
     assert wrench is not None
     return wrench
@@ -102,6 +107,18 @@ def test_the_weight_on_a_joint_is_measured_within_a_percent(
     force, torque = expected_wrench(world)
     assert np.linalg.norm(wrench.force - force) < 0.01 * np.linalg.norm(force)
     assert np.linalg.norm(wrench.torque - torque) < 0.01 * np.linalg.norm(torque)
+
+
+def test_a_sensor_that_is_asked_first_in_a_world_at_rest_measures(
+    make_world: Callable[[], PhysicsWorld], convex_parts: ConvexParts
+) -> None:
+    world = make_world()
+    robot = RobotBody(world, read_robot(urdf("fixed"), str, convex_parts, False), "arm", Pose(), {"shoulder": 0.4})
+    settle(world, robot)
+    assert world.rest.holds
+    wrench = weighed(world, robot, JointLoad(world, sensors_of(urdf("fixed"))[0][0]))
+    force, _ = expected_wrench(world)
+    assert np.linalg.norm(wrench.force - force) < 0.01 * np.linalg.norm(force)
 
 
 def test_a_sensor_measures_again_after_a_restart(

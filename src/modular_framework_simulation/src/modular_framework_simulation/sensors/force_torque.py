@@ -147,6 +147,7 @@ class JointLoad:
             self._instance, self._measures = instance, False
             self._find()
             self._world.engine.measure_joint_load(self._tree.number, self._index)
+            self._world.rest.disturb()
         measures, self._measures = self._measures, True
         return self._noisy(self._wrench()) if measures else None
 
