@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from simulated_samples import run, solid
+from simulated_samples import exact_state, run, solid
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.models import sdf_specs as specs
@@ -269,10 +269,48 @@ def hit(lift: Lift) -> None:
 def test_what_is_done_to_a_world_at_rest_moves_it(lift: Lift, action: Callable[[Lift], None]) -> None:
     lift.run(0.5)
     before = lift.positions()
+    assert lift.computed_steps == 0
     action(lift)
     lift.run(1.0)
     assert lift.computed_steps > 50
     assert max(abs(a - b) for a, b in zip(lift.positions(), before, strict=True)) > 0.005
+
+
+def test_a_state_saved_at_rest_continues_bit_for_bit(make_world: MakeWorld, convex_parts: ConvexParts) -> None:
+    lift = Lift(make_world(rest_speed=0.0), convex_parts)
+    lift.world.delete("cube")  # which trembles in PyBullet
+    lift.run(LONG_S)
+    assert lift.world.rest.holds
+    saved, ends = lift.world.save_state(), []
+    for _ in range(2):
+        lift.target_m = 0.0
+        lift.run(0.4)
+        lift.target_m = 0.1
+        lift.run(0.4)
+        ends.append((exact_state(lift.world), lift.tray.read()))
+        lift.world.restore_state(saved)
+    assert ends[0] == ends[1]
+
+
+def test_an_effort_acts_on_when_a_force_elsewhere_is_due(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
+    text = TRAY.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><dynamics damping="0" friction="2"/>')
+    tray = RobotBody(world, read_robot(text, str, convex_parts, False), "tray", Pose(), {})
+    world.spawn(solid("cube", CUBE, Pose((1, 0, 0.025))))
+
+    def hold(seconds: float) -> None:
+        for _ in range(round(seconds / world.settings.time_step_s)):
+            tray.read()
+            tray.drive({"lift": Drive(Mode.EFFORT, GRAVITY, 0.0, 500.0)})
+            world.step()
+
+    hold(LONG_S)
+    assert world.rest.holds
+    before = world.entity_state("tray::plate").pose.position[2]
+    begin = world.time_ns + 1_000_000_000
+    wrench = LinkWrench(PartName("cube", "link"), (1.0, 0, 0), (0, 0, 0), Interval(begin, begin + 100_000_000))
+    world.forces.add_wrench(wrench)
+    hold(0.5)
+    assert world.entity_state("tray::plate").pose.position[2] == pytest.approx(before, abs=1e-9)
 
 
 def test_a_body_at_the_top_of_its_flight_is_not_taken_for_one_at_rest(make_world: MakeWorld) -> None:

@@ -12,14 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from simulated_samples import solid
+from simulated_samples import run, solid
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.sdf_reader import read_model_text
 from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.urdf_model import read_urdf_model
+from modular_framework_simulation.physics.body_links import measured_inertial
 from modular_framework_simulation.physics.engine_choice import ENGINES
+from modular_framework_simulation.physics.model_changes import set_inertial
+from modular_framework_simulation.physics.part_names import PartName
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
 from modular_framework_simulation.sensors.cameras import CameraImage
@@ -445,6 +448,26 @@ def test_a_force_torque_sensor_of_a_model_weighs_the_child_in_the_axes_it_names(
     centre_from_joint = child @ (-0.1, 0.0, 0.0)
     assert wrench.force == pytest.approx(sign * axes.T @ weight, abs=0.01 * MASS * GRAVITY)
     assert wrench.torque == pytest.approx(sign * axes.T @ np.cross(centre_from_joint, weight), abs=0.02)
+
+
+def test_a_force_torque_sensor_weighs_on_when_a_mass_is_changed(world: PhysicsWorld) -> None:
+    text = f"""<sdf version="1.6"><model name="arm"><link name="a">{INERTIAL}</link><link name="b">{INERTIAL}</link>
+        <joint name="root" type="fixed"><parent>world</parent><child>a</child></joint>
+        <joint name="j" type="fixed"><parent>a</parent><child>b</child>
+        <sensor name="load" type="force_torque"><topic>load</topic></sensor></joint>
+        </model></sdf>"""
+    described = replace(read_model_text(text, "text", Resources((), str)), pose=Pose((0.0, 0.0, 1.0)))
+    world.spawn(described)
+    load = JointLoad(world, only(described))
+    load.measure()
+    run(world, 0.1)
+    present = measured_inertial(world.engine, world.body("arm"), "b")
+    assert set_inertial(world, PartName("arm", "b"), replace(present, mass=2 * MASS))
+    assert load.measure() is None
+    run(world, 0.1)
+    wrench = load.measure()
+    assert wrench is not None
+    assert wrench.force == pytest.approx((0.0, 0.0, -2 * MASS * GRAVITY), abs=0.01 * MASS * GRAVITY)
 
 
 def test_noise_of_a_camera_has_the_deviation_of_the_file_on_its_colours() -> None:

@@ -152,8 +152,8 @@ class PhysicsWorld:
         return self._steps
 
     def step(self) -> None:
-        """Advances the world by one time step; what is at rest stays where it is, and is not computed."""
-        if self.forces.pending:
+        """Advances the world by one time step; a world in which everything is at rest is not computed."""
+        if self.forces.pending or self.engine.has_window:  # in a window, the mouse moves bodies
             self.rest.disturb()
         if not self.rest.holds:
             self._compute_step()
@@ -485,6 +485,7 @@ class PhysicsWorld:
 
         Not part of it: controllers and their commands, and settings that requests changed.
         """
+        self.rest.disturb()  # as `restore_state` does, so that both go on alike
         forces = self.forces.saved()
         return WorldState(
             self.engine.save_state(), self._numbers(), tuple(self._welds), self._steps, self._time_ns, forces

@@ -9,16 +9,16 @@ from modular_framework_simulation.physics.physics_engine import PhysicsEngine
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
 
 _AT_REST = 1e-9
-"""Of velocities [m/s, rad/s]: a body this slow is 4 micrometres away after an hour. What engines leave of the velocity
-of a robot that holds still is 1e-13; a held object that creeps by a millimetre an hour has 3e-7."""
-_LOOK_STEPS = 50
-"""Computed steps from one look at the velocities to the next."""
+"""What is not faster is at rest [m/s, rad/s]: it would be 4 micrometres away after an hour. What engines leave of the
+velocity of a robot that holds still is 1e-13; a held object that creeps by a millimetre an hour has 3e-7."""
+_LOOK_S = 0.1
+"""From one look at the velocities to the next [s of simulated time]."""
 
 
 class WorldRest:
     """Whether a world is at rest: nothing had a velocity after two steps in a row, so nothing accelerates either.
 
-    It stays at rest until something is done to it, which is said by `disturb`: forces, commands, changes of models.
+    It stays at rest until `disturb` says that something is done to it: by a force, a command, a change of a model.
 
     Args:
         engine: Of the world.
@@ -32,7 +32,7 @@ class WorldRest:
         """Whether the world is at rest."""
 
     def disturb(self) -> None:
-        """Has the coming steps computed."""
+        """Ends the rest: the coming steps are computed."""
         self._steps, self._was_still, self.holds = 0, False, False
 
     def after_step(self, bodies: Iterable[SimulatedBody]) -> None:
@@ -42,7 +42,7 @@ class WorldRest:
             bodies: All models.
         """
         self._steps += 1
-        if self._was_still or self._steps % _LOOK_STEPS == 0:
+        if self._was_still or self._steps % round(_LOOK_S / self._engine.settings.time_step_s) == 0:
             still = not any(self._moves(part) for body in bodies for part in body.parts)
             self.holds = still and self._was_still
             self._was_still = still

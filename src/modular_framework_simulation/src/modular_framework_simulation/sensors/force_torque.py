@@ -116,7 +116,7 @@ class JointLoad:
     def __init__(self, world: PhysicsWorld, sensor: ForceTorqueSensor, seed: int = 0) -> None:
         self._world, self._sensor = world, sensor
         self._noise = NoiseSource(seed, sensor.name, sensor.noise)
-        self._instance = -1
+        self._found: tuple[int, ...] = ()  # what tells the model from the one in which the joint was found
         self._measures = False
         self._find()
 
@@ -142,9 +142,10 @@ class JointLoad:
 
     def measure(self) -> Wrench | None:
         """Returns the wrench in the last physics step; None at first, when the engine has not measured it."""
-        instance = self._world.instance(self._sensor.model)
-        if instance != self._instance:  # also after a restart, which creates the body again
-            self._instance, self._measures = instance, False
+        model = self._sensor.model
+        found = (self._world.instance(model), *(part.number for part in self._world.body(model).parts))
+        if found != self._found:  # also after a restart or a change of a mass, which make the body again
+            self._found, self._measures = found, False
             self._find()
             self._world.engine.measure_joint_load(self._tree.number, self._index)
             self._world.rest.disturb()
