@@ -282,6 +282,7 @@ def test_a_state_saved_at_rest_continues_bit_for_bit(make_world: MakeWorld, conv
     lift.run(LONG_S)
     assert lift.world.rest.holds
     saved, ends = lift.world.save_state(), []
+    assert not lift.world.rest.holds  # as after `restore_state`
     for _ in range(2):
         lift.target_m = 0.0
         lift.run(0.4)
