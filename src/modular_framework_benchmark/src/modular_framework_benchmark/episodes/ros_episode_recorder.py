@@ -193,8 +193,10 @@ class EpisodeRecorder:
         answer["simulated_s"] = self._now() - answer["zero"]
         latest_s = answer["zero"] + answer["simulated_s"] - SAMPLE_S
         models = model_samples(answer["zero"], answer["simulated_s"])[1] if self._time.enabled else 0
+        samples = self._samples
         wait_until(
-            lambda: self._samples.latest_s() >= latest_s and len(self._samples.models) >= models, SAMPLES_TIMEOUT_S
+            lambda: samples.latest_s() >= latest_s and len(samples.models) >= models and samples.actions_ended(),
+            SAMPLES_TIMEOUT_S,
         )
         self._reached(request, answer, "checked")
 

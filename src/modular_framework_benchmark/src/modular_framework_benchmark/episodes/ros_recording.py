@@ -260,7 +260,7 @@ def _belongs(path: Any, report: dict[str, Any]) -> bool:
 
 def _actions(samples: Samples, zero: float) -> list[dict[str, Any]]:
     reports = []
-    for ended in samples.actions:
+    for ended in samples.actions():
         trajectory = getattr(getattr(ended["goal"], "trajectory", None), "joint_trajectory", None)
         times_s = (ended["ros"] - zero, ended["ros_end"] - zero)
         wall_s = (ended["wall"], ended["wall_end"])

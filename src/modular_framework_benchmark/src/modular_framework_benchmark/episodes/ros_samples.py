@@ -41,7 +41,6 @@ class Samples:
         planning: (real time [s], report of move_group).
         paths: Motions that move_group shows.
         components: (real time [s], report of a component).
-        actions: Goals that ended, see `_on_result`.
     """
 
     def __init__(self) -> None:
@@ -49,6 +48,7 @@ class Samples:
         self._lock = threading.Lock()
         self._subscribers: dict[str, Any] = {}
         self._goals: dict[str, dict[str, Any]] = {}
+        self._results: dict[str, dict[str, Any]] = {}
         self._last_grasped = ""
         self.clear()
 
@@ -64,13 +64,28 @@ class Samples:
             self.planning: list[tuple[float, dict[str, Any]]] = []
             self.paths: list[Any] = []
             self.components: list[tuple[float, dict[str, Any]]] = []
-            self.actions: list[dict[str, Any]] = []
             self._goals.clear()
+            self._results.clear()
 
     @property
     def held(self) -> frozenset[str]:
         """Names of the objects that grippers hold now."""
         return frozenset(self._last_grasped.split(",")) - {""}
+
+    def actions(self) -> list[dict[str, Any]]:
+        """Returns the goals that ended, in this order, with `component`, `goal`, begin and end, `succeeded`, `reason`.
+
+        A goal and its result come from two nodes, so the result may come first.
+        """
+        with self._lock:
+            pairs = [(goal, self._results[number]) for number, goal in self._goals.items() if number in self._results]
+        ended = [goal | result | {"wall": min(goal["wall"], result["wall_end"])} for goal, result in pairs]
+        return sorted(ended, key=lambda each: (each["ros_end"], each["wall_end"]))
+
+    def actions_ended(self) -> bool:
+        """Whether all goals have their result, and all results their goal."""
+        with self._lock:
+            return self._goals.keys() == self._results.keys()
 
     def latest_s(self) -> float:
         """Returns the stamp of the latest joint state [s]; minus infinity before the first."""
@@ -105,13 +120,14 @@ class Samples:
         name, component = topic.rpartition("/")[0], ACTIONS[type_name]
         goal = roslib.message.get_message_class(type_name)
         result = roslib.message.get_message_class(type_name.removesuffix("Goal") + "Result")
-        self._subscribe(topic, goal, lambda message: self._on_goal(component, message))
-        self._subscribe(f"{name}/result", result, self._on_result)
+        self._subscribe(topic, goal, lambda message: self.add_goal(component, message))
+        self._subscribe(f"{name}/result", result, self.add_result)
 
     def _on_grasped(self, message: String) -> None:
         self._last_grasped = message.data
 
-    def _on_goal(self, component: str, message: Any) -> None:
+    def add_goal(self, component: str, message: Any) -> None:
+        """Adds the goal of an action that belongs to a component."""
         begin = {
             "component": component,
             "wall": time.monotonic(),
@@ -121,24 +137,18 @@ class Samples:
         with self._lock:
             self._goals[message.goal_id.id] = begin
 
-    def _on_result(self, message: Any) -> None:
-        """Keeps a goal that ended with `component`, `goal`, begin and end, `succeeded` and `reason`."""
+    def add_result(self, message: Any) -> None:
+        """Adds the result of a goal."""
+        code = getattr(getattr(message.result, "error_code", None), "val", 1)
+        succeeded = message.status.status == SUCCEEDED and code == 1
+        end = {
+            "wall_end": time.monotonic(),
+            "ros_end": message.header.stamp.to_sec(),
+            "succeeded": succeeded,
+            "reason": "" if succeeded else message.status.text or f"error code {code}",
+        }
         with self._lock:
-            begin = self._goals.pop(message.status.goal_id.id, None)
-            if begin is None:
-                return
-            code = getattr(getattr(message.result, "error_code", None), "val", 1)
-            succeeded = message.status.status == SUCCEEDED and code == 1
-            reason = "" if succeeded else message.status.text or f"error code {code}"
-            self.actions.append(
-                begin
-                | {
-                    "wall_end": time.monotonic(),
-                    "ros_end": message.header.stamp.to_sec(),
-                    "succeeded": succeeded,
-                    "reason": reason,
-                }
-            )
+            self._results[message.status.goal_id.id] = end
 
 
 def _report(message: String) -> tuple[float, dict[str, Any]]:
