@@ -208,6 +208,17 @@ def test_joint_damping_is_right_on_a_base_with_moments_that_no_body_can_have(mak
     assert joint_state(world, "wheel", "hinge")[1] == pytest.approx(10 * math.exp(-0.1 * 0.005 / 0.001), rel=0.01)
 
 
+def test_a_joint_of_a_link_with_moments_that_no_body_can_have_is_damped(make_world: MakeWorld) -> None:
+    world = make_world(gravity=(0.0, 0.0, 0.0))
+    model = jointed("wheel", 0.0, dynamics=specs.JointDynamics(damping=0.005), pose=Pose((0, 0, 1)))
+    x, y, z = 1e-3, 1e-3, 4e-3
+    odd = replace(model.links[-1], inertial=specs.Inertial(Pose(), 1.0, (x, 0, 0, y, 0, z)))
+    world.spawn(replace(model, links=(*model.links[:-1], odd)))
+    set_joint_velocity(world, "wheel", "hinge", 10.0)
+    run(world, 0.5)
+    assert 0.0 < joint_state(world, "wheel", "hinge")[1] < 9.0
+
+
 def test_joint_friction_takes_the_same_from_the_velocity_every_second_and_holds(make_world: MakeWorld) -> None:
     world = make_world(gravity=(0.0, 0.0, 0.0))
     world.spawn(jointed("wheel", 0.0, dynamics=specs.JointDynamics(friction=0.02)))

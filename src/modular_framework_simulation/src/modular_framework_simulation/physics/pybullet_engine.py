@@ -96,6 +96,7 @@ class PyBulletEngine(PhysicsEngine):
                 "different surfaces their geometric mean counts, not the smaller one"
             )
         self._rest = Rest(self.api, self.client, settings)
+        self._impossible_moments: dict[int, dict[int, list[float]]] = {}  # by body and link
         self._urdf_folder = tempfile.TemporaryDirectory(prefix="simulation_")
         self._files_written = 0
         self._configure(gravity)
@@ -157,6 +158,7 @@ class PyBulletEngine(PhysicsEngine):
             gravity: [m/s^2]
         """
         self.api.resetSimulation(physicsClientId=self.client)
+        self._impossible_moments.clear()
         self._rest = Rest(self.api, self.client, self.settings)
         self._configure(gravity)
 
@@ -198,7 +200,8 @@ class PyBulletEngine(PhysicsEngine):
             inertia, number = link.find("inertial/inertia"), dropped.get(link.get("name", ""))
             if inertia is not None and number is not None:
                 moments = [float(inertia.get(key, "0")) for key in ("ixx", "iyy", "izz")]
-                self.api.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=self.client)
+                self._impossible_moments.setdefault(body, {})[number] = moments
+                self._set_moments(body, number, moments)
 
     def joint_infos(self, body: int) -> list[tuple[Any, ...]]:
         """Returns the engine's record of every joint of a body, in the order of the link numbers."""
@@ -246,6 +249,7 @@ class PyBulletEngine(PhysicsEngine):
     def remove_body(self, number: int) -> None:
         """Takes a body out."""
         self._rest.remove(number)
+        self._impossible_moments.pop(number, None)
         self.api.removeBody(number, physicsClientId=self.client)
 
     def root_link(self, number: int) -> str:
@@ -279,7 +283,17 @@ class PyBulletEngine(PhysicsEngine):
         """Returns the joint space inertia."""
         states = self.api.getJointStates(number, indices, physicsClientId=self.client)
         positions = [state[0] for state in states]
-        return np.array(self.api.calculateMassMatrix(number, positions, physicsClientId=self.client))
+        # The engine refuses moments here that no rigid body can have; their mean stands for them.
+        impossible = self._impossible_moments.get(number, {})
+        for index, moments in impossible.items():
+            self._set_moments(number, index, [sum(moments) / 3.0] * 3)
+        matrix = np.array(self.api.calculateMassMatrix(number, positions, physicsClientId=self.client))
+        for index, moments in impossible.items():
+            self._set_moments(number, index, moments)
+        return matrix
+
+    def _set_moments(self, number: int, index: int, moments: Sequence[float]) -> None:
+        self.api.changeDynamics(number, index, localInertiaDiagonal=moments, physicsClientId=self.client)
 
     def set_self_collisions(self, number: int, allowed: Collection[frozenset[int]]) -> None:
         """Sets which pairs of links touch."""
