@@ -151,11 +151,16 @@ class PhysicsWorld:
         """Physics steps since the start or the last reset."""
         return self._steps
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves and nothing is to move it: the coming step is not computed then."""
+        return self.rest.holds and not self.forces.pending
+
     def step(self) -> None:
         """Advances the world by one time step; a world in which everything is at rest is not computed."""
-        if self.forces.pending or self.engine.has_window:  # in a window, the mouse moves bodies
-            self.rest.disturb()
-        if not self.rest.holds:
+        if not self.at_rest:
+            if self.forces.pending or self.engine.has_window:  # in a window, the mouse moves bodies
+                self.rest.disturb()
             self._compute_step()
             self.rest.after_step(self._bodies.values())
         self._steps += 1

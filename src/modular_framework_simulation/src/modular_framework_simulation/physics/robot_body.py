@@ -215,7 +215,7 @@ class RobotBody:
         if commands != self._commands:
             self.world.rest.disturb()
             self._commands = commands
-        elif self.world.rest.holds and not self.world.forces.pending:
+        elif self.world.at_rest:
             return
         reach_s = self.world.settings.time_step_s / _POSITION_GAIN
         targets: list[float] = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells when nothing in a world moves, so that its steps need not be computed."""
+"""Detects when nothing in a world moves, so that its steps need not be computed."""
 
 from __future__ import annotations
 

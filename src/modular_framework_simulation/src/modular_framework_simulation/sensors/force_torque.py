@@ -116,7 +116,7 @@ class JointLoad:
     def __init__(self, world: PhysicsWorld, sensor: ForceTorqueSensor, seed: int = 0) -> None:
         self._world, self._sensor = world, sensor
         self._noise = NoiseSource(seed, sensor.name, sensor.noise)
-        self._found: tuple[int, ...] = ()  # what tells the model from the one in which the joint was found
+        self._found: tuple[int, ...] = ()  # instance and trees of the model in which the joint was found
         self._measures = False
         self._find()
 
