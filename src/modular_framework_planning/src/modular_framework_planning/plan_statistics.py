@@ -16,7 +16,8 @@ class CheckCounts:
 
     Attributes:
         asked: checks that were asked for; one that was remembered does not count.
-        free_by_bounds, touching_by_bounds: decided by the compiled check of covers and surfaces.
+        free_by_bounds, touching_by_bounds: decided by the compiled check of spheres and surfaces.
+        by_spheres: of these, straight motions that spheres around and inside of the bodies decided alone.
         undecided: left to the exact check (Coal).
         touching_exactly: of these, those in which bodies touch.
         states: that the compiled check looked at, those of undecided edges of a compiled search twice.
@@ -25,6 +26,7 @@ class CheckCounts:
     asked: int
     free_by_bounds: int
     touching_by_bounds: int
+    by_spheres: int
     undecided: int
     touching_exactly: int
     states: int

@@ -72,6 +72,21 @@ class BoundingGeometry:
         return None if self.corners is None else _surface(self.corners())
 
     @property
+    def inner_radius(self) -> float:
+        """Radius of the largest ball around the closed form's origin that lies inside [m]; 0 where none is known."""
+        x, y, z = self.size
+        if self.solid_excess > 0.0:
+            return 0.0
+        match self.kind:
+            case _ if self.kind == BOX:
+                return min(x, y, z)
+            case _ if self.kind == CYLINDER:
+                return min(x, y)
+            case _ if self.kind in (SPHERE, CAPSULE):
+                return x
+        return 0.0
+
+    @property
     def radius(self) -> float:
         """Radius of a ball around the closed form's origin that holds it [m]; infinite without a closed form."""
         x, y, z = self.size

@@ -24,6 +24,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     CHECK_COUNTS,
     FIELD,
     UNKNOWN,
+    Covers,
     World,
     arguments,
 )
@@ -31,6 +32,16 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 from modular_framework_planning.collision_detection.kernels.compiled_distance_field import KEPT, DistanceField
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.collision_detection.reaches import farthest_end
+from modular_framework_planning.collision_detection.sphere_covers import (
+    Layers,
+    balls_inside,
+    boxes_around,
+    common_joints,
+    empty_covers,
+    extents_of,
+    heap_of,
+    single_sphere,
+)
 from modular_framework_planning.contacts import LINK, WORLD, Body
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import tree_of
@@ -183,6 +194,7 @@ def compile_world(
     model: RobotModel,
     parts: Sequence[PlacedGeometry],
     pairs: WatchedPairs,
+    layers: Layers,
     check_interrupt: Callable[[], None] = _never_interrupt,
 ) -> CompiledWorld:
     """Builds the arrays; what is built for a shape is cached as long as the shape exists.
@@ -191,6 +203,7 @@ def compile_world(
         model: the robot.
         parts: geometries of the scene, the model's links first.
         pairs: the pairs to watch; those that no joint moves should not be among them.
+        layers: the spheres to use.
         check_interrupt: called between shapes; raises an exception to stop.
     """
     groups = _groups(model, parts, pairs)
@@ -210,6 +223,7 @@ def compile_world(
     )
     tables, joints = _tables(model, groups, tuple(key for key in keys if key is not None))
     world = _with_field(world._replace(tables=tables, table_joints=joints, table_of=table_of))
+    world = _with_covers(model, groups, members, layers, world)
     numbers = np.argsort(rows, kind="stable")[np.count_nonzero(~is_compiled) :]
     represented = Represented(rows, numbers, world.represented)
     return CompiledWorld(world, arguments(world), represented, tuple(np.flatnonzero(~is_compiled).tolist()))
@@ -408,6 +422,7 @@ def _arrays(
         counts=np.zeros(CHECK_COUNTS, dtype=np.int64),
         refusals=np.zeros(len(pairs), dtype=np.int64),
         field=_field(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3, 4)), 0.0),
+        covers=empty_covers(Layers(0, 0), len(_tree(model).parents), len(members), len(pairs)),
     )
 
 
@@ -448,6 +463,52 @@ def _with_field(world: World) -> World:
         refusals=np.zeros(count + len(rows), dtype=np.int64),
         field=field,
     )
+
+
+def _with_covers(
+    model: RobotModel, groups: Grouping, members: Sequence[_Member], layers: Layers, world: World
+) -> World:
+    """Adds spheres around the moving bodies and balls inside of them."""
+    covers = empty_covers(layers, len(world.tree.parents), len(members), len(world.pairs))
+    links = _link_covers(model, groups, layers)
+    count = len(links.spheres)
+    covers.spheres[:count], covers.balls[:count], covers.extents[:count] = links.spheres, links.balls, links.extents
+    for number in range(count, len(members)):
+        item = members[number]
+        if item.joint < 0:
+            continue
+        if layers.balls:
+            covers.balls[number, 0] = *item.pose[:, 3], item.shape.inner_radius
+        if layers.nodes:
+            covers.spheres[number] = (
+                single_sphere(item.sphere, item.pose, layers.nodes)
+                if item.root < 0
+                else heap_of(world.scene, item.root, item.pose, layers.nodes, item.shape.inflation_radius)
+            )
+    covers.extents[count:] = extents_of(covers.spheres[count:])
+    first, second = world.pairs.T
+    meets = np.where(second >= 0, _common_joints(model)[world.joints[first], world.joints[second]], -1)
+    boxes = boxes_around(world.field.kinds, world.field.sizes, world.field.poses)
+    return world._replace(covers=covers._replace(lengths=links.lengths, meets=meets, boxes=boxes))
+
+
+@lru_cache(maxsize=KEPT_GROUPINGS)
+def _link_covers(model: RobotModel, groups: Grouping, layers: Layers) -> Covers:
+    """Spheres around groups of links and balls inside of them, and the lengths of the joints."""
+    surfaces, members, _ = _link_members(model, groups)
+    covers = empty_covers(layers, 0, len(members), 0)
+    for number, item in enumerate(members):
+        if layers.nodes:
+            covers.spheres[number] = heap_of(surfaces, item.root, item.pose, layers.nodes)
+        if item.shape.is_closed:
+            covers.balls[number] = balls_inside(surfaces, item.root, layers.balls)
+    lengths = np.linalg.norm(_tree(model).placements[:, :, 3], axis=1)
+    return covers._replace(extents=extents_of(covers.spheres), lengths=lengths)
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _common_joints(model: RobotModel) -> NDArray[np.int64]:
+    return common_joints(_tree(model).parents)
 
 
 def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:

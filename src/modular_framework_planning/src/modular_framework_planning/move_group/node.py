@@ -8,6 +8,7 @@ import time
 
 import rospy
 
+from modular_framework_planning.collision_detection.sphere_layers import choose_layers
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.move_group.capabilities.cartesian_path_service import CartesianPathService
@@ -122,7 +123,7 @@ def advertise(context: MoveGroupContext) -> None:
 
 
 def warm_up(context: MoveGroupContext) -> None:
-    """Compiles what is missing and lets a checker build what its checks need of the links.
+    """Compiles what is missing, measures what pays, and lets a checker build what its checks need of the links.
 
     Raises:
         PlanningError: the checker cannot check the scene, or lacks its model.
@@ -134,6 +135,7 @@ def warm_up(context: MoveGroupContext) -> None:
     checker = context.new_checker(scene)
     if not hasattr(checker, "model"):
         raise ModelError(f"collision_detector: {type(checker).__name__} has no attribute model, the robot; add it")
+    choose_layers(checker.model)
     checker.is_free(scene.positions)
     checker.distance(scene.positions)
     freeze_loaded_objects()

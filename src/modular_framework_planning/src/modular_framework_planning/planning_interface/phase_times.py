@@ -62,7 +62,8 @@ class PhaseTimes:
             return PlanStatistics(dict(self.seconds))
         counts = {}
         for phase, row in self._checks.items():
-            asked, free, touching, states, exactly = row.tolist()
+            asked, free, touching, states, exactly, by_spheres = row.tolist()
             if asked:
-                counts[phase] = CheckCounts(asked, free, touching, asked - free - touching, exactly, states)
+                undecided = asked - free - touching
+                counts[phase] = CheckCounts(asked, free, touching, by_spheres, undecided, exactly, states)
         return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals())

@@ -14,6 +14,7 @@ import numpy as np
 from pinocchio import SE3 as Transform
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.collision_detection.sphere_layers import choose_layers
 from modular_framework_planning.constraints import constrained_motion
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
 from modular_framework_planning.kinematics import compiled_kinematics
@@ -43,6 +44,7 @@ def compile_all() -> float:
     time_parameterization.warm_up()
     robot = _robot()
     constrained_motion.warm_up(robot)
+    choose_layers(robot)
     _check_motions(_scene(robot, _voxels()))
     links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: a mesh needs an import of 0.3 s
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))

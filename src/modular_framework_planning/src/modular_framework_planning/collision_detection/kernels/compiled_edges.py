@@ -9,12 +9,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from modular_framework_planning.collision_detection.kernels.compiled_arrays import borrowed
+from modular_framework_planning.collision_detection.kernels.compiled_collision import world_of
 from modular_framework_planning.collision_detection.kernels.compiled_distance import CLEAR, TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
     Samples,
     check_samples,
     count_verdict,
+    new_workspace,
     number_samples,
+    release,
 )
 from modular_framework_planning.geometry.spatial import Array
 
@@ -120,3 +124,23 @@ def check_edge(edges, world, start, end, samples, undecided, workspace):  # type
     if status != TOO_CLOSE:  # else it is asked again elsewhere
         count_verdict(world.counts, status)
     return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
+
+
+@njit(cache=True, nogil=True)
+def check_edges(edges, motions, *world):  # type: ignore[no-untyped-def]
+    """Returns what `check_edge` does for motions (n, 2, joints) in a world, which is what `arguments` returns."""
+    bodies = world_of(world)
+    workspace, samples = new_workspace(bodies), new_edge(edges)
+    verdicts = np.empty(len(motions), np.int64)
+    _check_all(borrowed(edges), bodies, motions, borrowed(samples), borrowed(workspace), verdicts)
+    release(workspace)
+    samples.numbers[0] = 0
+    return verdicts
+
+
+@njit(cache=True, nogil=True)
+def _check_all(edges, world, motions, samples, workspace, verdicts):  # type: ignore[no-untyped-def]
+    no_rows = np.empty((0, 2), np.int64)
+    for number in range(len(motions)):
+        start, end = motions[number, 0], motions[number, 1]
+        verdicts[number] = check_edge(edges, world, start, end, samples, no_rows, workspace)

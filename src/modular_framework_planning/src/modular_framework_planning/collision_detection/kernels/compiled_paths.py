@@ -19,6 +19,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_arrays impo
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     APART,
     ASKED,
+    DECIDED_BY_SPHERES,
     FIELD,
     FOUND_FREE,
     FOUND_TOUCHING,
@@ -30,6 +31,12 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     solid_of,
     surrounded_pair,
     world_of,
+)
+from modular_framework_planning.collision_detection.kernels.compiled_covers import (
+    Batch,
+    find_open_pairs,
+    find_touching_pair,
+    new_batch,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import (
     CLEAR,
@@ -163,18 +170,22 @@ class Workspace(NamedTuple):
 
     stretch: Stretch
     memory: Memory
+    batch: Batch
+    order: NDArray[np.int64]
 
 
 @njit(cache=True, nogil=True)
 def new_workspace(world):  # type: ignore[no-untyped-def]
     """Returns working memory for paths in a world."""
-    return Workspace(_new_stretch(len(world.tree.parents), len(world.joints)), new_memory())
+    joints, bodies = len(world.tree.parents), len(world.joints)
+    return Workspace(_new_stretch(joints, bodies), new_memory(), new_batch(world), world.watched.copy())
 
 
 @njit(cache=True, nogil=True)
 def release(workspace):  # type: ignore[no-untyped-def]
     """Marks where working memory was used last: until here it has an owner."""
-    workspace.stretch.motions[:], workspace.memory.bounds[0] = 0.0, 0.0
+    workspace.stretch.motions[:], workspace.memory.bounds[0], workspace.batch.numbers[0] = 0.0, 0.0, 0
+    workspace.order[0:0] = 0
 
 
 @njit(cache=True, nogil=True)
@@ -365,11 +376,23 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
     return result
 
 
+@njit(cache=True, nogil=True)
+def _move_to_front(order, pair):  # type: ignore[no-untyped-def]
+    """Moves a pair to the front: what touched last often touches next, and is then found before other pairs."""
+    place = 0
+    while order[place] != pair:
+        place += 1
+    while place > 0:
+        order[place] = order[place - 1]
+        place -= 1
+    order[0] = pair
+
+
 # What is done to each pair stands in the loop, on single arrays: a call costs more than most of what is asked.
 @njit(cache=True, nogil=True)
 def check_samples(world, samples, first, undecided, workspace):  # type: ignore[no-untyped-def]
     """Does what check_path does, in given working memory; none of the arrays should have an owner (see `borrowed`)."""
-    stretch, memory = workspace
+    stretch, memory, batch, order = workspace
     pairs, margins, spheres, kinds, sizes = world.pairs, world.margins, world.spheres, world.kinds, world.sizes
     tables, table_joints, table_of = world.tables, world.table_joints, world.table_of
     parents, prismatic, hangs_on, field = world.tree.parents, world.tree.prismatic, world.joints, world.field
@@ -377,17 +400,34 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
     _, poses, centres, axes, still, reach, change, signs, motions, rows = stretch
     ranges = np.empty((64, 4), np.int64)  # first sample, last sample, and their pairs' indices in `active`
     active, used, last = np.empty(4 * len(pairs) + 16, np.int64), len(world.watched), samples.numbers[-1]
-    active[:used] = world.watched
+    active[:used] = order
     ranges[0], ranges[1] = (last, last, 0, used), (first, last - 1, 0, used)
     head, tail, looked_at, open_questions = 0, 2, 0, 0
+    has_balls = world.covers.balls.shape[1] > 0
+    has_spheres = len(samples.numbers) == 2 and world.covers.spheres.shape[1] > 0
     while head < tail:
         low, high, begin, end = ranges[head, 0], ranges[head, 1], ranges[head, 2], ranges[head, 3]
         head += 1
         if low > high:
             continue
+        if has_spheres and head == 2:  # the end is free
+            used = find_open_pairs(world, samples.vertices, last, batch)
+            if used == 0:
+                counts[DECIDED_BY_SPHERES] += open_questions == 0
+                break
+            active[:used] = batch.pairs[:used]
+            end = used
         middle, kept, share = (low + high) // 2, used, 1.0
         is_long = look_at(world, samples, low, high, looked_at == 0, stretch) > LONG_MOTION
         looked_at += 1
+        if head == 1 and has_balls:
+            pair, number = find_touching_pair(world, order, stretch.placements)
+            if pair >= 0:
+                counts[LOOKED_AT] += 1
+                counts[DECIDED_BY_SPHERES] += 1
+                refusals[represented[pair - len(pairs) + len(represented), number]] += 1
+                _move_to_front(order, pair)
+                return TOUCHING, middle
         moves = low < high and not is_long
         active = _with_room(active, used + end - begin)
         for index in range(begin, end):
@@ -430,6 +470,7 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
             if status == TOUCHING:
                 counts[LOOKED_AT] += looked_at
                 refusals[represented[pair - len(pairs) + len(represented), int(bound)] if two == FIELD else pair] += 1
+                _move_to_front(order, pair)
                 return TOUCHING, middle
             if status == TOO_CLOSE:
                 if open_questions < len(undecided):

@@ -157,7 +157,8 @@ class RrtConnect:
         elif self._status == NEEDS_SAMPLES:
             self._batches += 1
             low, high = (self._low, self._high) if self._batches % WIDE_EVERY == 0 else self._near
-            self._samples = self._problem.rng.uniform(low, high, (SAMPLES, len(low)))
+            # what rng.uniform(low, high) gives, in a third of its time
+            self._samples = low + (high - low) * self._problem.rng.random((SAMPLES, len(low)))
             self._trees.position[0] = 0
         elif self._status == UNDECIDED:
             self._verdict = FREE if self._undecided_edge_is_free() else BLOCKED
