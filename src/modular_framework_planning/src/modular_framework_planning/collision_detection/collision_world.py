@@ -40,6 +40,7 @@ from modular_framework_planning.collision_detection.sphere_covers import (
     empty_covers,
     extents_of,
     heap_of,
+    meeting_joints,
     single_sphere,
 )
 from modular_framework_planning.contacts import LINK, WORLD, Body
@@ -485,9 +486,8 @@ def _with_covers(
                 if item.root < 0
                 else heap_of(world.scene, item.root, item.pose, layers.nodes, item.shape.inflation_radius)
             )
-    covers.extents[count:] = extents_of(covers.spheres[count:])
-    first, second = world.pairs.T
-    meets = np.where(second >= 0, _common_joints(model)[world.joints[first], world.joints[second]], -1)
+            covers.extents[number] = extents_of(covers.spheres[number : number + 1])[0]
+    meets = meeting_joints(world.pairs, world.joints, _common_joints(model))
     boxes = boxes_around(world.field.kinds, world.field.sizes, world.field.poses)
     return world._replace(covers=covers._replace(lengths=links.lengths, meets=meets, boxes=boxes))
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from modular_framework_planning.collision_detection.kernels.compiled_collision import Covers
+from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD, Covers
 from modular_framework_planning.collision_detection.kernels.compiled_distance import BOX, CYLINDER, SPHERE
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import (
     Surfaces,
@@ -149,15 +149,38 @@ def common_joints(parents: NDArray[np.int64]) -> NDArray[np.int64]:
     return result
 
 
-def boxes_around(kinds: NDArray[np.int64], sizes: Array, poses: Array) -> Array:
-    """Returns boxes around solids, see Covers.boxes."""
-    x, y, z = sizes.T
-    is_round, is_box, is_ball = kinds == CYLINDER, kinds == BOX, kinds == SPHERE
-    halves = np.full((len(kinds), 3), np.inf)
-    halves[is_box] = sizes[is_box]
-    halves[is_round] = np.column_stack([x, x, y])[is_round]
-    halves[is_ball] = np.column_stack([x, x, x])[is_ball]
-    with np.errstate(invalid="ignore"):
-        reach = np.nan_to_num(np.einsum("nij,nj->ni", np.abs(poses[:, :, :3]), halves), nan=np.inf)
-    half_lengths = np.select([is_box, is_round, is_ball], [np.linalg.norm(sizes, axis=1), np.hypot(x, y), x], 0.0)
-    return np.column_stack([poses[:, :, 3] - reach, poses[:, :, 3] + reach, half_lengths])
+@njit(cache=True, nogil=True)
+def boxes_around(kinds, sizes, poses):  # type: ignore[no-untyped-def]
+    """Returns boxes around solids, see Covers.boxes; their other arguments are those of a DistanceField."""
+    boxes = np.empty((len(kinds), 7))
+    for number in range(len(kinds)):
+        x, y, z = sizes[number]
+        a, b, c, half_length = np.inf, np.inf, np.inf, 0.0
+        if kinds[number] == BOX:
+            a, b, c, half_length = x, y, z, np.sqrt(x * x + y * y + z * z)
+        elif kinds[number] == CYLINDER:
+            a, b, c, half_length = x, x, y, np.sqrt(x * x + y * y)
+        elif kinds[number] == SPHERE:
+            a, b, c, half_length = x, x, x, x
+        for row in range(3):
+            pose = poses[number, row]
+            reach = abs(pose[0]) * a + abs(pose[1]) * b + abs(pose[2]) * c if half_length > 0.0 else np.inf
+            boxes[number, row], boxes[number, 3 + row] = pose[3] - reach, pose[3] + reach
+        boxes[number, 6] = half_length
+    return boxes
+
+
+@njit(cache=True, nogil=True)
+def meeting_joints(pairs, joints, common):  # type: ignore[no-untyped-def]
+    """Returns the last joint that moves both bodies of each pair (p, 2), see Covers.meets.
+
+    Args:
+        pairs: of bodies, the second one FIELD for solids of the world.
+        joints: that move the bodies, -1 for the world.
+        common: what `common_joints` returns.
+    """
+    meets = np.full(len(pairs), -1)
+    for pair in range(len(pairs)):
+        if pairs[pair, 1] != FIELD:
+            meets[pair] = common[joints[pairs[pair, 0]], joints[pairs[pair, 1]]]
+    return meets

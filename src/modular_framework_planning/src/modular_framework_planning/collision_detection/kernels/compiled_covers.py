@@ -33,7 +33,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
     SURFACE,
     placed_solid_distance,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_distance_field import field_cell
 from modular_framework_planning.collision_detection.kernels.compiled_tables import fill_line, line_answer
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
@@ -42,6 +41,7 @@ LANES = 8  # samples that are looked at together
 MIDDLE = LANES // 2  # one of them
 MOST_TURN = 1.5  # [rad]; of all joints together between two of them
 BALL_SLACK = 1.0e-4  # [m]; how far a ball has to reach into a solid
+MOST_SOLIDS = 64  # of the world; among more, spheres are not asked, as each would be held against all of them
 MOST_LOOKS = 64  # at two spheres, for one pair of bodies
 
 
@@ -92,10 +92,12 @@ class Batch(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def new_batch(world):  # type: ignore[no-untyped-def]
-    """Returns working memory."""
+def new_batch(world, is_used):  # type: ignore[no-untyped-def]
+    """Returns working memory; empty where it is not used."""
     joints, spheres = len(world.tree.parents), world.covers.spheres
     bodies, nodes = spheres.shape[:2]
+    if nodes == 0 or not is_used:
+        joints, bodies, nodes = 0, 0, 0
     moves, still, placements = np.empty(joints, np.bool_), np.empty((joints, 3, 4)), np.empty((joints, 12, LANES))
     placed, centres = np.empty((bodies, nodes), np.bool_), np.empty((bodies, nodes, 3, LANES))
     return Batch(
@@ -515,8 +517,7 @@ def find_touching_pair(world, order, placements):  # type: ignore[no-untyped-def
     """
     pairs, joints, spheres, excess = world.pairs, world.joints, world.spheres, world.excess
     balls, boxes = world.covers.balls, world.covers.boxes
-    kinds, sizes, poses, corner, known, nearest, distances = world.field
-    edge, cells, kept = corner[3], known.shape[0], nearest.shape[3]
+    kinds, sizes, poses = world.field.kinds, world.field.sizes, world.field.poses
     for index in range(len(order)):
         pair = order[index]
         body = pairs[pair, 0]
@@ -532,22 +533,13 @@ def find_touching_pair(world, order, placements):  # type: ignore[no-untyped-def
             y = placements[joint, 1, 0] * a + placements[joint, 1, 1] * b + placements[joint, 1, 2] * c
             z = placements[joint, 2, 0] * a + placements[joint, 2, 1] * b + placements[joint, 2, 2] * c
             x, y, z = x + placements[joint, 0, 3], y + placements[joint, 1, 3], z + placements[joint, 2, 3]
-            u, v, w = (x - corner[0]) / edge, (y - corner[1]) / edge, (z - corner[2]) / edge
-            if not (0.0 <= u < cells and 0.0 <= v < cells and 0.0 <= w < cells):
-                continue
-            i, j, k = int(u), int(v), int(w)
-            if not known[i, j, k]:
-                field_cell(world.field, x, y, z)
-            u, v, w = u - i - 0.5, v - j - 0.5, w - k - 0.5
-            away = edge * np.sqrt(u * u + v * v + w * w)
-            place = 0
-            while place < kept and distances[i, j, k, place] - away < radius:
-                number = nearest[i, j, k, place]
-                solid = solid_of(kinds, sizes, number)
+            for number in range(len(boxes)):
                 if (
-                    boxes[number, 6] > spheres[body, 3]
-                    and placed_solid_distance(solid, poses, number, x, y, z) < radius
+                    boxes[number, 0] - radius < x < boxes[number, 3] + radius
+                    and boxes[number, 1] - radius < y < boxes[number, 4] + radius
+                    and boxes[number, 2] - radius < z < boxes[number, 5] + radius
+                    and boxes[number, 6] > spheres[body, 3]
+                    and placed_solid_distance(solid_of(kinds, sizes, number), poses, number, x, y, z) < radius
                 ):
-                    return pair, int(number)
-                place += 1
+                    return pair, number
     return -1, 0

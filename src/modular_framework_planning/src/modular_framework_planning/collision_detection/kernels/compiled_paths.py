@@ -33,6 +33,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     world_of,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_covers import (
+    MOST_SOLIDS,
     Batch,
     find_open_pairs,
     find_touching_pair,
@@ -175,10 +176,10 @@ class Workspace(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def new_workspace(world):  # type: ignore[no-untyped-def]
-    """Returns working memory for paths in a world."""
+def new_workspace(world, is_motion=True):  # type: ignore[no-untyped-def]
+    """Returns working memory for paths in a world; spheres are looked at on straight motions only."""
     joints, bodies = len(world.tree.parents), len(world.joints)
-    return Workspace(_new_stretch(joints, bodies), new_memory(), new_batch(world), world.watched.copy())
+    return Workspace(_new_stretch(joints, bodies), new_memory(), new_batch(world, is_motion), world.watched.copy())
 
 
 @njit(cache=True, nogil=True)
@@ -370,7 +371,7 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         (status, number): TOUCHING with the number of a sample that touches; TOO_CLOSE with the number of undecided
         entries, more than n when they do not fit; CLEAR with the number of samples looked at.
     """
-    workspace = new_workspace(world)
+    workspace = new_workspace(world, len(samples.numbers) == 2)
     result = check_samples(world, borrowed(samples), first, undecided, borrowed(workspace))
     release(workspace)
     return result
@@ -403,14 +404,14 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
     active[:used] = order
     ranges[0], ranges[1] = (last, last, 0, used), (first, last - 1, 0, used)
     head, tail, looked_at, open_questions = 0, 2, 0, 0
-    has_balls = world.covers.balls.shape[1] > 0
-    has_spheres = len(samples.numbers) == 2 and world.covers.spheres.shape[1] > 0
+    covers, is_motion, few_solids = world.covers, len(samples.numbers) == 2, len(world.covers.boxes) <= MOST_SOLIDS
+    has_balls, has_spheres = covers.balls.shape[1] > 0 and few_solids, covers.spheres.shape[1] > 0 and few_solids
     while head < tail:
         low, high, begin, end = ranges[head, 0], ranges[head, 1], ranges[head, 2], ranges[head, 3]
         head += 1
         if low > high:
             continue
-        if has_spheres and head == 2:  # the end is free
+        if has_spheres and is_motion and head == 2:  # the end is free
             used = find_open_pairs(world, samples.vertices, last, batch)
             if used == 0:
                 counts[DECIDED_BY_SPHERES] += open_questions == 0
