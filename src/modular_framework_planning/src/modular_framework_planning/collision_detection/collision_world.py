@@ -217,11 +217,10 @@ def compile_world(
     firsts, rows = _distinct(ordered, pairs.margins, is_compiled)
     world = _arrays(model, members, robot, scene, ordered[firsts], pairs.margins[firsts])
     tabled = np.flatnonzero(~world.is_environment[world.pairs].any(axis=1))
-    keys = [_table_key(world, number) for number in tabled.tolist()]
+    keys = _table_keys(model, groups, world.pairs[tabled].tobytes(), world.margins[tabled].tobytes())
     table_of = np.full(len(firsts), -1)
-    table_of[[number for number, key in zip(tabled.tolist(), keys, strict=True) if key]] = np.arange(
-        len(keys) - keys.count(None)
-    )
+    has_table = np.array([key is not None for key in keys], dtype=bool)
+    table_of[tabled[has_table]] = np.arange(np.count_nonzero(has_table))
     tables, joints = _tables(model, groups, tuple(key for key in keys if key is not None))
     world = _with_field(world._replace(tables=tables, table_joints=joints, table_of=table_of))
     world = _with_covers(model, groups, members, layers, world)
@@ -360,21 +359,31 @@ def _excess(members: Sequence[_Member], both: NDArray[np.int64]) -> Array:
     return np.asarray(surface[both[:, 0]] + other[both[:, 1]])
 
 
-def _table_key(world: World, pair: int) -> tuple[int, ...] | None:
-    """Returns roots and joints (one or two) of a pair of links where one link moves the other, or None."""
-    first, second = (int(number) for number in world.pairs[pair])
-    if world.joints[first] > world.joints[second]:
+@lru_cache(maxsize=KEPT_GROUPINGS)
+def _table_keys(
+    model: RobotModel, groups: Grouping, pairs: bytes, margins: bytes
+) -> tuple[tuple[int, ...] | None, ...]:
+    """Returns the keys of pairs of groups of links; cached, because consecutive plans mostly have the same ones."""
+    _, members, _ = _link_members(model, groups)
+    both = np.frombuffer(pairs, dtype=np.int64).reshape(-1, 2).tolist()
+    return tuple(
+        None if margin > 0.0 else _table_key(_tree(model), members[first], members[second])
+        for (first, second), margin in zip(both, np.frombuffer(margins).tolist(), strict=True)
+    )
+
+
+def _table_key(tree: Tree, first: _Member, second: _Member) -> tuple[int, ...] | None:
+    """Returns roots and joints (one or two) of two bodies of which one moves the other, or None."""
+    if first.joint > second.joint:
         first, second = second, first
-    if world.margins[pair] > 0.0:
-        return None
     between: list[int] = []
-    joint = int(world.joints[second])
-    while joint > world.joints[first] and len(between) < 3:
+    joint = second.joint
+    while joint > first.joint and len(between) < 3:
         between.append(joint)
-        joint = int(world.tree.parents[joint])
-    if joint != world.joints[first] or not 1 <= len(between) <= 2 or world.tree.prismatic[between].any():
+        joint = int(tree.parents[joint])
+    if joint != first.joint or not 1 <= len(between) <= 2 or tree.prismatic[between].any():
         return None
-    return int(world.roots[first]), int(world.roots[second]), *between[::-1]
+    return first.root, second.root, *between[::-1]
 
 
 @lru_cache(maxsize=KEPT_GROUPINGS)
