@@ -14,6 +14,8 @@ from plain_coal_checker import PlainCoalChecker
 from test_collision_checkers import SHAPES, SMALL_SRDF, SMALL_URDF
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.collision_detection.sphere_covers import Layers
+from modular_framework_planning.collision_detection.sphere_layers import ALL_LAYERS, NO_LAYERS
 from modular_framework_planning.geometry.shapes import Box, Mesh, Plane, Shape
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planners.rrt_connect import compiled_rrt_connect, rrt_connect
@@ -142,6 +144,60 @@ def test_of_searches_side_by_side_the_first_path_wins_whatever_the_threads_do(sm
         fewer += together.states < count * alone.states
         assert together.states <= count * (alone.states + compiled_rrt_connect.EDGES)
     assert fewer > 0, "some search other than the first one found its path earlier"
+
+
+def cube_beside_a_wall(layers: Layers, seed: int) -> PlanningProblem:
+    """A cube slides in a plane, one corner 5 um away from a wall, past a pillar behind it."""
+    half = 0.8
+    turn = pin.Quaternion.FromTwoVectors(np.ones(3), np.array([1.0, 0.0, 0.0])).toRotationMatrix()
+    roll, pitch, yaw = pin.rpy.matrixToRpy(turn)
+    joints = "".join(
+        f'<joint name="{axis}" type="prismatic"><parent link="{parent}"/><child link="{child}"/><axis xyz="{xyz}"/>'
+        '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+        for axis, parent, child, xyz in (("y", "base", "rail", "0 1 0"), ("z", "rail", "cube", "0 0 1"))
+    )
+    model = RobotModel(
+        f'<robot name="slide"><link name="base"/><link name="rail"/>{joints}<link name="cube"><collision>'
+        f'<origin rpy="{roll} {pitch} {yaw}" xyz="0 0 0"/><geometry><box size="{2 * half} {2 * half} {2 * half}"/>'
+        "</geometry></collision></link></robot>",
+        '<robot name="slide"><group name="all"><joint name="y"/><joint name="z"/></group></robot>',
+    )
+    corner = np.sqrt(3.0) * half
+    wall = Box(1.0, 8.0, 8.0), np.array([corner + 5.0e-6 + 0.5, 0.0, 0.0])
+    scene = scene_with(model, wall, (Box(0.02, 0.1, 0.3), np.array([0.05 - corner, 0.0, 0.0])))
+    start, group, now_s = np.array([-0.8, 0.0]), model.group("all"), time.monotonic()
+    checker = ExactCollisionChecker(scene.with_positions(start), group.indices, layers=layers)
+    return PlanningProblem(
+        request=PlanningRequest(scene, "all", (JointGoal({"y": 0.8, "z": 0.0}),), "RRTConnect", 1, 60.0),
+        model=model,
+        group=group,
+        start=start,
+        checker=checker,
+        motion=MotionChecker(checker, group.indices, start),
+        kinematics=KinematicsPool(model),
+        settings=PipelineSettings(),
+        max_velocity=np.ones(2),
+        max_acceleration=np.ones(2),
+        rng=np.random.default_rng(seed),
+        begun_s=now_s,
+        deadline_s=now_s + 60.0,
+        end_s=now_s + 60.0,
+        solution_validator=TrajectoryValidator(),
+        planner_id="RRTConnect",
+    )
+
+
+def test_of_searches_side_by_side_the_same_one_wins_whatever_edges_the_bounds_leave_open() -> None:
+    for seed in range(8):
+        paths = []
+        for layers in (NO_LAYERS, ALL_LAYERS):  # spheres decide edges here that surfaces leave open
+            problem = cube_beside_a_wall(layers, seed)
+            searches = [
+                RrtConnect(replace(problem, rng=rng), np.array([[0.8, 0.0]]), 0.002, 0.02, None, False, number)
+                for number, rng in enumerate([problem.rng, *problem.rng.spawn(3)])
+            ]
+            paths.append(SideBySide(problem, searches).run())
+        assert paths[0] is not None and np.array_equal(paths[0], paths[1]), seed
 
 
 def test_searches_side_by_side_end_with_the_time_and_when_cancelled(small: RobotModel) -> None:

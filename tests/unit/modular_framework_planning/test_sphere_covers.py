@@ -164,3 +164,16 @@ def test_a_robot_without_joints_needs_no_spheres() -> None:
     block = '<link name="block"><collision><geometry><box size="1 1 1"/></geometry></collision></link>'
     model = RobotModel(f'<robot name="block">{block}</robot>', '<robot name="block"/>')
     assert choose_layers(model) == NO_LAYERS
+
+
+def test_the_layers_are_measured_on_joints_whose_limits_lie_far_from_zero() -> None:
+    joints = "".join(
+        f'<link name="l{n}"><collision><geometry><box size="0.1 0.1 0.4"/></geometry></collision></link>'
+        f'<joint name="j{n}" type="{kind}"><parent link="{parent}"/><child link="l{n}"/><axis xyz="0 1 0"/>'
+        f'<limit lower="{low}" upper="{high}" velocity="1" effort="1"/></joint>'
+        for n, (kind, parent, low, high) in enumerate(
+            [("revolute", "base", 4.0, 5.5), ("prismatic", "l0", 4.0, 10.0), ("prismatic", "l1", -10.0, -5.0)]
+        )
+    )
+    model = RobotModel(f'<robot name="far"><link name="base"/>{joints}</robot>', '<robot name="far"/>')
+    assert choose_layers(model) in CHOICES

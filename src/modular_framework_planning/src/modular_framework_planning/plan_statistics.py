@@ -17,7 +17,8 @@ class CheckCounts:
     Attributes:
         asked: checks that were asked for; one that was remembered does not count.
         free_by_bounds, touching_by_bounds: decided by the compiled check of spheres and surfaces.
-        by_spheres: of these, straight motions that spheres around and inside of the bodies decided alone.
+        by_spheres: of these, checks refused by a ball inside of a body, and straight motions with a free end on whose
+            way spheres leave no pair of bodies open.
         undecided: left to the exact check (Coal).
         touching_exactly: of these, those in which bodies touch.
         states: that the compiled check looked at, those of undecided edges of a compiled search twice.
@@ -39,7 +40,10 @@ class CheckCounts:
 
 @dataclass(frozen=True, slots=True)
 class Refusals:
-    """Two bodies by name, and in how many checks they touched; of links on one joint the first is named."""
+    """Two bodies by name, and in how many checks they touched; of links on one joint the first is named.
+
+    Where several pairs touch, the one that is found first counts; which one that is depends on the spheres in use.
+    """
 
     first: str
     second: str

@@ -30,17 +30,16 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
 from modular_framework_planning.collision_detection.kernels.compiled_distance_field import KEPT, DistanceField
+from modular_framework_planning.collision_detection.kernels.compiled_spheres import boxes_around, meeting_joints
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.collision_detection.reaches import farthest_end
 from modular_framework_planning.collision_detection.sphere_covers import (
     Layers,
     balls_inside,
-    boxes_around,
     common_joints,
     empty_covers,
     extents_of,
     heap_of,
-    meeting_joints,
     single_sphere,
 )
 from modular_framework_planning.contacts import LINK, WORLD, Body
@@ -509,7 +508,7 @@ def _link_covers(model: RobotModel, groups: Grouping, layers: Layers) -> Covers:
     for number, item in enumerate(members):
         if layers.nodes:
             covers.spheres[number] = heap_of(surfaces, item.root, item.pose, layers.nodes)
-        if item.shape.is_closed:
+        if layers.balls and item.shape.is_closed:
             covers.balls[number] = balls_inside(surfaces, item.root, layers.balls)
     lengths = np.linalg.norm(_tree(model).placements[:, :, 3], axis=1)
     return covers._replace(extents=extents_of(covers.spheres), lengths=lengths)

@@ -45,7 +45,7 @@ def layers_for(model: RobotModel) -> Layers:
 def choose_layers(model: RobotModel) -> Layers:
     """Measures random motions of a robot among boards, and chooses the spheres with which they are checked fastest.
 
-    To be called when a process starts; takes about a tenth of a second.
+    To be called when a process starts; takes some tenths of a second.
     """
     rng = np.random.default_rng(0)
     alone = _world(empty_scene(model), NO_LAYERS)
@@ -86,7 +86,8 @@ def _among_boards(model: RobotModel, reach: float, rng: np.random.Generator) -> 
 
 def _motions(model: RobotModel, world: CompiledWorld, alone: CompiledWorld, rng: np.random.Generator) -> Array:
     """Returns random motions from free states, half of which touch what is in the world; shape (n, 2, joints)."""
-    low, high = np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)
+    middle = model.default_positions()
+    low, high = np.maximum(model.lower, middle - np.pi), np.minimum(model.upper, middle + np.pi)
     states = np.array([model.with_mimics(state) for state in rng.uniform(low, high, (DRAWN, len(low)))])
     free = states[_verdicts(world, np.stack([states, states], axis=1)) == FREE]
     if not len(free):

@@ -14,6 +14,8 @@ import numpy as np
 from pinocchio import SE3 as Transform
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces, build_sphere_tree
+from modular_framework_planning.collision_detection.sphere_covers import balls_inside
 from modular_framework_planning.collision_detection.sphere_layers import choose_layers
 from modular_framework_planning.constraints import constrained_motion
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
@@ -34,6 +36,15 @@ from modular_framework_planning.trajectory_processing import compiled_polylines,
 
 LINKS = 4
 MOTION_STEP = 0.05  # [rad]
+TETRAHEDRON = np.array(
+    [
+        [0, 0, 0, 0, 1, 0, 1, 0, 0],
+        [0, 0, 0, 1, 0, 0, 0, 0, 1],
+        [0, 0, 0, 0, 0, 1, 0, 1, 0],
+        [1, 0, 0, 0, 1, 0, 0, 0, 1],
+    ],
+    dtype=float,
+)
 
 
 def compile_all() -> float:
@@ -45,6 +56,8 @@ def compile_all() -> float:
     robot = _robot()
     constrained_motion.warm_up(robot)
     choose_layers(robot)
+    spheres, boxes, links = build_sphere_tree(TETRAHEDRON)
+    balls_inside(Surfaces(spheres, boxes, links, TETRAHEDRON), 0, 1)
     _check_motions(_scene(robot, _voxels()))
     links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: a mesh needs an import of 0.3 s
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))

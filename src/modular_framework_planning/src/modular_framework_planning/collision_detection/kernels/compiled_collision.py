@@ -29,7 +29,7 @@ from modular_framework_planning.kinematics.compiled_kinematics import Tree, join
 
 CELLS = 128  # of a table along each joint, over a whole turn
 # checks asked for, found free, found touching; states looked at; checks that Coal found touching; checks that spheres
-# alone decided
+# decided
 CHECK_COUNTS = 6
 ASKED, FOUND_FREE, FOUND_TOUCHING, LOOKED_AT, TOUCHING_EXACTLY, DECIDED_BY_SPHERES = range(CHECK_COUNTS)
 FIELD = -1  # in place of a pair's second body: all solids of the field
@@ -48,7 +48,7 @@ class Covers(NamedTuple):
         lengths: how far each joint at zero is from the one it hangs on [m]; shape (joints,).
         meets: the last joint that moves both bodies of each pair, -1 for none; shape (p,).
         boxes: box around each solid of the field in the planning frame, least and largest corner, and half the distance
-            of two of its points [m]; shape (n, 7).
+            of two of its points [m]; endless and 0 for solids that are no box, cylinder or sphere; shape (n, 7).
     """
 
     spheres: Array

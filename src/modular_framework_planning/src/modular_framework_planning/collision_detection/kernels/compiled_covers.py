@@ -7,9 +7,10 @@ certain: those around a body say that it is free, balls inside of it that it tou
 
 Between two samples a distance is bounded by its curvature. Let u be the shortest vector from a sphere's centre to
 another centre or to a solid, which changes by at most V from one sample to the next and whose rate of change by at most
-A. The square of its length bends down by at most 2 V^2 + 2 |u| A (of a distance from a fixed set this holds as well: it
-is the least of many such squares), so that it stays above r^2 between two samples where it is at least
-r^2 + (V^2 + (r + V) A) / 4. That needs A <= 2 V t with less than t = 1.5 rad of turning in all joints together.
+A. If it were shorter than r somewhere between two samples, it would be shorter than r + V everywhere between them. The
+second derivative of its squared length is then at most 2 V^2 + 2 (r + V) A (also of a distance from a fixed set: its
+square is the least of many such squares), and at that place the squared length is at most (V^2 + (r + V) A) / 4 less
+than at one of the samples. So it stays above r where its square is at least r^2 + (V^2 + (r + V) A) / 4 at all samples.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from modular_framework_planning.kinematics.compiled_kinematics import joint_plac
 
 LANES = 8  # samples that are looked at together
 MIDDLE = LANES // 2  # one of them
-MOST_TURN = 1.5  # [rad]; of all joints together between two of them
+MOST_TURN = 1.5  # [rad]; of all joints together between two of them; on longer motions spheres decide next to nothing
 BALL_SLACK = 1.0e-4  # [m]; how far a ball has to reach into a solid
 MOST_SOLIDS = 64  # of the world; among more, spheres are not asked, as each would be held against all of them
 MOST_LOOKS = 64  # at two spheres, for one pair of bodies
@@ -401,7 +402,7 @@ def find_open_pairs(world, positions, count, batch):  # type: ignore[no-untyped-
     for joint in range(len(begin)):
         if not prismatic[joint]:
             turn += share * abs(end[joint] - begin[joint])
-    if turn > MOST_TURN:
+    if not turn <= MOST_TURN:
         batch.pairs[:] = watched
         return len(watched)
     nodes, numbers, turns, speeds, bends, squares, waiting, out = batch

@@ -186,7 +186,6 @@ def new_workspace(world, is_motion=True):  # type: ignore[no-untyped-def]
 def release(workspace):  # type: ignore[no-untyped-def]
     """Marks where working memory was used last: until here it has an owner."""
     workspace.stretch.motions[:], workspace.memory.bounds[0], workspace.batch.numbers[0] = 0.0, 0.0, 0
-    workspace.order[0:0] = 0
 
 
 @njit(cache=True, nogil=True)

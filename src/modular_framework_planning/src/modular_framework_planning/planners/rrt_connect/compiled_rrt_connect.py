@@ -35,7 +35,7 @@ from modular_framework_planning.geometry.spatial import Array
 FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED, PAUSED, AT_LIMIT = range(6)
 EXTENDS, CONNECTS = 0, 1
 NEW = -1  # target, for which the nearest state is not known yet
-EDGES = 200  # that are checked in one call, so that the clock and a cancellation are looked at in between
+EDGES = 200  # that are checked before a pause, so that the clock and a cancellation are looked at in between
 
 
 class Trees(NamedTuple):
@@ -48,7 +48,8 @@ class Trees(NamedTuple):
         sizes: how many states each tree has; shape (2,).
         position: next sample; tree that grows; EXTENDS or CONNECTS; state at which it grows, or NEW; shape (4,).
         target: state that it grows to; shape (joints,).
-        counts: edges that were checked, extensions that were tried, and how many may be; shape (3,).
+        counts: edges that were checked, extensions that were tried, how many may be, and edges at which the search
+            pauses; shape (4,).
     """
 
     states: Array
@@ -127,7 +128,7 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
     Returns:
         FOUND: the last states of both trees are the same. NEEDS_SAMPLES: all samples are used. NEEDS_ROOM: a tree is
         full. AT_LIMIT: the last extension that may be was tried. UNDECIDED: the edge from the state at which a tree
-        grows to `target`, `longest` of it at most. PAUSED: EDGES edges were checked; to be called again.
+        grows to `target`, `longest` of it at most. PAUSED: to be called again.
     """
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(space.edges)
@@ -142,9 +143,8 @@ def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: igno
     """Does what `grow` does, in given working memory; none of the arrays should have an owner (see `borrowed`)."""
     states, parents, blocked, sizes, position, target, counts = trees
     state, no_rows = np.empty(len(target)), np.empty((0, 2), np.int64)
-    end = counts[0] + EDGES
     while True:
-        if counts[0] >= end and verdict == UNKNOWN:
+        if counts[0] >= counts[3] and verdict == UNKNOWN:
             return PAUSED
         if position[3] == NEW:
             if position[2] == EXTENDS:

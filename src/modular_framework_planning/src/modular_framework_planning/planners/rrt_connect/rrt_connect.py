@@ -20,6 +20,7 @@ from modular_framework_planning.collision_detection.reaches import reaches
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import (
     AT_LIMIT,
+    EDGES,
     EXTENDS,
     FOUND,
     NEEDS_ROOM,
@@ -73,7 +74,7 @@ def _trees(start: Array, goals: Array, most_extensions: int) -> Trees:
         np.array([1, len(goals)]),
         np.array([0, 0, EXTENDS, NEW]),
         start.copy(),
-        np.array([0, 0, most_extensions]),
+        np.array([0, 0, most_extensions, EDGES]),
     )
 
 
@@ -142,6 +143,8 @@ class RrtConnect:
 
     def grow(self) -> None:
         """Grows the trees until they meet, or for some edges; other searches may do the same in other threads."""
+        if self._status != UNDECIDED:  # else the same turn goes on
+            self._trees.counts[3] = self._trees.counts[0] + EDGES
         self._status = grow(self._trees, self._space, self._samples, self._verdict, *self._world)
         self._verdict = UNKNOWN
 
@@ -149,6 +152,15 @@ class RrtConnect:
     def path(self) -> Array | None:
         """Vertices of shape (n, joints) from the start to one of the goals; None as long as the trees have not met."""
         return self._vertices() if self._status == FOUND else None
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether the search waits for `decide`."""
+        return self._status == UNDECIDED
+
+    def decide(self) -> None:
+        """Asks the exact check about the edge that the bounds leave open."""
+        self._verdict = FREE if self._undecided_edge_is_free() else BLOCKED
 
     def prepare(self) -> bool:
         """Provides what the trees need to grow on; returns whether they may."""
@@ -160,8 +172,6 @@ class RrtConnect:
             # what rng.uniform(low, high) gives, in a third of its time
             self._samples = low + (high - low) * self._problem.rng.random((SAMPLES, len(low)))
             self._trees.position[0] = 0
-        elif self._status == UNDECIDED:
-            self._verdict = FREE if self._undecided_edge_is_free() else BLOCKED
         return self._status != AT_LIMIT
 
     def add_counts_of(self, other: RrtConnect) -> None:
@@ -241,8 +251,13 @@ class SideBySide:
     ) -> Array | None:
         problem, searches = self._problem, self._searches
         while searches:
-            for _ in each(RrtConnect.grow, searches):
-                pass
+            growing = searches
+            while growing:  # a turn does not depend on which edges the bounds leave open
+                for _ in each(RrtConnect.grow, growing):
+                    pass
+                growing = [search for search in growing if search.is_undecided and not problem.interrupted()]
+                for search in growing:
+                    search.decide()
             paths = [search.path for search in searches if search.path is not None]
             if paths:
                 # a search that the clock ends is not repeatable
