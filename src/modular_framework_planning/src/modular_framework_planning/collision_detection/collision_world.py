@@ -508,10 +508,20 @@ def _link_covers(model: RobotModel, groups: Grouping, layers: Layers) -> Covers:
     for number, item in enumerate(members):
         if layers.nodes:
             covers.spheres[number] = heap_of(surfaces, item.root, item.pose, layers.nodes)
-        if layers.balls and item.shape.is_closed:
-            covers.balls[number] = balls_inside(surfaces, item.root, layers.balls)
+    if layers.balls:
+        covers.balls[:] = _link_balls(model, groups, layers.balls)
     lengths = np.linalg.norm(_tree(model).placements[:, :, 3], axis=1)
     return covers._replace(extents=extents_of(covers.spheres), lengths=lengths)
+
+
+@lru_cache(maxsize=KEPT_GROUPINGS)
+def _link_balls(model: RobotModel, groups: Grouping, most: int) -> Array:
+    """Balls inside of groups of links, shape (groups, most, 4)."""
+    surfaces, members, _ = _link_members(model, groups)
+    closed = [
+        balls_inside(surfaces, item.root, most) if item.shape.is_closed else np.zeros((most, 4)) for item in members
+    ]
+    return np.array(closed).reshape(-1, most, 4)
 
 
 @lru_cache(maxsize=KEPT_MODELS)

@@ -13,7 +13,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_spheres imp
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.geometry.spatial import Array
 
-CANDIDATES = 255  # nodes of a tree around whose centres there may be balls
+CANDIDATES = 63  # nodes of a tree around whose centres there may be balls
 
 
 def heap_of(surfaces: Surfaces, root: int, pose: Array, nodes: int, inflation: float = 0.0) -> Array:

@@ -28,8 +28,8 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 LOGGER = logging.getLogger("rosout.collision_detection")
 NO_LAYERS, ALL_LAYERS = Layers(0, 0), Layers(15, 2)
 CHOICES = (NO_LAYERS, Layers(0, 2), Layers(15, 0), ALL_LAYERS)
-DRAWN = 1000  # states, and motions that start from those that are free
-MOTIONS = 100  # that are free, and as many that touch a board: planners meet obstacles far more often than the robot
+DRAWN = 120  # states, and motions that start from those that are free
+MOTIONS = 40  # that are free, and as many that touch a board: planners meet obstacles far more often than the robot
 ROUNDS = 3  # of which the quickest one counts
 LONGEST, STEP = 1.0, 0.02  # [rad or m]; of a motion in each joint, and between the samples on it
 BOARDS, BOARD = 12, (0.5, 0.4, 0.02)  # around the robot; sizes [m]
@@ -45,7 +45,7 @@ def layers_for(model: RobotModel) -> Layers:
 def choose_layers(model: RobotModel) -> Layers:
     """Measures random motions of a robot among boards, and chooses the spheres with which they are checked fastest.
 
-    To be called when a process starts; takes some tenths of a second.
+    To be called when a process starts; takes a tenth of a second besides the loading of the meshes.
     """
     rng = np.random.default_rng(0)
     alone = _world(empty_scene(model), NO_LAYERS)

@@ -14,9 +14,10 @@ import numpy as np
 from pinocchio import SE3 as Transform
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
+from modular_framework_planning.collision_detection.kernels.compiled_collision import arguments
+from modular_framework_planning.collision_detection.kernels.compiled_edges import GroupEdges, check_edges
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces, build_sphere_tree
 from modular_framework_planning.collision_detection.sphere_covers import balls_inside
-from modular_framework_planning.collision_detection.sphere_layers import choose_layers
 from modular_framework_planning.constraints import constrained_motion
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
 from modular_framework_planning.kinematics import compiled_kinematics
@@ -55,9 +56,8 @@ def compile_all() -> float:
     time_parameterization.warm_up()
     robot = _robot()
     constrained_motion.warm_up(robot)
-    choose_layers(robot)
-    spheres, boxes, links = build_sphere_tree(TETRAHEDRON)
-    balls_inside(Surfaces(spheres, boxes, links, TETRAHEDRON), 0, 1)
+    spheres, boxes, children = build_sphere_tree(TETRAHEDRON)
+    balls_inside(Surfaces(spheres, boxes, children, TETRAHEDRON), 0, 1)
     _check_motions(_scene(robot, _voxels()))
     links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: a mesh needs an import of 0.3 s
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
@@ -118,6 +118,9 @@ def _check_motions(scene: PlanningScene) -> None:
     checker.collision_costs(np.array([scene.positions]))
     rrt_connect.warm_up(checker, scene.positions)
     assert checker.compiled_world is not None
+    count = len(scene.positions)
+    edges = GroupEdges(np.zeros(count), np.eye(count), MOTION_STEP)
+    check_edges(edges, np.array([[scene.positions, scene.positions + 0.1]]), *arguments(checker.compiled_world))
     path_shortening.warm_up(checker.compiled_world, scene.positions)
 
 
