@@ -123,21 +123,27 @@ def advertise(context: MoveGroupContext) -> None:
 
 
 def warm_up(context: MoveGroupContext) -> None:
-    """Compiles what is missing, measures what pays, and lets a checker build what its checks need of the links.
+    """Compiles what is missing, and lets a checker build what its checks need of the links.
 
     Raises:
         PlanningError: the checker cannot check the scene, or lacks its model.
     """
     if cache_is_empty():
         rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
-    compile_all()
+        compile_all()
     scene = context.monitor.snapshot()
     checker = context.new_checker(scene)
     if not hasattr(checker, "model"):
         raise ModelError(f"collision_detector: {type(checker).__name__} has no attribute model, the robot; add it")
-    choose_layers(checker.model)
     checker.is_free(scene.positions)
     checker.distance(scene.positions)
+    freeze_loaded_objects()
+
+
+def prepare_more(context: MoveGroupContext) -> None:
+    """Loads the compiled loops that no request has asked for yet, and measures which spheres make checks faster."""
+    compile_all()
+    choose_layers(context.model)
     freeze_loaded_objects()
 
 
@@ -163,6 +169,7 @@ def main() -> int:
         context.execution.describe(),
         time.monotonic() - begun,
     )
+    prepare_more(context)
     rospy.spin()
     return 0
 
