@@ -60,15 +60,18 @@ def problem_in(
     seed: int = 1,
     seconds: float = 60.0,
     cancelled: Callable[[], bool] = lambda: False,
+    start: np.ndarray = START,
+    goal: np.ndarray = GOAL,
+    layers: Layers | None = None,
 ) -> PlanningProblem:
     model, group = scene.model, scene.model.group("all")
-    positions = model.merge(scene.positions, dict(zip(group.joints, START.tolist(), strict=True)))
+    positions = model.merge(scene.positions, dict(zip(group.joints, start.tolist(), strict=True)))
     scene = scene.with_positions(positions)
-    checker = ExactCollisionChecker(scene, group.indices)
-    goal = JointGoal(dict(zip(group.joints, GOAL.tolist(), strict=True)))
+    checker = ExactCollisionChecker(scene, group.indices, layers=layers)
+    target = JointGoal(dict(zip(group.joints, goal.tolist(), strict=True)))
     now_s = time.monotonic()
     return PlanningProblem(
-        request=PlanningRequest(scene, "all", (goal,), "RRTConnect", 1, seconds, cancelled=cancelled),
+        request=PlanningRequest(scene, "all", (target,), "RRTConnect", 1, seconds, cancelled=cancelled),
         model=model,
         group=group,
         start=positions,
@@ -76,8 +79,8 @@ def problem_in(
         motion=MotionChecker(checker, group.indices, positions),
         kinematics=KinematicsPool(model),
         settings=PipelineSettings(),
-        max_velocity=np.ones(4),
-        max_acceleration=np.ones(4),
+        max_velocity=np.ones(len(start)),
+        max_acceleration=np.ones(len(start)),
         rng=np.random.default_rng(seed),
         begun_s=now_s,
         deadline_s=now_s + seconds,
@@ -165,26 +168,7 @@ def cube_beside_a_wall(layers: Layers, seed: int) -> PlanningProblem:
     corner = np.sqrt(3.0) * half
     wall = Box(1.0, 8.0, 8.0), np.array([corner + 5.0e-6 + 0.5, 0.0, 0.0])
     scene = scene_with(model, wall, (Box(0.02, 0.1, 0.3), np.array([0.05 - corner, 0.0, 0.0])))
-    start, group, now_s = np.array([-0.8, 0.0]), model.group("all"), time.monotonic()
-    checker = ExactCollisionChecker(scene.with_positions(start), group.indices, layers=layers)
-    return PlanningProblem(
-        request=PlanningRequest(scene, "all", (JointGoal({"y": 0.8, "z": 0.0}),), "RRTConnect", 1, 60.0),
-        model=model,
-        group=group,
-        start=start,
-        checker=checker,
-        motion=MotionChecker(checker, group.indices, start),
-        kinematics=KinematicsPool(model),
-        settings=PipelineSettings(),
-        max_velocity=np.ones(2),
-        max_acceleration=np.ones(2),
-        rng=np.random.default_rng(seed),
-        begun_s=now_s,
-        deadline_s=now_s + 60.0,
-        end_s=now_s + 60.0,
-        solution_validator=TrajectoryValidator(),
-        planner_id="RRTConnect",
-    )
+    return problem_in(scene, seed, start=np.array([-0.8, 0.0]), goal=np.array([0.8, 0.0]), layers=layers)
 
 
 def test_of_searches_side_by_side_the_same_one_wins_whatever_edges_the_bounds_leave_open() -> None:
