@@ -36,7 +36,6 @@ from modular_framework_planning.collision_detection.reaches import farthest_end
 from modular_framework_planning.collision_detection.sphere_covers import (
     Layers,
     balls_inside,
-    common_joints,
     empty_covers,
     extents_of,
     heap_of,
@@ -495,7 +494,7 @@ def _with_covers(
                 else heap_of(world.scene, item.root, item.pose, layers.nodes, item.shape.inflation_radius)
             )
             covers.extents[number] = extents_of(covers.spheres[number : number + 1])[0]
-    meets = meeting_joints(world.pairs, world.joints, _common_joints(model))
+    meets = meeting_joints(world.pairs, world.joints, world.tree.parents)
     boxes = boxes_around(world.field.kinds, world.field.sizes, world.field.poses)
     return world._replace(covers=covers._replace(lengths=links.lengths, meets=meets, boxes=boxes))
 
@@ -522,11 +521,6 @@ def _link_balls(model: RobotModel, groups: Grouping, most: int) -> Array:
         balls_inside(surfaces, item.root, most) if item.shape.is_closed else np.zeros((most, 4)) for item in members
     ]
     return np.array(closed).reshape(-1, most, 4)
-
-
-@lru_cache(maxsize=KEPT_MODELS)
-def _common_joints(model: RobotModel) -> NDArray[np.int64]:
-    return common_joints(_tree(model).parents)
 
 
 def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:

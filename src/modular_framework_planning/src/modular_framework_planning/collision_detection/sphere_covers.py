@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import Covers
 from modular_framework_planning.collision_detection.kernels.compiled_spheres import NO_NODE, depth_inside, fill_heap
@@ -80,20 +79,3 @@ def extents_of(spheres: Array) -> Array:
     """Returns how far the centres of spheres (b, nodes, 4) are from the origin at most, shape (b,)."""
     distances = np.where(spheres[:, :, 3] >= 0.0, np.linalg.norm(spheres[:, :, :3], axis=2), 0.0)
     return np.asarray(distances.max(axis=1, initial=0.0))
-
-
-def common_joints(parents: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the last joint on which two joints depend, -1 for none; shape (joints + 1, joints + 1).
-
-    The last row and column are for the planning frame, whose number is -1.
-    """
-    count = len(parents)
-    ways: list[list[int]] = []
-    for joint, parent in enumerate(parents.tolist()):
-        ways.append([*(ways[parent] if parent >= 0 else []), joint])
-    result = np.full((count + 1, count + 1), -1)
-    for one, way in enumerate(ways):
-        for other, way_there in enumerate(ways):
-            same = [joint for joint, there in zip(way, way_there, strict=False) if joint == there]
-            result[one, other] = same[-1] if same else -1
-    return result

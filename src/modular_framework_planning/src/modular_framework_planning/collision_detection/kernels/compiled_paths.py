@@ -298,17 +298,6 @@ def _motion_of(parents, prismatic, axes, change, signs, centres, spheres, body, 
 
 
 @njit(cache=True, nogil=True)
-def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
-    """Returns the last joint both joints depend on, -1 for none."""
-    while first != second:  # parents come before children
-        if first > second:
-            first = parents[first]
-        else:
-            second = parents[second]
-    return first
-
-
-@njit(cache=True, nogil=True)
 def _certified(samples, near, far, change, rows):  # type: ignore[no-untyped-def]
     """Returns the sample farthest from `near`, towards `far`, where no joint has gone further than `change`.
 
@@ -449,8 +438,7 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
                     continue
             else:
                 if moves:
-                    joint, other = hangs_on[one], hangs_on[two]
-                    common = _common_joint(parents, joint, other)
+                    common = covers.meets[pair]
                     if common < 0:
                         needed += motions[one] + motions[two]
                     else:

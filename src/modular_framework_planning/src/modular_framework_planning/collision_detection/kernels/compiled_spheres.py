@@ -79,16 +79,27 @@ def boxes_around(kinds, sizes, poses):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def meeting_joints(pairs, joints, common):  # type: ignore[no-untyped-def]
+def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
+    """Returns the last joint both joints depend on, -1 for none."""
+    while first != second:  # parents come before children
+        if first > second:
+            first = parents[first]
+        else:
+            second = parents[second]
+    return first
+
+
+@njit(cache=True, nogil=True)
+def meeting_joints(pairs, joints, parents):  # type: ignore[no-untyped-def]
     """Returns the last joint that moves both bodies of each pair (p, 2), see Covers.meets.
 
     Args:
         pairs: of bodies, the second one FIELD for solids of the world.
         joints: that move the bodies, -1 for the world.
-        common: what `common_joints` returns.
+        parents: of the joints, see Tree.
     """
     meets = np.full(len(pairs), -1)
     for pair in range(len(pairs)):
         if pairs[pair, 1] != FIELD:
-            meets[pair] = common[joints[pairs[pair, 0]], joints[pairs[pair, 1]]]
+            meets[pair] = _common_joint(parents, joints[pairs[pair, 0]], joints[pairs[pair, 1]])
     return meets
