@@ -16,6 +16,8 @@ from modular_framework_planning.planning_interface.phase_times import PhaseTimes
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
 from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
+from modular_framework_planning.trajectory_processing.compiled_curves import quintic_coefficients
+from modular_framework_planning.trajectory_processing.compiled_timing import SAMPLES_PER_SEGMENT, largest_shares
 from modular_framework_planning.trajectory_processing.time_parameterization import WINDOW_S, parameterize
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
@@ -243,3 +245,21 @@ def test_the_curve_and_its_derivatives_are_those_of_the_quintics_through_the_poi
     for before in (-1.0, times[-1] + 1.0):
         ends = motion.at(np.array([before]))[0][0]
         assert np.allclose(ends, motion.positions[0 if before < 0.0 else -1])
+
+
+def test_the_largest_shares_are_those_of_all_samples() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.004, 0.5, 30))])
+        values = rng.normal(size=(31, 5)), rng.normal(size=(31, 5)), rng.normal(size=(31, 5))
+        coefficients = quintic_coefficients(times, *values)
+        limits = rng.uniform(0.5, 2.0, 5), rng.uniform(0.5, 2.0, 5)
+        found = largest_shares(times, coefficients, *limits, SAMPLES_PER_SEGMENT)
+        seconds = np.diff(times)[:, None] * np.arange(SAMPLES_PER_SEGMENT + 1) / SAMPLES_PER_SEGMENT
+        for share, limit, order in zip(found, limits, (1, 2), strict=True):
+            curves = [
+                np.polynomial.Polynomial(coefficients[i, :, j]).deriv(order)(seconds[i]) / limit[j]
+                for i in range(30)
+                for j in range(5)
+            ]
+            assert share == pytest.approx(np.abs(curves).max(), rel=1e-12)

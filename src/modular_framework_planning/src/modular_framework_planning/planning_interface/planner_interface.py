@@ -38,6 +38,10 @@ MAX_TURNED = 16  # goals by the longer way round that are searched for
 class SolutionValidator(Protocol):
     """Checks a timed motion before a client gets it."""
 
+    def is_valid(self, problem: PlanningProblem, path: PlannedPath) -> bool:
+        """Whether nothing is wrong with the timed motion of a path; takes the same arguments as `fault`."""
+        ...
+
     def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
         """Returns what is wrong with the timed motion of a path; empty where nothing is.
 

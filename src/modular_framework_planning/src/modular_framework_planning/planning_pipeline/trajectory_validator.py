@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -29,34 +31,43 @@ class TrajectoryValidator:
     def __init__(self) -> None:
         self._passed: dict[bytes, CollisionChecker] = {}  # by motion; a checker need not be hashable
 
+    def is_valid(self, problem: PlanningProblem, path: PlannedPath) -> bool:
+        """Whether nothing is wrong with a timed motion; see SolutionValidator."""
+        return self._find_fault(problem, path) is None
+
     def fault(self, problem: PlanningProblem, path: PlannedPath) -> str:
         """Returns what is wrong with a timed motion, or nothing; see SolutionValidator."""
+        describe = self._find_fault(problem, path)
+        return describe() if describe else ""
+
+    def _find_fault(self, problem: PlanningProblem, path: PlannedPath) -> Callable[[], str] | None:
+        """Returns what describes the first fault of a motion; None where there is no fault."""
         assert path.trajectory is not None
         motion = path.trajectory
         key = b"".join(
             rows.tobytes() for rows in (motion.times, motion.positions, motion.velocities, motion.accelerations)
         )
         if key in self._passed and self._passed[key] is problem.checker:
-            return ""
+            return None
         with problem.phases.measured(CHECK):
-            text = _not_in_order(path)
-            if not text:
-                curve = path.trajectory.curve(problem.settings.motion_step)
-                chords = path.trajectory.chords(_sample_at(path.trajectory.positions, path, path.path_prefix))
-                text = next(
-                    filter(
-                        None,
-                        (
-                            _collision(problem, line)
-                            for line in (curve[_sample_at(curve, path, path.path_prefix) :], *chords)
-                        ),
-                    ),
-                    "",
-                )
-                text = text or _violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
-        if not text:
+            describe = _find_fault(problem, path)
+        if describe is None:
             self._passed[key] = problem.checker
-        return text
+        return describe
+
+
+def _find_fault(problem: PlanningProblem, path: PlannedPath) -> Callable[[], str] | None:
+    assert path.trajectory is not None
+    disorder = _not_in_order(path)
+    if disorder:
+        return lambda: disorder
+    curve = path.trajectory.curve(problem.settings.motion_step)
+    chords = path.trajectory.chords(_sample_at(path.trajectory.positions, path, path.path_prefix))
+    for line in (curve[_sample_at(curve, path, path.path_prefix) :], *chords):
+        hit = _colliding_state(problem, line)
+        if hit is not None:
+            return partial(_describe_collision, problem, hit)
+    return _find_violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
 
 
 def _sample_at(samples: Array, path: PlannedPath, vertex: int) -> int:
@@ -73,16 +84,20 @@ def _not_in_order(path: PlannedPath) -> str:
     return f"the time of sample {int(bad[0]) + 1} is not after the one before" if len(bad) else ""
 
 
-def _collision(problem: PlanningProblem, samples: Array) -> str:
-    step = problem.settings.finest_step
+def _colliding_state(problem: PlanningProblem, samples: Array) -> Array | None:
     samples = without_repeats(samples)  # long straight pieces are checked faster than many short ones
     for begin in range(0, max(1, len(samples) - 1), SAMPLES_AT_ONCE):
         _require_time(problem)
-        hit = problem.motion.colliding_state(samples[begin : begin + SAMPLES_AT_ONCE + 1], step)
+        hit = problem.motion.colliding_state(samples[begin : begin + SAMPLES_AT_ONCE + 1], problem.settings.finest_step)
         if hit is not None:
-            contacts = problem.checker.contacts(problem.motion.full_positions(hit), include_fixed=False)
-            return f"{describe_contacts(contacts)}, at {describe_state(problem, hit)} (checked at {step} rad steps)"
-    return ""
+            return hit
+    return None
+
+
+def _describe_collision(problem: PlanningProblem, hit: Array) -> str:
+    contacts = problem.checker.contacts(problem.motion.full_positions(hit), include_fixed=False)
+    step = problem.settings.finest_step
+    return f"{describe_contacts(contacts)}, at {describe_state(problem, hit)} (checked at {step} rad steps)"
 
 
 def _require_time(problem: PlanningProblem) -> None:
@@ -97,13 +112,14 @@ def _require_time(problem: PlanningProblem) -> None:
         )
 
 
-def _violation(problem: PlanningProblem, samples: Array) -> str:
-    if problem.constraints is None:
-        return ""
+def _find_violation(problem: PlanningProblem, samples: Array) -> Callable[[], str] | None:
+    constraints = problem.constraints
+    if constraints is None:
+        return None
     states = problem.motion.full_path(samples)
-    number = problem.constraints.first_violated(states)
+    number = constraints.first_violated(states)
     if number < 0:
-        return ""
-    return (
-        f"sample {number} of {len(states)} violates a path constraint: {problem.constraints.describe(states[number])}"
+        return None
+    return lambda: (
+        f"sample {number} of {len(states)} violates a path constraint: {constraints.describe(states[number])}"
     )

@@ -26,6 +26,8 @@ GRID_STEP = 0.02  # [rad or m] between changes of the path acceleration, at most
 MIN_INTERVALS = 12  # a straight or curved piece is cut into
 JUMP = 0.05  # jump of an acceleration, as a share of its limit, that is worth a point
 SAMPLES_PER_SEGMENT = 24
+NEARLY_REVERSED = -0.9  # cosine of the turn below which the motion stops instead of swinging round
+SMALLEST_BLEND = 1.0e-3  # [rad or m]
 
 
 class PathPieces(NamedTuple):
@@ -293,6 +295,19 @@ def averaged(pieces: PathPieces, motion: PathMotion, times: Array, window: float
 
 
 @njit(cache=True, nogil=True)
+def _bound_of_cubic(a: float, b: float, c: float, d: float) -> float:
+    """Bound of |a + b t + c t^2 + d t^3| over 0 <= t <= 1: the largest of its Bernstein coefficients."""
+    return max(abs(a), abs(a + b / 3.0), abs(a + 2.0 * b / 3.0 + c / 3.0), abs(a + b + c + d))
+
+
+@njit(cache=True, nogil=True)
+def _bound_of_quartic(a: float, b: float, c: float, d: float, e: float) -> float:
+    """Bound of |a + b t + c t^2 + d t^3 + e t^4| over 0 <= t <= 1: the largest of its Bernstein coefficients."""
+    inner = max(abs(a + b / 4.0), abs(a + b / 2.0 + c / 6.0), abs(a + 3.0 * b / 4.0 + c / 2.0 + d / 4.0))
+    return max(abs(a), inner, abs(a + b + c + d + e))
+
+
+@njit(cache=True, nogil=True)
 def largest_shares(
     times: Array, coefficients: Array, velocity: Array, acceleration: Array, samples: int
 ) -> tuple[float, float]:
@@ -303,10 +318,16 @@ def largest_shares(
     """
     fastest, hardest = 0.0, 0.0
     for i in range(len(times) - 1):
-        step = (times[i + 1] - times[i]) / samples
+        span = times[i + 1] - times[i]
+        step = span / samples
         for j in range(len(velocity)):
             c1, c2, c3 = coefficients[i, 1, j], coefficients[i, 2, j], coefficients[i, 3, j]
             c4, c5 = coefficients[i, 4, j], coefficients[i, 5, j]
+            t2, t3, t4, t5 = 2.0 * c2 * span, 3.0 * c3 * span**2, 4.0 * c4 * span**3, 5.0 * c5 * span**4
+            speeds = _bound_of_quartic(c1, t2, t3, t4, t5)
+            rates = _bound_of_cubic(t2, 2.0 * t3, 3.0 * t4, 4.0 * t5) / span
+            if speeds <= fastest * velocity[j] and rates <= hardest * acceleration[j]:
+                continue  # no sample can be above those seen
             for k in range(samples + 1):
                 t = k * step
                 speed = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5)))
@@ -416,6 +437,26 @@ def timed_points(
     values[1] /= factor
     values[2] /= factor * factor
     return slower, values
+
+
+@njit(cache=True, nogil=True)
+def largest_blends(vertices: Array, deviation: float) -> Array:
+    """Returns the distance from each inner corner at which its parabola may leave the line, shape (n - 2,); 0: none.
+
+    Args: vertices of shape (n, joints); most distance of the parabola from the corner [rad or m].
+    """
+    result = np.zeros(max(0, len(vertices) - 2))
+    for number in range(len(result)):
+        before, after = vertices[number + 1] - vertices[number], vertices[number + 2] - vertices[number + 1]
+        length, next_length = np.sqrt((before * before).sum()), np.sqrt((after * after).sum())
+        before, after = before / length, after / next_length
+        if (before * after).sum() < NEARLY_REVERSED:
+            continue
+        turn = max(np.sqrt(((after - before) ** 2).sum()), 1e-9)
+        size = min(0.45 * length, 0.45 * next_length, 4.0 * deviation / turn)
+        if size >= SMALLEST_BLEND:
+            result[number] = size
+    return result
 
 
 @njit(cache=True, nogil=True)

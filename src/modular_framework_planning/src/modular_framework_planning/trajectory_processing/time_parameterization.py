@@ -15,9 +15,10 @@ import numpy as np
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.trajectory_processing.blended_path import choose_blends
+from modular_framework_planning.trajectory_processing.blended_path import free_blends
 from modular_framework_planning.trajectory_processing.compiled_timing import (
     SAMPLES_PER_SEGMENT,
+    largest_blends,
     largest_shares,
     spread_times,
     timed_points,
@@ -118,4 +119,4 @@ def warm_up() -> None:
     motion.curve(0.1)
     point_times(motion.times, motion.duration_s)
     overrun(motion.slowed(2.0), limits, limits)
-    choose_blends(vertices, 0.1, lambda samples: len(samples) > 0)
+    free_blends(vertices, largest_blends(vertices, 0.1), lambda samples: len(samples) > 0)

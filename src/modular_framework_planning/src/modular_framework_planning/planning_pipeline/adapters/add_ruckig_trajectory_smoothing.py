@@ -36,7 +36,7 @@ class AddRuckigTrajectorySmoothing(RequestAdapter):
             return timed
         candidates = [replace(timed, trajectory=item) for item in self._candidates(problem, timed)]
         for candidate in sorted(candidates, key=_duration):
-            if not problem.solution_validator.fault(problem, candidate):
+            if problem.solution_validator.is_valid(problem, candidate):
                 return candidate
         return replace(timed, trajectory=slowed_to_limits(timed.trajectory, *limits))
 

@@ -13,7 +13,8 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.phase_times import TIMING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
-from modular_framework_planning.trajectory_processing.blended_path import choose_blends
+from modular_framework_planning.trajectory_processing.blended_path import free_blends
+from modular_framework_planning.trajectory_processing.compiled_timing import largest_blends
 from modular_framework_planning.trajectory_processing.time_parameterization import (
     LONGEST_PERIOD_S,
     SHORTEST_PERIOD_S,
@@ -64,11 +65,16 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
             ),
         )
 
-    blends = choose_blends(vertices, tolerance, lambda curve: _is_valid(problem, curve))
+    largest = largest_blends(np.ascontiguousarray(vertices, dtype=float), float(tolerance))
+    if problem.constraints is None:  # the last check finds most often that all corners are free at their full size
+        rounded = timed(largest)
+        if not largest.any() or problem.solution_validator.is_valid(problem, rounded):
+            return rounded
+    blends = free_blends(vertices, largest, lambda curve: _is_valid(problem, curve))
     if blends.any():
         for slowness in (1.0,) if problem.constraints is None else SLOWNESS:
             rounded = timed(blends, slowness)
-            if not problem.solution_validator.fault(problem, rounded):
+            if problem.solution_validator.is_valid(problem, rounded):
                 return rounded
     return timed(np.zeros_like(blends))
 
