@@ -17,8 +17,9 @@ from wide_robots import robot as wide_robot
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.collision_detection.kernels.compiled_collision import DECIDED_BY_SPHERES
+from modular_framework_planning.collision_detection.kernels.compiled_spheres import NO_NODE, fill_heaps
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces, build_sphere_tree
-from modular_framework_planning.collision_detection.sphere_covers import Layers, balls_inside, heap_of
+from modular_framework_planning.collision_detection.sphere_covers import Layers, balls_inside
 from modular_framework_planning.collision_detection.sphere_layers import (
     ALL_LAYERS,
     CHOICES,
@@ -143,11 +144,23 @@ def test_spheres_of_every_level_hold_the_body() -> None:
     shape = trimesh.creation.icosphere(3).apply_scale((0.3, 0.1, 0.05))
     pose = pin.SE3(pin.exp3(np.array([0.3, -0.2, 1.0])), np.array([0.1, 0.2, 0.3]))
     points = shape.vertices @ pose.rotation.T + pose.translation
+    body, place, inflation = np.zeros(1, dtype=np.int64), pose.homogeneous[None, :3].copy(), 0.01
     for nodes in (1, 3, 15, 63):
-        spheres = heap_of(tree_over(shape), 0, pose.homogeneous[:3], nodes)
-        lowest = spheres[nodes // 2 :]
+        spheres = np.full((1, nodes, 4), NO_NODE)
+        fill_heaps(tree_over(shape), body, place, np.zeros((1, 4)), np.array([inflation]), body, spheres)
+        lowest = spheres[0, nodes // 2 :]
         gaps = np.linalg.norm(points[:, None] - lowest[None, :, :3], axis=2) - lowest[:, 3]
-        assert (gaps.min(axis=1) < 1e-9).all()
+        assert (gaps.min(axis=1) < 1e-9 - inflation).all()
+
+
+def test_one_sphere_covers_a_body_without_a_surface() -> None:
+    pose = pin.SE3(pin.exp3(np.array([0.3, -0.2, 1.0])), np.array([0.1, 0.2, 0.3]))
+    spheres, nothing, sphere = np.full((2, 3, 4), NO_NODE), tree_over(trimesh.creation.box((1, 1, 1))), np.zeros((2, 4))
+    sphere[1] = 0.4, 0.0, 0.0, 0.2
+    poses = np.array([pose.homogeneous[:3]] * 2)
+    fill_heaps(nothing, np.full(2, -1), poses, sphere, np.full(2, 0.01), np.array([1]), spheres)
+    assert np.allclose(spheres[1, 0], [*(pose * np.array([0.4, 0.0, 0.0])), 0.2])
+    assert (spheres[0, :, 3] == NO_NODE).all() and (spheres[1, 1:, 3] == NO_NODE).all()
 
 
 def test_the_layers_are_chosen_by_measurement(caplog: pytest.LogCaptureFixture) -> None:

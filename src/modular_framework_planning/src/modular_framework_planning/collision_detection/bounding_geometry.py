@@ -71,6 +71,22 @@ class BoundingGeometry:
         """Sphere tree over the triangles; built on first use, because most solids are checked in closed form."""
         return None if self.corners is None else _surface(self.corners())
 
+    @cached_property
+    def numbers(self) -> Array:
+        """Kind, three sizes, inflation, excess of surface and closed form, is closed, radius, inner radius."""
+        return np.array(
+            [
+                self.kind,
+                *self.size,
+                self.inflation_radius,
+                self.surface_excess,
+                self.solid_excess,
+                self.is_closed,
+                self.radius,
+                self.inner_radius,
+            ]
+        )
+
     @property
     def inner_radius(self) -> float:
         """Radius of the largest ball around the closed form's origin that lies inside [m]; 0 where none is known."""

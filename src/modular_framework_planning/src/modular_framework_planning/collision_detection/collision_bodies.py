@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,10 +113,7 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
     joint_ids = np.array([part.joint_id for part in parts])
     held = np.array([part.body.kind == ATTACHED for part in parts])
     numbers = np.arange(len(parts))
-    first, second = (
-        numbers[:rows, None],
-        numbers[None, links:],
-    )  # bodies of the world do not move relative to each other
+    first, second = numbers[:rows, None], numbers[None, links:]  # bodies of the world do not move against each other
     is_rigid = (standing[joint_ids[first]] == standing[joint_ids[second]]) & ~held[first] & ~held[second]
     checked = np.nonzero((second > first) & ~is_rigid & ~_allowed(scene, parts, rows, links))
     first, second = checked[0], checked[1] + links
@@ -133,7 +131,7 @@ def _allowed(scene: PlanningScene, parts: Sequence[PlacedGeometry], rows: int, l
     Most objects of the world are not in the allowed collision matrix: what holds for one of them holds for all.
     """
     acm = scene.acm
-    named = {name for pair in acm.entries for name in pair} | acm.defaults.keys()
+    named = {*chain.from_iterable(acm.entries), *acm.defaults}
     bodies = list({(part.body.kind, part.body.name): part.body for part in parts[:rows]}.values())
     row_of = {(body.kind, body.name): number for number, body in enumerate(bodies)}
     columns: list[list[bool]] = []
@@ -215,4 +213,4 @@ def _supports(model: RobotModel, moving: Joints) -> list[frozenset[int]]:
     """Returns, for each joint of the tree, which of the moving joints it depends on (mimics included)."""
     chosen = set(range(len(model.joint_names))) if moving is None else {int(number) for number in moving}
     chosen |= {follower for follower, leader, _, _ in model.mimics if leader in chosen}
-    return [frozenset(int(joint) - 1 for joint in chain if joint > 0) & chosen for chain in model.pin_model.supports]
+    return [frozenset(int(joint) - 1 for joint in joints if joint > 0) & chosen for joints in model.pin_model.supports]

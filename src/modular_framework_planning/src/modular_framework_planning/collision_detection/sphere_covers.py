@@ -15,26 +15,16 @@ from modular_framework_planning.geometry.spatial import Array
 CANDIDATES = 63  # nodes of a tree around whose centres there may be balls
 
 
-def heap_of(surfaces: Surfaces, root: int, pose: Array, nodes: int, inflation: float = 0.0) -> Array:
-    """Returns spheres around a body, see Covers.spheres; shape (nodes, 4).
+def heap_of(surfaces: Surfaces, root: int, nodes: int) -> Array:
+    """Returns spheres around a body in the frame of its surface, see Covers.spheres; shape (nodes, 4).
 
     Args:
         surfaces: that hold the tree of its surface.
         root: of the tree.
-        pose: of the surface in the frame of the joint, shape (3, 4).
         nodes: of the heap, one less than a power of two.
-        inflation: radius of a ball around each point of the surface that belongs to the body [m].
     """
     out = np.zeros((nodes, 4))
-    fill_heap(surfaces, root, np.ascontiguousarray(pose), out)
-    out[out[:, 3] >= 0.0, 3] += inflation
-    return out
-
-
-def single_sphere(sphere: Array, pose: Array, nodes: int) -> Array:
-    """Returns the heap (nodes, 4) of a body of which one sphere (centre and radius) is known."""
-    out = np.full((nodes, 4), NO_NODE)
-    out[0] = *(pose[:, :3] @ sphere[:3] + pose[:, 3]), sphere[3]
+    fill_heap(surfaces, root, out)
     return out
 
 
@@ -44,7 +34,7 @@ def balls_inside(surfaces: Surfaces, root: int, most: int) -> Array:
     Returns:
         Shape (most, 4): centre and radius [m], 0 for none.
     """
-    candidates = heap_of(surfaces, root, np.eye(4)[:3], CANDIDATES)
+    candidates = heap_of(surfaces, root, CANDIDATES)
     candidates = candidates[candidates[:, 3] >= 0.0]
     candidates[:, 3] = [depth_inside(surfaces, root, candidate) for candidate in candidates]
     result = np.zeros((most, 4))

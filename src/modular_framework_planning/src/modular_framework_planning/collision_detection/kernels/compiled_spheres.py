@@ -39,8 +39,8 @@ def depth_inside(surface, root, point):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fill_heap(surface, root, pose, out):  # type: ignore[no-untyped-def]
-    """Writes the upper levels (nodes, 4) of a tree of spheres; their centres are moved by a pose (3, 4)."""
+def fill_heap(surface, root, out):  # type: ignore[no-untyped-def]
+    """Writes the upper levels (nodes, 4) of a tree of spheres."""
     spheres, links = surface.spheres, surface.links
     nodes = np.full(len(out), -1, np.int32)
     nodes[0] = root
@@ -48,13 +48,38 @@ def fill_heap(surface, root, pose, out):  # type: ignore[no-untyped-def]
         node, out[place, 3] = nodes[place], NO_NODE
         if node < 0:
             continue
-        for row in range(3):
-            out[place, row] = pose[row, 3]
-            for inner in range(3):
-                out[place, row] += pose[row, inner] * spheres[node, inner]
-        out[place, 3] = spheres[node, 3]
+        out[place] = spheres[node]
         if 2 * place + 2 < len(out) and links[node, 0] >= 0:
             nodes[2 * place + 1], nodes[2 * place + 2] = links[node, 0], links[node, 1]
+
+
+@njit(cache=True, nogil=True)
+def fill_heaps(surface, roots, poses, spheres, inflation, chosen, out):  # type: ignore[no-untyped-def]
+    """Writes the spheres (b, nodes, 4) of some bodies, in the frames of their joints: one alone without a surface.
+
+    Args:
+        surface: that holds the trees of the bodies' surfaces.
+        roots: of all bodies, see World.
+        poses: of all bodies, see World.
+        spheres: of all bodies, see World.
+        inflation: radius of a ball around each point of a body's surface that belongs to it [m], shape (b,).
+        chosen: numbers of the bodies.
+        out: filled; no body has a sphere before.
+    """
+    for body in chosen:
+        if roots[body] < 0:
+            out[body, 0] = spheres[body]
+        else:
+            fill_heap(surface, roots[body], out[body])
+        for place in range(out.shape[1]):
+            if out[body, place, 3] < 0.0:
+                continue
+            x, y, z = out[body, place, 0], out[body, place, 1], out[body, place, 2]
+            for row in range(3):
+                pose = poses[body, row]
+                out[body, place, row] = pose[0] * x + pose[1] * y + pose[2] * z + pose[3]
+            if roots[body] >= 0:
+                out[body, place, 3] += inflation[body]
 
 
 @njit(cache=True, nogil=True)
