@@ -210,5 +210,5 @@ def test_the_farthest_end_bounds_where_points_of_the_robot_can_be(small: RobotMo
                 for item in small.link_geometries
             ),
         )
-    assert 0.8 * farthest < farthest_end(world) < 2.0 * farthest
-    assert farthest <= farthest_end(world)
+    assert 0.8 * farthest < farthest_end(world.tree, world) < 2.0 * farthest
+    assert farthest <= farthest_end(world.tree, world)

@@ -80,16 +80,66 @@ def scene_bodies(
         pairs: the pairs to watch.
         check_interrupt: called between shapes; raises an exception to stop.
     """
-    groups = _groups(model, parts, pairs)
-    robot, of_groups, body_of_link = link_groups(model, groups)
+    links, count = _links(model, pairs), len(model.link_geometries)
     is_in_pair, of_part = np.zeros(len(parts), dtype=bool), np.full(len(parts), -1)
     is_in_pair[pairs.parts] = True
-    of_part[: len(body_of_link)] = body_of_link
-    others = np.flatnonzero(is_in_pair & (of_part < 0))
-    of_part[others] = len(groups) + np.arange(len(others))
-    scene, of_others = _other_bodies(model, parts, others.tolist(), pairs, check_interrupt)
-    arrays = BodyArrays(*(np.concatenate(both) for both in zip(of_groups, of_others, strict=True)))
-    return SceneBodies(groups, robot, scene, arrays, of_part)
+    others = count + np.flatnonzero(is_in_pair[count:])
+    of_part[:count], of_part[others] = links.of_link, len(links.arrays.joints) + np.arange(len(others))
+    shapes = []
+    for number in others.tolist():
+        shapes.append(bounding_geometry_of(parts[number]))
+        check_interrupt()
+    arrays = _body_arrays(shapes, [parts[number].joint_id - 1 for number in others.tolist()], is_environment=True)
+    for row, number in enumerate(others.tolist()):
+        arrays.poses[row] = _pose(parts[number].placement, shapes[row])
+    found, has_surface = list(links.with_surface), _need_surface(links, arrays, shapes, parts, others, pairs)
+    for row in np.flatnonzero(has_surface).tolist():
+        if shapes[row].surface is not None:  # which is built now, if it was not
+            found.append(shapes[row])
+        check_interrupt()
+    surfaces, roots = _scene_surfaces(tuple(found))
+    _set_surfaces(arrays, has_surface, surfaces, roots[len(links.with_surface) :])
+    arrays = BodyArrays(*(np.concatenate(both) for both in zip(links.arrays, arrays, strict=True)))
+    return SceneBodies(links.groups, links.robot, surfaces, arrays, of_part)
+
+
+class _Links(NamedTuple):
+    """The links that are in a pair: groups of links with surfaces, then links in closed form.
+
+    Attributes:
+        groups, robot, arrays: see SceneBodies.
+        with_surface: the links in closed form whose surfaces come first among those of the scene.
+        of_link: body of each link, -1 for none.
+        is_inexact: whether the surface of each link in closed form lies outside of it by more than SMALL_EXCESS.
+    """
+
+    groups: Grouping
+    robot: Surfaces
+    arrays: BodyArrays
+    with_surface: tuple[BoundingGeometry, ...]
+    of_link: NDArray[np.int64]
+    is_inexact: NDArray[np.bool_]
+
+
+@lru_cache(maxsize=KEPT_GROUPINGS)
+def _links(model: RobotModel, pairs: WatchedPairs) -> _Links:
+    groups, geometries, shapes = _groups(model, pairs), model.link_geometries, _link_bounding_geometries(model)
+    robot, of_groups, of_link = link_groups(model, groups)
+    is_in_pair = np.zeros(len(geometries), dtype=bool)
+    is_in_pair[pairs.parts[pairs.parts < len(geometries)]] = True
+    numbers = np.flatnonzero(is_in_pair & (of_link < 0)).tolist()
+    of_link, is_inexact = of_link.copy(), np.zeros(len(geometries), dtype=bool)
+    of_link[numbers] = len(groups) + np.arange(len(numbers))
+    singles = [shapes[number] for number in numbers]
+    arrays = _body_arrays(singles, [geometries[number].joint_id - 1 for number in numbers], is_environment=True)
+    for row, number in enumerate(numbers):
+        arrays.poses[row] = _pose(geometries[number].placement, singles[row])
+    has_surface = np.array([shape.corners is not None for shape in singles], dtype=bool)
+    with_surface = tuple(shape for shape in singles if shape.corners is not None)
+    _set_surfaces(arrays, has_surface, *_scene_surfaces(with_surface))
+    is_inexact[numbers] = arrays.surface_excess > SMALL_EXCESS
+    both = BodyArrays(*(np.concatenate(rows) for rows in zip(of_groups, arrays, strict=True)))
+    return _Links(groups, robot, both, with_surface, of_link, is_inexact)
 
 
 @lru_cache(maxsize=KEPT_MODELS)
@@ -144,16 +194,18 @@ def _joined(spheres: list[Array], boxes: list[Array], links: list[Array], roots:
     return len(spheres) - 1
 
 
-def _groups(model: RobotModel, parts: Sequence[PlacedGeometry], pairs: WatchedPairs) -> Grouping:
+def _groups(model: RobotModel, pairs: WatchedPairs) -> Grouping:
     """Groups links that one joint moves, that have surfaces and are checked against the same bodies at one distance."""
-    links, (first, second) = len(model.link_geometries), pairs.parts.T
-    partners = np.full((len(parts), len(parts)), -1.0)  # the margin of a pair
+    links, count = len(model.link_geometries), int(pairs.parts.max(initial=-1)) + 1
+    first, second = pairs.parts.T
+    partners = np.full((count, count), -1.0)  # the margin of a pair
     partners[first, second] = partners[second, first] = pairs.margins
     groups: dict[tuple[int, bytes], list[int]] = {}
     for number in np.flatnonzero((partners[:links] >= 0.0).any(axis=1)).tolist():
         shape = _link_bounding_geometries(model)[number]
         if shape.kind == SURFACE and shape.corners is not None:
-            groups.setdefault((parts[number].joint_id, partners[number].tobytes()), []).append(number)
+            key = model.link_geometries[number].joint_id, partners[number].tobytes()
+            groups.setdefault(key, []).append(number)
     return tuple(tuple(group) for group in groups.values())
 
 
@@ -167,42 +219,13 @@ def link_groups(model: RobotModel, groups: Grouping) -> tuple[Surfaces, BodyArra
         shapes.append(BoundingGeometry(None, is_closed=all(links[link].is_closed for link in group)))
     joints = [model.link_geometries[group[0]].joint_id - 1 for group in groups]
     arrays = _body_arrays(shapes, joints, is_environment=False)
-    arrays.roots[:], arrays.spheres[:] = roots, surfaces.spheres[list(roots)]
+    _set_surfaces(arrays, np.ones(len(groups), dtype=bool), surfaces, roots)
     return surfaces, arrays, body_of_link
-
-
-def _other_bodies(
-    model: RobotModel,
-    parts: Sequence[PlacedGeometry],
-    others: Sequence[int],
-    pairs: WatchedPairs,
-    check_interrupt: Callable[[], None],
-) -> tuple[Surfaces, BodyArrays]:
-    """Returns links in closed form, held objects and the world, and the surfaces they need."""
-    links, shapes = _link_bounding_geometries(model), []
-    for number in others:
-        shapes.append(links[number] if number < len(links) else bounding_geometry_of(parts[number]))
-        check_interrupt()
-    arrays = _body_arrays(shapes, [parts[number].joint_id - 1 for number in others], is_environment=True)
-    found, has_surface = [], _need_surface(arrays, shapes, parts, others, pairs)
-    for number in np.flatnonzero(has_surface).tolist():
-        if shapes[number].surface is not None:
-            found.append(shapes[number])
-        check_interrupt()
-    surfaces, roots = _scene_surfaces(tuple(found))
-    arrays.roots[has_surface] = roots
-    arrays.spheres[has_surface] = surfaces.spheres[list(roots)]
-    arrays.spheres[has_surface, 3] += arrays.inflation[has_surface]
-    count = sum(number < len(links) for number in others)
-    arrays.poses[:count] = _link_poses(model)[list(others[:count])]
-    for row in range(count, len(others)):
-        arrays.poses[row] = _pose(parts[others[row]].placement, shapes[row])
-    return surfaces, arrays
 
 
 def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_environment: bool) -> BodyArrays:
     """Returns bodies in the frames of their joints, without surfaces."""
-    numbers = np.concatenate([np.zeros(0), *(shape.numbers for shape in shapes)]).reshape(-1, 10)
+    numbers = np.array([shape.numbers for shape in shapes], dtype=float).reshape(-1, 10)
     spheres = np.zeros((len(shapes), 4))
     spheres[:, 3] = numbers[:, 8]
     return BodyArrays(
@@ -221,12 +244,11 @@ def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_e
     )
 
 
-@lru_cache(maxsize=KEPT_MODELS)
-def _link_poses(model: RobotModel) -> Array:
-    """Poses of all links' bounding geometries in their joints' frames, shape (links, 3, 4)."""
-    shapes = _link_bounding_geometries(model)
-    poses = [_pose(item.placement, shape) for item, shape in zip(model.link_geometries, shapes, strict=True)]
-    return np.array(poses).reshape(-1, 3, 4)
+def _set_surfaces(arrays: BodyArrays, has_surface: NDArray[np.bool_], surfaces: Surfaces, roots: Sequence[int]) -> None:
+    """Gives bodies their surfaces: roots in the order of these bodies, and the spheres around them."""
+    arrays.roots[has_surface] = roots
+    arrays.spheres[has_surface] = surfaces.spheres[list(roots)]
+    arrays.spheres[has_surface, 3] += arrays.inflation[has_surface]
 
 
 def _pose(placement: Transform, shape: BoundingGeometry) -> Array:
@@ -241,23 +263,23 @@ def _scene_surfaces(shapes: tuple[BoundingGeometry, ...]) -> tuple[Surfaces, tup
 
 
 def _need_surface(
+    links: _Links,
     arrays: BodyArrays,
     shapes: Sequence[BoundingGeometry],
     parts: Sequence[PlacedGeometry],
-    others: Sequence[int],
+    others: NDArray[np.int64],
     pairs: WatchedPairs,
 ) -> NDArray[np.bool_]:
-    """Returns which bodies are checked by their surface.
+    """Returns which held objects and bodies of the world are checked by their surface.
 
     A solid of the world against a body whose surface is (nearly) exact is checked in closed form. Its triangles would
     not be used, and building a tree over them takes longer than many plans.
     """
-    chosen = list(others)
-    is_world = np.array([parts[number].body.kind == WORLD for number in others], dtype=bool)
-    is_plain, is_inexact, needed = np.zeros((3, len(parts)), dtype=bool)
-    is_plain[chosen] = is_world & (arrays.kinds != SURFACE) & (arrays.solid_excess == 0.0)
-    is_inexact[chosen] = arrays.surface_excess > SMALL_EXCESS
+    is_world = np.array([parts[number].body.kind == WORLD for number in others.tolist()], dtype=bool)
+    is_plain, is_inexact, is_needed = np.zeros((3, len(parts)), dtype=bool)
+    is_plain[others] = is_world & (arrays.kinds != SURFACE) & (arrays.solid_excess == 0.0)
+    is_inexact[: len(links.is_inexact)], is_inexact[others] = links.is_inexact, arrays.surface_excess > SMALL_EXCESS
     for number, other in (pairs.parts.T, pairs.parts.T[::-1]):
-        needed[number[is_plain[number] & (is_inexact[other] | is_plain[other])]] = True
+        is_needed[number[is_plain[number] & (is_inexact[other] | is_plain[other])]] = True
     has_surface = np.array([shape.corners is not None for shape in shapes], dtype=bool)
-    return np.asarray((needed[chosen] | ~is_plain[chosen]) & has_surface)
+    return np.asarray((is_needed[others] | ~is_plain[others]) & has_surface)

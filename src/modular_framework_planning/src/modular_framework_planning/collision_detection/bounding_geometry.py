@@ -7,6 +7,7 @@ encloses the body; where it is larger than the body, a hit is not final and the 
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -72,20 +73,10 @@ class BoundingGeometry:
         return None if self.corners is None else _surface(self.corners())
 
     @cached_property
-    def numbers(self) -> Array:
+    def numbers(self) -> tuple[float, ...]:
         """Kind, three sizes, inflation, excess of surface and closed form, is closed, radius, inner radius."""
-        return np.array(
-            [
-                self.kind,
-                *self.size,
-                self.inflation_radius,
-                self.surface_excess,
-                self.solid_excess,
-                self.is_closed,
-                self.radius,
-                self.inner_radius,
-            ]
-        )
+        excess = self.surface_excess, self.solid_excess
+        return (self.kind, *self.size, self.inflation_radius, *excess, self.is_closed, self.radius, self.inner_radius)
 
     @property
     def inner_radius(self) -> float:
@@ -108,9 +99,9 @@ class BoundingGeometry:
         x, y, z = self.size
         match self.kind:
             case _ if self.kind == BOX:
-                return float(np.sqrt(x * x + y * y + z * z))
+                return math.sqrt(x * x + y * y + z * z)
             case _ if self.kind in (CYLINDER, CONE):
-                return float(np.hypot(x, y))
+                return math.hypot(x, y)
             case _ if self.kind in (SPHERE, CAPSULE):
                 return x + y
         return np.inf

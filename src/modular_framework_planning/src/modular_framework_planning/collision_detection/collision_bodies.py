@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import chain
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,8 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 Joints = Sequence[int] | NDArray[np.int64] | None
-KEPT_LINK_PAIRS = 16
+KEPT_PAIRS = 16
+UNNAMED = Body("", WORLD)  # stands for all bodies of the world that the allowed collision matrix does not name
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class WatchedPair:
     is_fixed: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class WatchedPairs:
     """Pairs of geometries that may not come closer than a margin.
 
@@ -63,6 +63,16 @@ class WatchedPairs:
     parts: NDArray[np.int64]
     margins: NDArray[np.float64]
     fixed: NDArray[np.bool_]
+
+    @cached_property
+    def moving_numbers(self) -> NDArray[np.int64]:
+        """Numbers of the pairs that joints move against each other."""
+        return np.flatnonzero(~self.fixed)
+
+    @cached_property
+    def moving(self) -> WatchedPairs:
+        """Pairs that joints move against each other."""
+        return self.chosen(self.moving_numbers)
 
     def __len__(self) -> int:
         return len(self.parts)
@@ -79,10 +89,7 @@ class WatchedPairs:
 def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
     """Returns every collision geometry of a scene: links, held objects, then the world."""
     model = scene.model
-    result = [
-        PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.shape, float(margin))
-        for item, margin in zip(model.link_geometries, scene.link_margins(), strict=True)
-    ]
+    result = list(_placed_links(model, tuple(scene.link_margins().tolist())))
     for held in scene.attached.values():
         frame = model.pin_model.frames[model.frame_ids[held.link]]
         body = Body(held.name, ATTACHED, held.link, held.touch_links)
@@ -95,8 +102,16 @@ def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
     return result
 
 
+@lru_cache(maxsize=KEPT_PAIRS)
+def _placed_links(model: RobotModel, margins: tuple[float, ...]) -> tuple[PlacedGeometry, ...]:
+    return tuple(
+        PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.shape, margin)
+        for item, margin in zip(model.link_geometries, margins, strict=True)
+    )
+
+
 def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving: Joints) -> WatchedPairs:
-    """Returns the pairs that may not touch.
+    """Returns the pairs that may not touch, the same ones again for scenes that differ only in poses and shapes.
 
     Args:
         scene: whose allowed collisions count.
@@ -104,51 +119,65 @@ def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving:
         moving: joints that will move, as indices in a position vector; all by default.
     """
     chosen = None if moving is None else tuple(int(number) for number in moving)
-    acm, links = scene.acm, len(scene.model.link_geometries)
-    own = _link_pairs(scene.model, chosen, frozenset(acm.entries.items()), frozenset(acm.defaults.items()))
-    rows = next((number for number, part in enumerate(parts) if part.body.kind == WORLD), len(parts))
-    if len(parts) == links:
+    named, links = scene.acm.named, len(scene.model.link_geometries)
+    others = tuple(
+        part.body if part.body.kind != WORLD or part.body.name in named else UNNAMED for part in parts[links:]
+    )
+    joint_ids, margins = tuple([part.joint_id for part in parts]), tuple([part.margin for part in parts])
+    return _watched_pairs(scene.model, chosen, *scene.acm.verdicts, others, joint_ids, margins)
+
+
+@lru_cache(maxsize=KEPT_PAIRS)
+def _watched_pairs(
+    model: RobotModel,
+    moving: tuple[int, ...] | None,
+    entries: frozenset[tuple[frozenset[str], bool]],
+    defaults: frozenset[tuple[str, bool]],
+    others: tuple[Body, ...],
+    joint_ids: tuple[int, ...],
+    margins: tuple[float, ...],
+) -> WatchedPairs:
+    """Returns the pairs that may not touch.
+
+    Args:
+        model: the robot.
+        moving: as for watched_pairs.
+        entries: of the allowed collision matrix.
+        defaults: of the same.
+        others: bodies of the geometries that are not links, those of the world last.
+        joint_ids: of all geometries, see PlacedGeometry.
+        margins: of all geometries, see PlacedGeometry.
+    """
+    own = _link_pairs(model, moving, entries, defaults)
+    if not others:
         return own
-    support, standing = _rigid_joints(scene.model, chosen)
-    joint_ids = np.array([part.joint_id for part in parts])
-    held = np.array([part.body.kind == ATTACHED for part in parts])
-    numbers = np.arange(len(parts))
+    bodies = [*(part.body for part in _placed_links(model, margins[: len(model.link_geometries)])), *others]
+    kinds, links, joints = np.array([body.kind for body in bodies]), len(model.link_geometries), np.array(joint_ids)
+    rows = int(np.count_nonzero(kinds != WORLD))
+    support, standing = _rigid_joints(model, moving)
+    acm = AllowedCollisionMatrix(dict(entries), dict(defaults))
+    allowed = _allowed(acm, bodies[:rows], others)
+    numbers, held = np.arange(len(bodies)), kinds == ATTACHED
     first, second = numbers[:rows, None], numbers[None, links:]  # bodies of the world do not move against each other
-    is_rigid = (standing[joint_ids[first]] == standing[joint_ids[second]]) & ~held[first] & ~held[second]
-    checked = np.nonzero((second > first) & ~is_rigid & ~_allowed(scene, parts, rows, links))
+    is_rigid = (standing[joints[first]] == standing[joints[second]]) & ~held[first] & ~held[second]
+    checked = np.nonzero((second > first) & ~is_rigid & ~allowed)
     first, second = checked[0], checked[1] + links
-    margins = np.array([part.margin for part in parts[:rows]])[first]
     return WatchedPairs(
         np.concatenate([own.parts, np.column_stack([first, second])]),
-        np.concatenate([own.margins, np.where(second >= rows, margins, 0.0)]),
-        np.concatenate([own.fixed, support[joint_ids[first]] == support[joint_ids[second]]]),
+        np.concatenate([own.margins, np.where(second >= rows, np.array(margins)[first], 0.0)]),
+        np.concatenate([own.fixed, support[joints[first]] == support[joints[second]]]),
     )
 
 
-def _allowed(scene: PlanningScene, parts: Sequence[PlacedGeometry], rows: int, links: int) -> NDArray[np.bool_]:
-    """Returns whether each of the first `rows` geometries may touch each of those behind the links, as a matrix.
-
-    Most objects of the world are not in the allowed collision matrix: what holds for one of them holds for all.
-    """
-    acm = scene.acm
-    named = {*chain.from_iterable(acm.entries), *acm.defaults}
-    bodies = list({(part.body.kind, part.body.name): part.body for part in parts[:rows]}.values())
-    row_of = {(body.kind, body.name): number for number, body in enumerate(bodies)}
-    columns: list[list[bool]] = []
-    column_of: dict[tuple[str, str], int] = {}
-    others: list[int] = []
-    for part in parts[links:]:
-        body = part.body
-        key = (body.kind, body.name if body.kind != WORLD or body.name in named else "")  # no body has an empty name
-        if key not in column_of:
-            column_of[key] = len(columns)
-            columns.append([_may_touch(scene, one, body) for one in bodies])
-        others.append(column_of[key])
-    by_body = np.array(columns, dtype=bool).T
-    return by_body[np.ix_([row_of[part.body.kind, part.body.name] for part in parts[:rows]], others)]
+def _allowed(acm: AllowedCollisionMatrix, ones: Sequence[Body], others: Sequence[Body]) -> NDArray[np.bool_]:
+    """Returns whether each of some bodies may touch each of others, as a matrix."""
+    rows, columns = ({body: number for number, body in enumerate(dict.fromkeys(items))} for items in (ones, others))
+    verdicts = np.array([[_may_touch(acm, one, other) for other in columns] for one in rows], dtype=bool)
+    verdicts = verdicts.reshape(len(rows), len(columns))
+    return verdicts[np.ix_([rows[one] for one in ones], [columns[other] for other in others])]
 
 
-@lru_cache(maxsize=KEPT_LINK_PAIRS)
+@lru_cache(maxsize=KEPT_PAIRS)
 def _rigid_joints(model: RobotModel, moving: tuple[int, ...] | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Returns, for each of Pinocchio's joints, a number of the moving joints it depends on, and of what it is rigid to.
 
@@ -160,7 +189,7 @@ def _rigid_joints(model: RobotModel, moving: tuple[int, ...] | None) -> tuple[ND
     return np.array(support), np.array([standing.get(joint, joint) for joint in range(len(supports))])
 
 
-@lru_cache(maxsize=KEPT_LINK_PAIRS)
+@lru_cache(maxsize=KEPT_PAIRS)
 def _link_pairs(
     model: RobotModel,
     moving: tuple[int, ...] | None,
@@ -200,13 +229,13 @@ def _standing(model: RobotModel, moving: Joints) -> dict[int, int]:
     return {int(model.base_indices[-1]) + 1: 0}
 
 
-def _may_touch(scene: PlanningScene, first: Body, second: Body) -> bool:
+def _may_touch(acm: AllowedCollisionMatrix, first: Body, second: Body) -> bool:
     if first.name == second.name and first.kind == second.kind:
         return True
     for held, other in ((first, second), (second, first)) if ATTACHED in (first.kind, second.kind) else ():
         if held.kind == ATTACHED and other.kind == LINK and (other.name == held.link or other.name in held.touch_links):
             return True
-    return scene.acm.allows(first.name, second.name)
+    return acm.allows(first.name, second.name)
 
 
 def _supports(model: RobotModel, moving: Joints) -> list[frozenset[int]]:

@@ -74,13 +74,15 @@ class ExactCollisionChecker:
         self._parts: list[PlacedGeometry] = placed_geometries(scene)
         self._pairs: WatchedPairs = watched_pairs(scene, self._parts, moving)
         depths = {frozenset((item.first.name, item.second.name)): item.depth for item in tolerated}
-        moving_pairs = np.flatnonzero(~self._pairs.fixed)
         self._tolerated: dict[int, float] = {}
-        for number in moving_pairs.tolist() if depths else ():
+        for number in self._pairs.moving_numbers.tolist() if depths else ():
             depth = depths.get(frozenset(self._names(number)))
             if depth is not None:
                 self._tolerated[number] = depth
-        self._moving = np.setdiff1d(moving_pairs, list(self._tolerated)) if self._tolerated else moving_pairs
+        self._moving, self._moving_pairs = self._pairs.moving_numbers, self._pairs.moving
+        if self._tolerated:
+            self._moving = np.setdiff1d(self._moving, list(self._tolerated))
+            self._moving_pairs = self._pairs.chosen(self._moving)
         self._undecided = np.empty((UNDECIDED_ROWS, 2), dtype=np.int64)
 
     @cached_property
@@ -89,7 +91,7 @@ class ExactCollisionChecker:
 
     @cached_property
     def _compiled(self) -> CompiledWorld:
-        return compile_world(self.model, self._parts, self._pairs.chosen(self._moving), self._layers)
+        return compile_world(self.model, self._parts, self._moving_pairs, self._layers)
 
     @property
     def compiled_world(self) -> World | None:
@@ -123,8 +125,7 @@ class ExactCollisionChecker:
         Args:
             check_interrupt: called between shapes; raises an exception to stop. What was built is kept.
         """
-        pairs = self._pairs.chosen(self._moving)
-        self._compiled = compile_world(self.model, self._parts, pairs, self._layers, check_interrupt)
+        self._compiled = compile_world(self.model, self._parts, self._moving_pairs, self._layers, check_interrupt)
 
     def is_free(self, positions: Array) -> bool:
         """Whether no pair that can move touches at these positions (of the whole robot)."""

@@ -59,10 +59,10 @@ class Layers(NamedTuple):
     balls: int
 
 
-def empty_covers(layers: Layers, joints: int, bodies: int, pairs: int) -> Covers:
+def empty_covers(layers: Layers, bodies: int) -> Covers:
     """Returns covers in which no body has a sphere."""
     spheres, balls = np.full((bodies, layers.nodes, 4), NO_NODE), np.zeros((bodies, layers.balls, 4))
-    return Covers(spheres, balls, np.zeros(bodies), np.zeros(joints), np.full(pairs, -1), np.zeros((0, 7)))
+    return Covers(spheres, balls, np.zeros(bodies), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 7)))
 
 
 def extents_of(spheres: Array) -> Array:

@@ -49,7 +49,7 @@ def choose_layers(model: RobotModel) -> Layers:
     """
     rng = np.random.default_rng(0)
     alone = _world(empty_scene(model), NO_LAYERS)
-    scene = _among_boards(model, farthest_end(alone.world), rng)
+    scene = _among_boards(model, farthest_end(alone.world.tree, alone.world), rng)
     worlds = {layers: _world(scene, layers) for layers in CHOICES}
     motions = _motions(model, worlds[NO_LAYERS], alone, rng)
     times = {layers: min(_seconds(world, motions) for _ in range(ROUNDS)) for layers, world in worlds.items()}
@@ -69,8 +69,7 @@ def choose_layers(model: RobotModel) -> Layers:
 
 def _world(scene: PlanningScene, layers: Layers) -> CompiledWorld:
     parts = placed_geometries(scene)
-    pairs = watched_pairs(scene, parts, None)
-    return compile_world(scene.model, parts, pairs.chosen(np.flatnonzero(~pairs.fixed)), layers)
+    return compile_world(scene.model, parts, watched_pairs(scene, parts, None).moving, layers)
 
 
 def _among_boards(model: RobotModel, reach: float, rng: np.random.Generator) -> PlanningScene:

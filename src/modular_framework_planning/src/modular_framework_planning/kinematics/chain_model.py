@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +12,14 @@ import pinocchio as pin
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Chain, Tree
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
+
+KEPT_MODELS = 4
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def whole_tree(model: RobotModel) -> Tree:
+    """Returns all joints of a robot as arrays; the same ones again for the same robot."""
+    return tree_of(model)
 
 
 def tree_of(model: RobotModel, joints: Sequence[int] | None = None) -> Tree:

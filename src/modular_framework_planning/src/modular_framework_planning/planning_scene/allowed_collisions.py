@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import chain
 
 from modular_framework_urdf.srdf_reader import SemanticDescription
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AllowedCollisionMatrix:
     """Pairs of body names to "may touch"; a pair without an entry falls back to the defaults of its two bodies.
 
@@ -22,6 +24,16 @@ class AllowedCollisionMatrix:
     entries: Mapping[frozenset[str], bool] = field(default_factory=dict)
     defaults: Mapping[str, bool] = field(default_factory=dict)
     names: tuple[str, ...] = ()
+
+    @cached_property
+    def verdicts(self) -> tuple[frozenset[tuple[frozenset[str], bool]], frozenset[tuple[str, bool]]]:
+        """Entries and defaults, hashable."""
+        return frozenset(self.entries.items()), frozenset(self.defaults.items())
+
+    @cached_property
+    def named(self) -> frozenset[str]:
+        """Bodies with an entry or a default; all others may touch the same ones."""
+        return frozenset(chain(chain.from_iterable(self.entries), self.defaults))
 
     def allows(self, first: str, second: str) -> bool:
         """Whether the two bodies may touch; when both have a default, both must allow it."""

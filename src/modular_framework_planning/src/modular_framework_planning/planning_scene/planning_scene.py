@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import count
 
 import numpy as np
@@ -18,6 +19,7 @@ from modular_framework_planning.planning_scene.padding import Padding
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 _versions = count(1)
+KEPT_MODELS = 4
 OCTOMAP_ID = "<octomap>"
 DEFAULT_NAME = "(noname)"
 Color = tuple[float, float, float, float]
@@ -127,7 +129,10 @@ class PlanningScene:
 
     def link_margins(self) -> Array:
         """Returns the distance [m] each of the model's link geometries keeps from the world; (n,), in their order."""
-        return np.array([self.padding.margin(item.link, item.geometry) for item in self.model.link_geometries])
+        links, padding = self.model.link_geometries, self.padding
+        if not padding.links and not padding.scales:
+            return np.full(len(links), padding.objects)
+        return np.array([padding.margin(item.link, item.geometry) for item in links])
 
     def attached_padding(self) -> float:
         """Returns the distance [m] held objects keep from the world."""
@@ -300,6 +305,10 @@ def _place_in_message(shape: Shape) -> int:
 
 def empty_scene(model: RobotModel, positions: Array | None = None) -> PlanningScene:
     """Returns the scene of a robot alone in the world, with the SRDF's allowed collisions."""
-    acm = matrix_from_semantics(model.semantics, model.document.links)
     start = model.default_positions() if positions is None else model.with_mimics(positions)
-    return PlanningScene(model=model, positions=start, acm=acm)
+    return PlanningScene(model=model, positions=start, acm=_matrix_of_srdf(model))
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _matrix_of_srdf(model: RobotModel) -> AllowedCollisionMatrix:
+    return matrix_from_semantics(model.semantics, model.document.links)

@@ -23,10 +23,11 @@ def free_blends(vertices: Array, largest: Array, is_free: Callable[[Array], bool
     """
     result = np.zeros_like(largest)
     for number, size in enumerate(largest):
+        start, corner, end = vertices[number : number + 3]
         for _ in range(4):
             if size < SMALLEST_BLEND:
                 break
-            if is_free(corner_samples(*vertices[number : number + 3], size, SAMPLE_STEP)):
+            if is_free(corner_samples(start, corner, end, size, SAMPLE_STEP)):
                 result[number] = size
                 break
             size *= 0.5

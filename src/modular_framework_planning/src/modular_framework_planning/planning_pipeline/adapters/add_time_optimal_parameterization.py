@@ -46,7 +46,7 @@ def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
 
 
 def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
-    vertices = path.vertices
+    vertices = np.ascontiguousarray(path.vertices, dtype=float)
     if len(vertices) == 2 and np.abs(vertices[1] - vertices[0]).max() < 1e-9:
         vertices = vertices[1:]
     period = _number(problem.settings.parameters, "resample_dt", LONGEST_PERIOD_S, SHORTEST_PERIOD_S)
@@ -65,7 +65,7 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
             ),
         )
 
-    largest = largest_blends(np.ascontiguousarray(vertices, dtype=float), float(tolerance))
+    largest = largest_blends(vertices, float(tolerance))
     if problem.constraints is None:  # the last check finds most often that all corners are free at their full size
         rounded = timed(largest)
         if not largest.any() or problem.solution_validator.is_valid(problem, rounded):
