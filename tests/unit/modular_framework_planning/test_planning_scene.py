@@ -116,6 +116,14 @@ def test_every_kind_of_shape_is_hit_and_missed(model: RobotModel, shape: object)
         assert ExactCollisionChecker(placed).is_free(scene.positions) is free
 
 
+def test_an_empty_name_in_the_matrix_allows_no_contact(model: RobotModel) -> None:
+    scene = upright(model)
+    tip = model.link_transforms(scene.positions)["wrist_3_link"].translation
+    scene = scene.with_object(box("wall", at(*tip)))
+    for acm in (scene.acm.with_defaults({"": True}), scene.acm.with_entry("", "wrist_3_link", True)):
+        assert not ExactCollisionChecker(scene.with_acm(acm)).is_free(scene.positions)
+
+
 def test_defaults_hold_only_where_no_entry_speaks_and_both_must_allow() -> None:
     acm = AllowedCollisionMatrix({frozenset("ab"): False}, {"a": True, "c": True, "d": False})
     assert not acm.allows("a", "b")

@@ -16,14 +16,14 @@ from modular_framework_planning.collision_detection.bounding_geometry import (
     moved,
     stacked,
 )
-from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPairs
+from modular_framework_planning.collision_detection.collision_bodies import KEPT_PAIRS, PlacedGeometry, WatchedPairs
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.contacts import LINK, WORLD, Body
 from modular_framework_planning.geometry.spatial import Array, Transform
-from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, RobotModel
 
-KEPT_MODELS, KEPT_GROUPINGS, KEPT_SCENES = 4, 16, 2
+KEPT_GROUPINGS, KEPT_SCENES = 16, 2
 SMALL_EXCESS = 2.0e-3  # [m]; a surface that lies no further outside of its body stands for it
 Grouping = tuple[tuple[int, ...], ...]
 
@@ -89,17 +89,17 @@ def scene_bodies(
     for number in others.tolist():
         shapes.append(bounding_geometry_of(parts[number]))
         check_interrupt()
-    arrays = _body_arrays(shapes, [parts[number].joint_id - 1 for number in others.tolist()], is_environment=True)
+    of_others = _body_arrays(shapes, [parts[number].joint_id - 1 for number in others.tolist()], is_environment=True)
     for row, number in enumerate(others.tolist()):
-        arrays.poses[row] = _pose(parts[number].placement, shapes[row])
-    found, has_surface = list(links.with_surface), _need_surface(links, arrays, shapes, parts, others, pairs)
+        of_others.poses[row] = _pose(parts[number].placement, shapes[row])
+    found, has_surface = list(links.with_surface), _need_surface(links, of_others, shapes, parts, others, pairs)
     for row in np.flatnonzero(has_surface).tolist():
         if shapes[row].surface is not None:  # which is built now, if it was not
             found.append(shapes[row])
         check_interrupt()
     surfaces, roots = _scene_surfaces(tuple(found))
-    _set_surfaces(arrays, has_surface, surfaces, roots[len(links.with_surface) :])
-    arrays = BodyArrays(*(np.concatenate(both) for both in zip(links.arrays, arrays, strict=True)))
+    _set_surfaces(of_others, has_surface, surfaces, roots[len(links.with_surface) :])
+    arrays = BodyArrays(*(np.concatenate(both) for both in zip(links.arrays, of_others, strict=True)))
     return SceneBodies(links.groups, links.robot, surfaces, arrays, of_part)
 
 
@@ -121,7 +121,7 @@ class _Links(NamedTuple):
     is_inexact: NDArray[np.bool_]
 
 
-@lru_cache(maxsize=KEPT_GROUPINGS)
+@lru_cache(maxsize=KEPT_PAIRS)
 def _links(model: RobotModel, pairs: WatchedPairs) -> _Links:
     groups, geometries, shapes = _groups(model, pairs), model.link_geometries, _link_bounding_geometries(model)
     robot, of_groups, of_link = link_groups(model, groups)
@@ -136,7 +136,7 @@ def _links(model: RobotModel, pairs: WatchedPairs) -> _Links:
         arrays.poses[row] = _pose(geometries[number].placement, singles[row])
     has_surface = np.array([shape.corners is not None for shape in singles], dtype=bool)
     with_surface = tuple(shape for shape in singles if shape.corners is not None)
-    _set_surfaces(arrays, has_surface, *_scene_surfaces(with_surface))
+    _set_surfaces(arrays, has_surface, *stacked([shape.surface for shape in with_surface if shape.surface is not None]))
     is_inexact[numbers] = arrays.surface_excess > SMALL_EXCESS
     both = BodyArrays(*(np.concatenate(rows) for rows in zip(of_groups, arrays, strict=True)))
     return _Links(groups, robot, both, with_surface, of_link, is_inexact)
@@ -225,22 +225,23 @@ def link_groups(model: RobotModel, groups: Grouping) -> tuple[Surfaces, BodyArra
 
 def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_environment: bool) -> BodyArrays:
     """Returns bodies in the frames of their joints, without surfaces."""
-    numbers = np.array([shape.numbers for shape in shapes], dtype=float).reshape(-1, 10)
+    columns = np.array([shape.numbers for shape in shapes], dtype=float).reshape(-1, 10).T.copy()
+    kinds, x, y, z, inflation, surface_excess, solid_excess, closed, radii, inner_radii = columns
     spheres = np.zeros((len(shapes), 4))
-    spheres[:, 3] = numbers[:, 8]
+    spheres[:, 3] = radii
     return BodyArrays(
         joints=np.array(joints, dtype=np.int64),
         poses=np.tile(np.eye(4)[:3], (len(shapes), 1, 1)),
         roots=np.full(len(shapes), -1),
         is_environment=np.full(len(shapes), is_environment),
         spheres=spheres,
-        kinds=numbers[:, 0].astype(np.int64),
-        sizes=numbers[:, 1:4].copy(),
-        inflation=numbers[:, 4].copy(),
-        surface_excess=numbers[:, 5].copy(),
-        solid_excess=numbers[:, 6].copy(),
-        closed=numbers[:, 7] > 0.0,
-        inner_radii=numbers[:, 9].copy(),
+        kinds=kinds.astype(np.int64),
+        sizes=np.column_stack([x, y, z]),
+        inflation=inflation,
+        surface_excess=surface_excess,
+        solid_excess=solid_excess,
+        closed=closed > 0.0,
+        inner_radii=inner_radii,
     )
 
 

@@ -18,7 +18,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 Joints = Sequence[int] | NDArray[np.int64] | None
-KEPT_PAIRS = 16
+KEPT_PAIRS = 16  # for how many robots or scenes what depends on pairs of bodies is kept
 UNNAMED = Body("", WORLD)  # stands for all bodies of the world that the allowed collision matrix does not name
 
 
@@ -82,8 +82,14 @@ class WatchedPairs:
         return WatchedPair(first, second, float(self.margins[number]), bool(self.fixed[number]))
 
     def chosen(self, numbers: NDArray[np.int64]) -> WatchedPairs:
-        """Returns some of the pairs, by their numbers."""
-        return WatchedPairs(self.parts[numbers], self.margins[numbers], self.fixed[numbers])
+        """Returns some of the pairs, by their numbers; the same ones again for the same numbers."""
+        return _chosen(self, numbers.tobytes())
+
+
+@lru_cache(maxsize=KEPT_PAIRS)
+def _chosen(pairs: WatchedPairs, numbers: bytes) -> WatchedPairs:
+    chosen = np.frombuffer(numbers, dtype=np.int64)
+    return WatchedPairs(pairs.parts[chosen], pairs.margins[chosen], pairs.fixed[chosen])
 
 
 def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
@@ -230,6 +236,8 @@ def _standing(model: RobotModel, moving: Joints) -> dict[int, int]:
 
 
 def _may_touch(acm: AllowedCollisionMatrix, first: Body, second: Body) -> bool:
+    if second is UNNAMED:
+        return acm.allows_others(first.name)
     if first.name == second.name and first.kind == second.kind:
         return True
     for held, other in ((first, second), (second, first)) if ATTACHED in (first.kind, second.kind) else ():

@@ -19,7 +19,7 @@ from modular_framework_planning.collision_detection.body_arrays import (
     SceneBodies,
     link_groups,
 )
-from modular_framework_planning.collision_detection.collision_bodies import WatchedPairs
+from modular_framework_planning.collision_detection.collision_bodies import KEPT_PAIRS, WatchedPairs
 from modular_framework_planning.collision_detection.kernels.compiled_collision import CELLS, FIELD, UNKNOWN
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
 from modular_framework_planning.collision_detection.kernels.compiled_spheres import meeting_joints
@@ -102,14 +102,14 @@ def pair_arrays(model: RobotModel, bodies: SceneBodies, pairs: WatchedPairs) -> 
         arrays.joints,
         has_surface,
         arrays.kinds != SURFACE,
-        arrays.inflation,
+        np.where(has_surface, arrays.inflation, 0.0),
         np.where(has_surface, arrays.surface_excess, 0.0),
         arrays.solid_excess,
     ]
     return _pair_arrays(model, bodies.groups, pairs, bodies.of_part.tobytes(), np.array(rows, dtype=float).tobytes())
 
 
-@lru_cache(maxsize=KEPT_GROUPINGS)
+@lru_cache(maxsize=KEPT_PAIRS)
 def _pair_arrays(model: RobotModel, groups: Grouping, pairs: WatchedPairs, of_part: bytes, rows: bytes) -> PairArrays:
     bodies = _Bodies(*np.frombuffer(rows).reshape(len(_Bodies._fields), -1))
     ordered, is_compiled = _ordered(bodies, np.frombuffer(of_part, dtype=np.int64)[pairs.parts])
@@ -186,15 +186,14 @@ def _distinct(
         The first pair of each kind, in their order, and the number of each pair's kind, -1 where it does not count.
     """
     chosen, rows = np.flatnonzero(is_compiled), np.full(len(ordered), -1)
-    levels = np.unique(margins)
-    bodies = ordered.max(initial=0) + 1
-    codes = (ordered[chosen, 0] * bodies + ordered[chosen, 1]) * len(levels) + np.searchsorted(levels, margins[chosen])
-    first_of = np.empty(bodies * bodies * len(levels), dtype=np.int64)
-    first_of[codes[::-1]] = np.arange(len(codes))[::-1]  # of equal codes, the first one is written last
-    firsts = first_of[codes]
-    is_first = firsts == np.arange(len(codes))
-    rows[chosen] = (np.cumsum(is_first) - 1)[firsts]
-    return chosen[is_first], rows
+    _, distance = np.unique(margins, return_inverse=True)
+    codes = (ordered[:, 0] * (ordered.max(initial=0) + 1) + ordered[:, 1]) * (distance.max(initial=0) + 1) + distance
+    _, first, kinds = np.unique(codes[chosen], return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(len(order))
+    rows[chosen] = ranks[kinds]
+    return chosen[first[order]], rows
 
 
 def _table_keys(

@@ -11,9 +11,7 @@ import pinocchio as pin
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Chain, Tree
-from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
-
-KEPT_MODELS = 4
+from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, JointGroup, RobotModel
 
 
 @lru_cache(maxsize=KEPT_MODELS)

@@ -50,13 +50,13 @@ class TrajectoryValidator:
         if key in self._passed and self._passed[key] is problem.checker:
             return None
         with problem.phases.measured(CHECK):
-            describe = _find_fault(problem, path)
+            describe = _first_fault(problem, path)
         if describe is None:
             self._passed[key] = problem.checker
         return describe
 
 
-def _find_fault(problem: PlanningProblem, path: PlannedPath) -> Callable[[], str] | None:
+def _first_fault(problem: PlanningProblem, path: PlannedPath) -> Callable[[], str] | None:
     assert path.trajectory is not None
     disorder = _not_in_order(path)
     if disorder:

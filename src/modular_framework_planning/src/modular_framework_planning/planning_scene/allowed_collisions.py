@@ -32,13 +32,17 @@ class AllowedCollisionMatrix:
 
     @cached_property
     def named(self) -> frozenset[str]:
-        """Bodies with an entry or a default; all others may touch the same ones."""
+        """Bodies with an entry or a default; all others may touch the same ones, see allows_others."""
         return frozenset(chain(chain.from_iterable(self.entries), self.defaults))
 
     def allows(self, first: str, second: str) -> bool:
         """Whether the two bodies may touch; when both have a default, both must allow it."""
         entry = self.entries.get(frozenset((first, second)))
         return _default(self.defaults, first, second) if entry is None else entry
+
+    def allows_others(self, name: str) -> bool:
+        """Whether a body may touch those that the matrix does not name."""
+        return self.defaults.get(name, False)
 
     def with_entry(self, first: str, second: str, allowed: bool) -> AllowedCollisionMatrix:
         """Returns a matrix in which one pair has the given verdict."""

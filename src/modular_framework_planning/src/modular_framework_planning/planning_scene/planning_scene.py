@@ -16,10 +16,9 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.planning_scene.allowed_collisions import AllowedCollisionMatrix, matrix_from_semantics
 from modular_framework_planning.planning_scene.padding import Padding
-from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, RobotModel
 
 _versions = count(1)
-KEPT_MODELS = 4
 OCTOMAP_ID = "<octomap>"
 DEFAULT_NAME = "(noname)"
 Color = tuple[float, float, float, float]

@@ -31,6 +31,7 @@ from modular_framework_planning.robot_model.urdf_document import (
 from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription
 
 NO_VELOCITY_LIMIT = 1.0e6
+KEPT_MODELS = 4  # for how many robots what is computed once for a robot is kept
 
 
 @dataclass(frozen=True, slots=True)

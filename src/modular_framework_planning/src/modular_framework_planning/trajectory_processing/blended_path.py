@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Chooses the parabolas that round the corners of a polyline: smooth enough to pass without stopping, near the line."""
+"""Makes the parabolas that round the corners of a polyline smaller where something is in their way."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def free_blends(vertices: Array, largest: Array, is_free: Callable[[Array], bool
     Args:
         vertices: polyline of shape (n, joints).
         largest: corner distances to begin with, shape (n - 2,) (see `largest_blends`).
-        is_free: whether a polyline (samples along a candidate corner) is free of collisions.
+        is_free: whether a polyline (samples along a candidate corner) is free and keeps the path constraints.
     """
     result = np.zeros_like(largest)
     for number, size in enumerate(largest):

@@ -34,7 +34,7 @@ class AddTimeOptimalParameterization(RequestAdapter):
     """
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans, then times the path; the path without rounded corners where the rounded one fails the last check."""
+        """Plans, then times the path, with smaller corners or a stop at each where that fails the last check."""
         path = plan_next(problem)
         return path if path.trajectory is not None else time_path(problem, path)
 
@@ -66,12 +66,13 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
         )
 
     largest = largest_blends(vertices, float(tolerance))
-    if problem.constraints is None:  # the last check finds most often that all corners are free at their full size
+    is_tried = problem.constraints is None and path.path_prefix == 0  # else the last check does not see all corners
+    if is_tried:  # most often all corners are free at their full size
         rounded = timed(largest)
         if not largest.any() or problem.solution_validator.is_valid(problem, rounded):
             return rounded
-    blends = free_blends(vertices, largest, lambda curve: _is_valid(problem, curve))
-    if blends.any():
+    blends = free_blends(vertices, largest, lambda curve: _corner_is_valid(problem, curve))
+    if blends.any() and not (is_tried and np.array_equal(blends, largest)):
         for slowness in (1.0,) if problem.constraints is None else SLOWNESS:
             rounded = timed(blends, slowness)
             if problem.solution_validator.is_valid(problem, rounded):
@@ -79,7 +80,7 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     return timed(np.zeros_like(blends))
 
 
-def _is_valid(problem: PlanningProblem, curve: Array) -> bool:
+def _corner_is_valid(problem: PlanningProblem, curve: Array) -> bool:
     """Whether a rounded corner is free and keeps the path constraints."""
     if not problem.keeps_constraints(curve, problem.settings.motion_step):
         return False
