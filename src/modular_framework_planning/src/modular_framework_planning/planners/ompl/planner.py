@@ -28,6 +28,7 @@ from modular_framework_planning.planners.ompl.planner_settings import (
     parameter_faults,
 )
 from modular_framework_planning.planners.ompl.projection import projection_evaluator
+from modular_framework_planning.planners.rrt_connect.aorrtc import Aorrtc
 from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, SideBySide, can_search
 from modular_framework_planning.planning_interface.path_repair import repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
@@ -139,11 +140,14 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
     return _search(near, second[None], fine, CONNECTION_ITERATIONS).run()
 
 
-def _search(problem: PlanningProblem, goals: Array, step: float, limit: int | None = None) -> _Search | SideBySide:
-    """Returns the search of the problem's planner; RRTConnect is compiled where the checker allows it."""
-    parameters = problem.planner_parameters
+def _search(
+    problem: PlanningProblem, goals: Array, step: float, limit: int | None = None
+) -> _Search | SideBySide | Aorrtc:
+    """Returns the search of the problem's planner; RRTConnect and AORRTC are compiled where the checker allows it."""
+    parameters, limit = problem.planner_parameters, _most_iterations(problem, limit)
+    if problem.planner_id == "AORRTC" and can_search(problem):
+        return Aorrtc(problem, goals, connection_range(parameters) or DEFAULT_RANGE, limit)
     if problem.planner_id == "RRTConnect" and can_search(problem) and not keeps_intermediate_states(parameters):
-        limit = problem.request.most_iterations if limit is None else limit
         wanted = connection_range(parameters)
         generators = [problem.rng, *problem.rng.spawn(search_threads(problem) - 1)]
         return SideBySide(
@@ -156,6 +160,13 @@ def _search(problem: PlanningProblem, goals: Array, step: float, limit: int | No
             ],
         )
     return _Search(problem, goals, step, limit)
+
+
+def _most_iterations(problem: PlanningProblem, limit: int | None) -> int | None:
+    """Returns after how many iterations a search ends; None where the clock ends it."""
+    if limit is None and problem.repeatable and problem.planner_id in ANYTIME:
+        return problem.settings.seeded_iterations
+    return problem.request.most_iterations if limit is None else limit
 
 
 def search_threads(problem: PlanningProblem) -> int:
@@ -285,10 +296,6 @@ class _Search:
         if problem.planner_id in THREADED:
             return ob.timedPlannerTerminationCondition(max(1e-3, problem.deadline_s - time.monotonic()))
         limit = self._limit
-        if limit is None and problem.repeatable and problem.planner_id in ANYTIME:
-            limit = problem.settings.seeded_iterations
-        if limit is None:
-            limit = problem.request.most_iterations
         if limit is None:
             return ob.PlannerTerminationCondition(problem.interrupted)
 

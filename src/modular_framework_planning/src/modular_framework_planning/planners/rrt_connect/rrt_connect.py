@@ -59,7 +59,7 @@ def warm_up(checker: CompiledChecks, positions: Array) -> None:
         checker: of a scene.
         positions: of the whole robot.
     """
-    space = Space(np.ones(1), 1.0, 1.0, GroupEdges(positions, np.zeros((len(positions), 1)), 0.1))
+    space = Space(np.ones(1), 1.0, 1.0, np.inf, GroupEdges(positions, np.zeros((len(positions), 1)), 0.1))
     assert checker.compiled_world is not None
     grow(_trees(np.zeros(1), np.ones((1, 1)), 1), space, np.zeros((1, 1)), UNKNOWN, *arguments(checker.compiled_world))
 
@@ -71,6 +71,7 @@ def _trees(start: Array, goals: Array, most_extensions: int) -> Trees:
         states,
         np.full(states.shape[:2], -1),
         np.zeros(states.shape[:2], dtype=bool),
+        np.zeros(states.shape[:2]),
         np.array([1, len(goals)]),
         np.array([0, 0, EXTENDS, NEW]),
         start.copy(),
@@ -97,6 +98,7 @@ class RrtConnect:
         limit: int | None = None,
         is_weighted: bool = True,
         number: int = 0,
+        bound: float = np.inf,
     ) -> None:
         """Stores what to search.
 
@@ -110,8 +112,9 @@ class RrtConnect:
                 1; else all count as 1. A wrist then turns further in one step than a shoulder.
             number: of the search among those that run at the same time; all but number 0 have a distance field and
                 counts of their own, which they fill.
+            bound: the path has to be shorter, in weighted length [rad or m].
         """
-        self._problem = problem
+        self._problem, self._goals = problem, goals
         start = problem.start_values
         world = problem.compiled_world
         assert world is not None
@@ -126,7 +129,7 @@ class RrtConnect:
         self._low, self._high = problem.search_bounds(around)
         turn = np.where(world.tree.prismatic[problem.group.indices], np.inf, np.pi)
         self._near = np.maximum(self._low, around.min(axis=0) - turn), np.minimum(self._high, around.max(axis=0) + turn)
-        self._space = self._space_of(world, step, longest, is_weighted)
+        self._space = self._space_of(world, step, longest, is_weighted, bound)
         self._trees = _trees(start, goals, np.iinfo(np.int64).max if limit is None else limit)
         self._samples, self._batches = np.empty((0, len(self._low))), 0
         self._verdict, self._status = UNKNOWN, PAUSED
@@ -135,6 +138,11 @@ class RrtConnect:
     def states(self) -> int:
         """How many edges were checked."""
         return int(self._trees.counts[0])
+
+    @property
+    def extensions(self) -> int:
+        """How many extensions to random states were tried."""
+        return int(self._trees.counts[1])
 
     @property
     def tree_sizes(self) -> tuple[int, int]:
@@ -168,9 +176,7 @@ class RrtConnect:
             self._add_room()
         elif self._status == NEEDS_SAMPLES:
             self._batches += 1
-            low, high = (self._low, self._high) if self._batches % WIDE_EVERY == 0 else self._near
-            # what rng.uniform(low, high) gives, in a third of its time
-            self._samples = low + (high - low) * self._problem.rng.random((SAMPLES, len(low)))
+            self._samples = self._random_states() if self._space.bound == np.inf else self._states_within_bound()
             self._trees.position[0] = 0
         return self._status != AT_LIMIT
 
@@ -183,7 +189,7 @@ class RrtConnect:
         """Returns vertices of shape (n, joints) from the start to one of the goals, or None."""
         return SideBySide(self._problem, [self]).run()
 
-    def _space_of(self, world: World, step: float, longest: float, is_weighted: bool) -> Space:
+    def _space_of(self, world: World, step: float, longest: float, is_weighted: bool, bound: float) -> Space:
         problem = self._problem
         count = len(self._low)
         edges, weights = problem.motion.edges(step), np.ones(count)
@@ -193,7 +199,37 @@ class RrtConnect:
         squares = (weights * (self._near[1] - self._near[0])) ** 2
         near = squares.sum() / 6.0 - DEVIATIONS * np.sqrt(7.0 / 180.0 * (squares**2).sum())  # of two random states
         domain = max(LEAST_DOMAIN * longest, float(np.sqrt(max(near, 0.0))))
-        return Space(weights, longest, domain, edges)
+        if bound < np.inf:  # the shortest paths lie near obstacles
+            domain = np.inf
+        return Space(weights, longest, domain, bound, edges)
+
+    def _random_states(self) -> Array:
+        low, high = (self._low, self._high) if self._batches % WIDE_EVERY == 0 else self._near
+        # what rng.uniform(low, high) gives, in a third of its time
+        return low + (high - low) * self._problem.rng.random((SAMPLES, len(low)))
+
+    def _states_within_bound(self) -> Array:
+        """Random states over which a path may be shorter than the bound, and a number in 0 to 1 behind each.
+
+        They are uniform in the ellipsoid whose focal points are the start and one of the goals, as in Gammell et al.:
+        Informed RRT*, IROS 2014.
+        """
+        rng, start, weights = self._problem.rng, self._problem.start_values, self._space.weights
+        ways = weights * (self._goals - start)
+        ways = ways[np.linalg.norm(ways, axis=1) < self._space.bound]
+        way = ways[rng.integers(len(ways))]
+        distance, count = float(np.linalg.norm(way)), len(way)
+        radii = np.full(count, 0.5 * np.sqrt(self._space.bound**2 - distance**2))
+        radii[0] = 0.5 * self._space.bound
+        directions = rng.normal(size=(SAMPLES, count))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        ball = directions * rng.random((SAMPLES, 1)) ** (1.0 / count) * radii
+        mirror = way / distance - np.eye(count)[0]  # Householder's: it takes the first axis to the way
+        square = float(mirror @ mirror)
+        if square > 0.0:
+            ball -= np.outer(ball @ mirror, mirror) * (2.0 / square)
+        states = np.clip(start + (0.5 * way + ball) / weights, self._low, self._high)
+        return np.column_stack([states, rng.random(SAMPLES)])
 
     def _undecided_edge_is_free(self) -> bool:
         trees = self._trees
@@ -207,6 +243,7 @@ class RrtConnect:
             states=np.concatenate([trees.states, np.empty_like(trees.states)], axis=1),
             parents=np.concatenate([trees.parents, np.full_like(trees.parents, -1)], axis=1),
             blocked=np.concatenate([trees.blocked, np.zeros_like(trees.blocked)], axis=1),
+            lengths=np.concatenate([trees.lengths, np.zeros_like(trees.lengths)], axis=1),
         )
 
     def _vertices(self) -> Array:
