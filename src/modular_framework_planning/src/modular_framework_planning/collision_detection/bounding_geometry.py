@@ -35,7 +35,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_triangles i
     build_sphere_tree,
     cut_long_edges,
 )
-from modular_framework_planning.geometry.shapes import Mesh, Shape
+from modular_framework_planning.geometry.shapes import Box, Capsule, Cone, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.octomap.octree import Octree
 
@@ -120,57 +120,54 @@ def bounding_geometry_of(part: PlacedGeometry) -> BoundingGeometry:
 
 
 def _make(source: Shape) -> BoundingGeometry:
-    if isinstance(source, Octree):
-        points = np.tile(source.centers, 3)
-        around = source.resolution * np.sqrt(0.75)  # radius of the ball around a voxel
-        return BoundingGeometry(lambda: points, around, around - 0.5 * source.resolution)
-    if isinstance(source, Mesh):
-        vertices, faces = np.asarray(source.vertices, dtype=float), np.asarray(source.triangles, dtype=np.int64)
-        return BoundingGeometry(lambda: vertices[faces].reshape(-1, 9), is_closed=_is_closed(vertices, faces))
-    geometry = source.geometry
-    match geometry:
-        case coal.Box():
-            x, y, z = (float(value) for value in geometry.halfSide)
+    match source:
+        case Octree():
+            points = np.tile(source.centers, 3)
+            around = source.resolution * np.sqrt(0.75)  # radius of the ball around a voxel
+            return BoundingGeometry(lambda: points, around, around - 0.5 * source.resolution)
+        case Mesh():
+            vertices = np.asarray(source.vertices, dtype=float)
+            faces = np.asarray(source.triangles, dtype=np.int64)
+            return BoundingGeometry(lambda: vertices[faces].reshape(-1, 9), is_closed=_is_closed(vertices, faces))
+        case Box():
+            x, y, z = 0.5 * source.x, 0.5 * source.y, 0.5 * source.z
             return BoundingGeometry(lambda: _box_triangles(x, y, z), kind=BOX, size=(x, y, z))
-        case coal.Sphere():
-            return BoundingGeometry(
-                lambda: np.zeros((1, 9)), float(geometry.radius), kind=SPHERE, size=(float(geometry.radius), 0.0, 0.0)
-            )
-        case coal.Capsule():
-            radius, half = float(geometry.radius), float(geometry.halfLength)
+        case Sphere(radius):
+            return BoundingGeometry(lambda: np.zeros((1, 9)), radius, kind=SPHERE, size=(radius, 0.0, 0.0))
+        case Capsule(height, radius):
+            half = 0.5 * height
             return BoundingGeometry(
                 lambda: np.array([[0, 0, -half, 0, 0, half, 0, 0, half]], dtype=float),
                 radius,
                 kind=CAPSULE,
                 size=(radius, half, 0.0),
             )
-        case coal.Cylinder():
-            radius, half = float(geometry.radius), float(geometry.halfLength)
+        case Cylinder(height, radius):
+            half = 0.5 * height
             return BoundingGeometry(
                 lambda: _prism_triangles(radius, radius, half),
                 surface_excess=_prism_excess(radius),
                 kind=CYLINDER,
                 size=(radius, half, 0.0),
             )
-        case coal.Cone():
-            radius, half = float(geometry.radius), float(geometry.halfLength)
+        case Cone(height, radius):
+            half = 0.5 * height
             return BoundingGeometry(
                 lambda: _prism_triangles(radius, 0.0, half),
                 surface_excess=_prism_excess(radius),
                 kind=CONE,
                 size=(radius, half, 0.0),
             )
-        case coal.Plane() | coal.Halfspace():
-            normal = np.array(geometry.n, dtype=float)
-            kind = PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE
-            return BoundingGeometry(
-                None,
-                kind=kind,
-                size=(float(normal[0]), float(normal[1]), float(normal[2])),
-                offset=pin.SE3(np.eye(3), normal * float(geometry.d)),
-            )
-        case _:
-            return _bounding_box(geometry)
+    geometry = source.geometry
+    if not isinstance(geometry, coal.Plane | coal.Halfspace):
+        return _bounding_box(geometry)
+    normal = np.array(geometry.n, dtype=float)
+    return BoundingGeometry(
+        None,
+        kind=PLANE if isinstance(geometry, coal.Plane) else HALF_SPACE,
+        size=(float(normal[0]), float(normal[1]), float(normal[2])),
+        offset=pin.SE3(np.eye(3), normal * float(geometry.d)),
+    )
 
 
 def _bounding_box(geometry: Any) -> BoundingGeometry:

@@ -27,14 +27,13 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance_field import KEPT, DistanceField
 from modular_framework_planning.collision_detection.kernels.compiled_reaches import joint_lengths
-from modular_framework_planning.collision_detection.kernels.compiled_spheres import boxes_around, fill_heaps
+from modular_framework_planning.collision_detection.kernels.compiled_spheres import boxes_around, extents_of, fill_heaps
 from modular_framework_planning.collision_detection.pair_arrays import Represented, pair_arrays
 from modular_framework_planning.collision_detection.reaches import farthest_end
 from modular_framework_planning.collision_detection.sphere_covers import (
     Layers,
     balls_inside,
     empty_covers,
-    extents_of,
     heap_of,
 )
 from modular_framework_planning.geometry.spatial import Array

@@ -63,9 +63,3 @@ def empty_covers(layers: Layers, bodies: int) -> Covers:
     """Returns covers in which no body has a sphere."""
     spheres, balls = np.full((bodies, layers.nodes, 4), NO_NODE), np.zeros((bodies, layers.balls, 4))
     return Covers(spheres, balls, np.zeros(bodies), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 7)))
-
-
-def extents_of(spheres: Array) -> Array:
-    """Returns how far the centres of spheres (b, nodes, 4) are from the origin at most, shape (b,)."""
-    distances = np.where(spheres[:, :, 3] >= 0.0, np.linalg.norm(spheres[:, :, :3], axis=2), 0.0)
-    return np.asarray(distances.max(axis=1, initial=0.0))

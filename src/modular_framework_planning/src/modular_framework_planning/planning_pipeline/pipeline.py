@@ -132,7 +132,7 @@ class PlanningPipeline:
         """Searches, and repairs what the check of the motion finds, until the motion passes or the time is over."""
         begun = time.monotonic()
         with phases.measured(SETUP):
-            problem = replace(self._problem(request, begun), repeatable=repeatable, phases=phases)
+            problem = self._problem(request, begun, repeatable, phases)
             phases.watch(problem.checker)
         adapters, fault, steps = self._adapters_for(request), "", list(self._steps())
         search = PathSearch(self._planner)
@@ -230,7 +230,7 @@ class PlanningPipeline:
         ]
         return self._new_checker(scene, group.indices, shallow) if shallow else checker
 
-    def _problem(self, request: PlanningRequest, begun: float) -> PlanningProblem:
+    def _problem(self, request: PlanningRequest, begun: float, repeatable: bool, phases: PhaseTimes) -> PlanningProblem:
         """Reads the request; everything that can be refused without planning is refused here."""
         if not request.allowed_time_s > 0.0:
             raise PlanningError(
@@ -265,6 +265,8 @@ class PlanningPipeline:
             planner_id,
             parameters,
             request.path_constraints,
+            repeatable=repeatable,
+            phases=phases,
         )
 
     def _reserved(self, allowed_time_s: float, planner_id: str) -> float:

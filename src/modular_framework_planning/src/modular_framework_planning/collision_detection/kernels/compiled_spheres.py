@@ -83,6 +83,18 @@ def fill_heaps(surface, roots, poses, spheres, inflation, chosen, out):  # type:
 
 
 @njit(cache=True, nogil=True)
+def extents_of(spheres):  # type: ignore[no-untyped-def]
+    """Returns how far the centres of spheres (b, nodes, 4) are from the origin at most, shape (b,)."""
+    extents = np.zeros(len(spheres))
+    for body in range(len(spheres)):
+        for place in range(spheres.shape[1]):
+            x, y, z, radius = spheres[body, place]
+            if radius >= 0.0:
+                extents[body] = max(extents[body], np.sqrt(x * x + y * y + z * z))
+    return extents
+
+
+@njit(cache=True, nogil=True)
 def boxes_around(kinds, sizes, poses):  # type: ignore[no-untyped-def]
     """Returns boxes around solids, see Covers.boxes; their other arguments are those of a DistanceField."""
     boxes = np.empty((len(kinds), 7))
