@@ -93,15 +93,15 @@ def counts_of_verdicts(scene: PlanningScene, moving: np.ndarray | None, rng: np.
     Plain Coal sees no inside of a mesh: where there is one, what it calls free and we do not is not counted.
     """
     ours, plain, counts = ExactCollisionChecker(scene, moving), PlainCoalChecker(scene, moving), np.zeros(3, dtype=int)
-    anew = ExactCollisionChecker(replace(scene, model=wide_robot()), moving)  # nothing is kept for this model
+    fresh = ExactCollisionChecker(replace(scene, model=wide_robot()), moving)  # nothing is kept for this model
     has_mesh = any(isinstance(shape, Mesh) for body in scene.objects.values() for shape, _ in body.shapes)
     for _ in range(STATES):
         state = random_state(scene.model, rng)
         free, is_near = ours.is_free(state), abs(plain.distance(state)) < NEAR
-        assert free == anew.is_free(state)
+        assert free == fresh.is_free(state)
         counts[0 if free else 1] += 1
         counts[2] += free != plain.is_free(state) and not is_near and (free or not has_mesh)
-    assert ours.most_refusals() == anew.most_refusals()
+    assert ours.most_refusals() == fresh.most_refusals()
     return counts
 
 

@@ -20,8 +20,8 @@ from modular_framework_planning.collision_detection.collision_bodies import KEPT
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.contacts import LINK, WORLD, Body
-from modular_framework_planning.geometry.spatial import Array, Transform
-from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, RobotModel
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, LinkGeometry, RobotModel
 
 KEPT_GROUPINGS, KEPT_SCENES = 16, 2
 SMALL_EXCESS = 2.0e-3  # [m]; a surface that lies no further outside of its body stands for it
@@ -89,9 +89,7 @@ def scene_bodies(
     for number in others.tolist():
         shapes.append(bounding_geometry_of(parts[number]))
         check_interrupt()
-    of_others = _body_arrays(shapes, [parts[number].joint_id - 1 for number in others.tolist()], is_environment=True)
-    for row, number in enumerate(others.tolist()):
-        of_others.poses[row] = _pose(parts[number].placement, shapes[row])
+    of_others = _single_bodies(shapes, [parts[number] for number in others.tolist()])
     found, has_surface = list(links.with_surface), _need_surface(links, of_others, shapes, parts, others, pairs)
     for row in np.flatnonzero(has_surface).tolist():
         if shapes[row].surface is not None:  # which is built now, if it was not
@@ -131,9 +129,7 @@ def _links(model: RobotModel, pairs: WatchedPairs) -> _Links:
     of_link, is_inexact = of_link.copy(), np.zeros(len(geometries), dtype=bool)
     of_link[numbers] = len(groups) + np.arange(len(numbers))
     singles = [shapes[number] for number in numbers]
-    arrays = _body_arrays(singles, [geometries[number].joint_id - 1 for number in numbers], is_environment=True)
-    for row, number in enumerate(numbers):
-        arrays.poses[row] = _pose(geometries[number].placement, singles[row])
+    arrays = _single_bodies(singles, [geometries[number] for number in numbers])
     has_surface = np.array([shape.corners is not None for shape in singles], dtype=bool)
     with_surface = tuple(shape for shape in singles if shape.corners is not None)
     _set_surfaces(arrays, has_surface, *stacked([shape.surface for shape in with_surface if shape.surface is not None]))
@@ -245,15 +241,19 @@ def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_e
     )
 
 
+def _single_bodies(shapes: Sequence[BoundingGeometry], items: Sequence[PlacedGeometry | LinkGeometry]) -> BodyArrays:
+    """Returns a body for each geometry, at its place, without surfaces."""
+    arrays = _body_arrays(shapes, [item.joint_id - 1 for item in items], is_environment=True)
+    for row, (shape, item) in enumerate(zip(shapes, items, strict=True)):
+        arrays.poses[row] = (item.placement * shape.offset).homogeneous[:3]
+    return arrays
+
+
 def _set_surfaces(arrays: BodyArrays, has_surface: NDArray[np.bool_], surfaces: Surfaces, roots: Sequence[int]) -> None:
     """Gives bodies their surfaces: roots in the order of these bodies, and the spheres around them."""
     arrays.roots[has_surface] = roots
     arrays.spheres[has_surface] = surfaces.spheres[list(roots)]
     arrays.spheres[has_surface, 3] += arrays.inflation[has_surface]
-
-
-def _pose(placement: Transform, shape: BoundingGeometry) -> Array:
-    return np.asarray((placement * shape.offset).homogeneous[:3])
 
 
 @lru_cache(maxsize=KEPT_SCENES)

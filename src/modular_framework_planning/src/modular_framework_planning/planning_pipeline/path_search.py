@@ -14,8 +14,8 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.phase_times import REPAIR, SEARCH, SHORTENING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
+from modular_framework_planning.planning_interface.problem_shortening import shortened
 from modular_framework_planning.trajectory_processing.constrained_shortening import cut_along
-from modular_framework_planning.trajectory_processing.path_shortening import CompiledTest, EdgeTest, shorten
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
@@ -100,23 +100,11 @@ def _shortened(
 
 
 def _short(problem: PlanningProblem, path: Array, deadline: float) -> Array:
-    return shorten(path, _edge_test(problem), deadline, problem.rng, _compiled_test(problem))
+    return shortened(problem, path, deadline, problem.rng)
 
 
 def _without_vertices(problem: PlanningProblem, path: Array, deadline: float) -> Array:
-    return shorten(path, _edge_test(problem), deadline, None, _compiled_test(problem))
-
-
-def _edge_test(problem: PlanningProblem) -> EdgeTest:
-    fine = problem.settings.finest_step
-    return lambda first, second: problem.edge_is_valid(first, second, fine)
-
-
-def _compiled_test(problem: PlanningProblem) -> CompiledTest | None:
-    world = problem.compiled_world
-    if world is None:
-        return None
-    return CompiledTest(problem.motion.edges(problem.settings.finest_step), problem.motion.memory, world)
+    return shortened(problem, path, deadline, None)
 
 
 def _cut_along_constraints(problem: PlanningProblem, path: Array, deadline: float) -> Array:

@@ -12,14 +12,14 @@ Wilson, Thomason, Kingston, Kavraki, Gammell: AORRTC: Almost-surely asymptotical
 from __future__ import annotations
 
 import math
-import time
 
 import numpy as np
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, SideBySide
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
-from modular_framework_planning.trajectory_processing.path_shortening import CompiledTest, path_length, shorten
+from modular_framework_planning.planning_interface.problem_shortening import shortened
+from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
 BETTER = 0.995  # each path is at least that much shorter than the one before
 
@@ -54,20 +54,8 @@ class Aorrtc:
                 self._left -= search.extensions
             if path is None:
                 break
-            best = self._shortened(path)
+            best = shortened(problem, path, math.inf if problem.repeatable else problem.deadline_s, problem.rng)
             bound = BETTER * path_length(best)
         if problem.repeatable and problem.interrupted():
             return None  # a search that the clock ends is not repeatable
         return best
-
-    def _shortened(self, path: Array) -> Array:
-        problem, fine = self._problem, self._problem.settings.finest_step
-        world = problem.compiled_world
-        assert world is not None
-        return shorten(
-            path,
-            lambda first, second: problem.edge_is_valid(first, second, fine),
-            math.inf if problem.repeatable else max(problem.deadline_s, time.monotonic()),
-            problem.rng,
-            CompiledTest(problem.motion.edges(fine), problem.motion.memory, world),
-        )

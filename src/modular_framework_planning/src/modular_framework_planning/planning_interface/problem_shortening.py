@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shortens a path of a problem; what is accepted was checked as finely as the solution validator does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
+from modular_framework_planning.trajectory_processing.path_shortening import CompiledTest, shorten
+
+
+def shortened(problem: PlanningProblem, path: Array, deadline: float, rng: np.random.Generator | None) -> Array:
+    """Returns a path with the same ends, not longer than the given one.
+
+    Args:
+        problem: whose collisions and path constraints count.
+        path: vertices, shape (n, joints).
+        deadline: monotonic time [s] at which to stop.
+        rng: source of the random choices; None: vertices are left out, and nothing else is done.
+    """
+    fine, world = problem.settings.finest_step, problem.compiled_world
+    compiled = None if world is None else CompiledTest(problem.motion.edges(fine), problem.motion.memory, world)
+    return shorten(path, lambda first, second: problem.edge_is_valid(first, second, fine), deadline, rng, compiled)
