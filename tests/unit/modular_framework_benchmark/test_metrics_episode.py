@@ -22,6 +22,7 @@ from modular_framework_benchmark.metrics.measurements import (
 )
 from modular_framework_benchmark.metrics.registry import METRICS, MetricError, find_metric, load_metric, measure
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
+from modular_framework_ros.reported_figures import CANDIDATES, CHECKED, PLANNING_TIME, REACHABLE, declared
 
 JOINTS = ("pan", "lift")
 TIMES = np.linspace(0.0, 4.0, 401)
@@ -31,7 +32,8 @@ def planned(succeeded: bool, planning_time_s: float, length: float = 1.0, **figu
     motion = Motion(JOINTS, np.array([0.0, 1.0, 2.0]), np.array([[0, 0], [length, 0], [length, length]], dtype=float))
     return ComponentReport(
         *("planning", "to_grasp", succeeded, "" if succeeded else "no path", 0.0, 0.0, planning_time_s),
-        figures={"planning_time_s": planning_time_s} | figures,
+        figures={PLANNING_TIME: planning_time_s}
+        | {declared("planning", name): value for name, value in figures.items()},
         motion=motion if succeeded else None,
     )
 
@@ -61,7 +63,7 @@ def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasureme
         reports=(
             ComponentReport(
                 *("generation", "top_down", True, "", 0.0, 0.5, 0.25),
-                figures={"candidates": 40.0, "checked": 20.0, "reachable": 5.0},
+                figures={CANDIDATES: 40.0, CHECKED: 20.0, REACHABLE: 5.0},
             ),
             planned(True, 0.1, 1.0, clearance_m=0.03),
             planned(False, 5.0),

@@ -13,6 +13,7 @@ import rospy
 from std_msgs.msg import String
 
 from modular_framework_ros.publishing import publish
+from modular_framework_ros.reported_figures import Figure
 
 TOPIC = "component_reports"
 
@@ -26,7 +27,7 @@ class Work:
         reason: Why it failed; "" while it has not.
     """
 
-    figures: dict[str, float] = field(default_factory=dict)
+    figures: dict[Figure, float] = field(default_factory=dict)
     reason: str = ""
 
 
@@ -34,7 +35,7 @@ class ComponentReporter:
     """Publishes ``component_reports`` (std_msgs/String, JSON), one message for each piece of work when it ends.
 
     Keys: ``component``, ``name``, ``succeeded``, ``reason``, ``started`` and ``ended`` (ROS time [s]), ``wall_s`` (real
-    time [s]), ``figures`` (name to number).
+    time [s]), ``figures`` (name to number, see `reported_figures`).
     """
 
     def __init__(self, component: str) -> None:
@@ -68,6 +69,6 @@ class ComponentReporter:
                 "started": started,
                 "ended": rospy.get_time(),
                 "wall_s": time.monotonic() - wall,
-                "figures": work.figures,
+                "figures": {figure.name: value for figure, value in work.figures.items()},
             }
             publish(self._publisher, String(json.dumps(entry)))

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 from collections.abc import Mapping
 from typing import Any
 
 from modular_framework_benchmark.records.experiment import Metric
 from modular_framework_benchmark.scheduling.episode_runner import RunnerFactory
+from modular_framework_ros.reported_figures import Source
 
 _PACKAGE = "modular_framework_benchmark"
 RUNNERS = {
@@ -32,12 +34,12 @@ class RunnerError(Exception):
 
 
 def known_metrics() -> dict[str, Mapping[str, Metric]]:
-    """Returns the metrics of each mode, by name."""
+    """Returns the metrics of each mode, by name; a mode without simulation measures all of them itself."""
     from modular_framework_benchmark.metrics.registry import METRICS  # `resume` does without
 
     return {
         mode: {
-            name: known.metric
+            name: known.metric if mode == "task" else dataclasses.replace(known.metric, source=Source.MEASURED)
             for name, known in METRICS.items()
             if name == "success" or known.metric.component in components
         }

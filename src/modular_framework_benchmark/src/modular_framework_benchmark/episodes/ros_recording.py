@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.metrics.recording_files import PARAMETERS, RECORDING, TRACKING, TRAJECTORY
+from modular_framework_ros.reported_figures import ATTEMPTS, CLEARANCE, PLANNING_TIME
 
 OF_A_RUN = ("run_id", "roslaunch", "seed")
 """Parameters that differ between episodes of the same configuration."""
@@ -236,8 +237,8 @@ def _planning(samples: Samples, zero: float) -> list[dict[str, Any]]:
         motion = next((path for path in shown if work["succeeded"] and _belongs(path, report)), None)
         if motion is not None:
             shown.remove(motion)
-        figures = {"planning_time_s": wall_s} | {
-            key: report[key] for key in ("clearance_m", "attempts") if isinstance(report.get(key), int | float)
+        figures = {PLANNING_TIME.name: wall_s} | {
+            key: report[key] for key in (CLEARANCE.name, ATTEMPTS.name) if isinstance(report.get(key), int | float)
         }
         times_s = (report.get("started", report["time"]) - zero, report["time"] - zero)
         trajectory = motion.trajectory[-1].joint_trajectory if motion is not None else None

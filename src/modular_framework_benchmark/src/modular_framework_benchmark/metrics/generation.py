@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
+from modular_framework_ros.reported_figures import BEST_RANK, CANDIDATES, CHECKED, REACHABLE
 
 
 def _first(episode: EpisodeMeasurements) -> ComponentReport | None:
@@ -27,18 +28,18 @@ def generation_success(episode: EpisodeMeasurements) -> float | None:
 def candidates(episode: EpisodeMeasurements) -> float | None:
     """How many grasps the first generation found before their reachability was checked."""
     first = _first(episode)
-    return None if first is None else first.figures.get("candidates")
+    return None if first is None else first.figures.get(CANDIDATES)
 
 
 def best_rank(episode: EpisodeMeasurements) -> float | None:
     """Place of the first grasp that the arm can reach in the method's own order, 1 for the first; None without one."""
     first = _first(episode)
-    return None if first is None else first.figures.get("best_rank")
+    return None if first is None else first.figures.get(BEST_RANK)
 
 
 def reachable_share(episode: EpisodeMeasurements) -> float | None:
     """Share of the grasps checked in the first generation that the arm can reach without collision, 0 to 1."""
     first = _first(episode)
-    if first is None or not first.figures.get("checked"):
+    if first is None or not first.figures.get(CHECKED):
         return None
-    return first.figures.get("reachable", 0.0) / first.figures["checked"]
+    return first.figures.get(REACHABLE, 0.0) / first.figures[CHECKED]

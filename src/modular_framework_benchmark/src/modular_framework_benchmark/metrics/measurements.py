@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
+from modular_framework_ros.reported_figures import Figure
 
 Array = npt.NDArray[np.float64]
 
@@ -31,7 +32,7 @@ class ComponentReport:
         started_s: Start, simulated time [s].
         ended_s: End, simulated time [s].
         wall_s: Real time it took [s].
-        figures: Its own figures, such as `candidates`.
+        figures: Its own figures, by their declarations, such as `CANDIDATES`.
         motion: The motion it made or executed; None without one.
     """
 
@@ -42,7 +43,7 @@ class ComponentReport:
     started_s: float
     ended_s: float
     wall_s: float
-    figures: Mapping[str, float] = field(default_factory=dict)
+    figures: Mapping[Figure, float] = field(default_factory=dict)
     motion: Motion | None = None
 
 
@@ -171,6 +172,10 @@ class EpisodeMeasurements:
     held: bool = False
     shake: Shake | None = None
     folder: Path | None = None
+
+    def values_of(self, figure: Figure) -> list[float]:
+        """Returns the values of a figure in the reports that have it, in the order the reports ended."""
+        return [report.figures[figure] for report in self.of_component(figure.component) if figure in report.figures]
 
     def of_component(self, component: str) -> tuple[ComponentReport, ...]:
         """Returns the reports of a component, in the order they ended."""

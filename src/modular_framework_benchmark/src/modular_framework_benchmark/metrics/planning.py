@@ -7,6 +7,7 @@ import math
 
 from modular_framework_benchmark.metrics import motion_figures
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, Motion
+from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, SEARCH_TIME
 
 
 def _motions(episode: EpisodeMeasurements) -> list[Motion]:
@@ -21,7 +22,7 @@ def planning_time(episode: EpisodeMeasurements) -> float | None:
     """Mean time a successful plan took, as the planner reports it [s]."""
     return _mean(
         [
-            report.figures.get("planning_time_s", report.wall_s)
+            report.figures.get(PLANNING_TIME, report.wall_s)
             for report in episode.of_component("planning")
             if report.succeeded
         ]
@@ -30,8 +31,7 @@ def planning_time(episode: EpisodeMeasurements) -> float | None:
 
 def search_time(episode: EpisodeMeasurements) -> float | None:
     """Mean time until a path was found, before it was shortened, timed and checked, where the planner says so [s]."""
-    reports = episode.of_component("planning")
-    return _mean([report.figures["search_time_s"] for report in reports if "search_time_s" in report.figures])
+    return _mean(episode.values_of(SEARCH_TIME))
 
 
 def planning_success(episode: EpisodeMeasurements) -> float | None:
@@ -58,10 +58,7 @@ def smoothness(episode: EpisodeMeasurements) -> float | None:
 
 def clearance(episode: EpisodeMeasurements) -> float | None:
     """Smallest distance between the robot and anything it may not touch along the planned motions [m]."""
-    values = [
-        report.figures["clearance_m"] for report in episode.of_component("planning") if "clearance_m" in report.figures
-    ]
-    return min(values) if values else None
+    return min(episode.values_of(CLEARANCE), default=None)
 
 
 def attempts(episode: EpisodeMeasurements) -> float | None:

@@ -29,6 +29,7 @@ from modular_framework_benchmark.metrics.measurements import (
     ObjectTrack,
     TrackingSamples,
 )
+from modular_framework_ros.reported_figures import declared
 
 TRAJECTORY, TRACKING, RECORDING = "trajectory.parquet", "tracking.parquet", "recording.json"
 PARAMETERS = "parameters.json"
@@ -56,7 +57,7 @@ def reports_of(recording: Mapping[str, Any]) -> tuple[ComponentReport, ...]:
                 key: entry[key]
                 for key in ("component", "name", "succeeded", "reason", "started_s", "ended_s", "wall_s")
             },
-            figures=entry["figures"],
+            figures={declared(entry["component"], name): value for name, value in entry["figures"].items()},
             motion=_motion(entry["motion"]),
         )
         for entry in entries

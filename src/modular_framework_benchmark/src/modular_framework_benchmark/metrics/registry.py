@@ -6,7 +6,7 @@ from __future__ import annotations
 import importlib.util
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +15,7 @@ from typing import Any
 from modular_framework_benchmark.metrics import execution, generation, grasp, kinematics, planning, task
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
+from modular_framework_ros.reported_figures import Clock, Source
 
 MetricFunction = Callable[[EpisodeMeasurements], float | None]
 """Returns the value for an episode; None where it has none."""
@@ -32,8 +33,10 @@ class RegisteredMetric:
     measure: MetricFunction
 
 
-_RATE, _VALUE, _COUNT, _TIME = MetricKind.RATE, MetricKind.VALUE, MetricKind.COUNT, MetricKind.TIME
+_RATE, _VALUE, _COUNT = MetricKind.RATE, MetricKind.VALUE, MetricKind.COUNT
 _HIGHER, _LOWER = Direction.HIGHER, Direction.LOWER
+_SIMULATED, _WALL = Clock.SIMULATED, Clock.WALL
+_SAID = Source.SAID
 _SHARE = (0.0, 1.0)
 _NOT_NEGATIVE = (0.0, None)
 _Bounds = tuple[float | None, float | None]
@@ -41,53 +44,64 @@ _Bounds = tuple[float | None, float | None]
 
 def _registered(
     measure: MetricFunction,
-    component: str,
     kind: MetricKind,
     better: Direction,
     unit: str = "",
     bounds: _Bounds = (None, None),
+    source: Source = Source.MEASURED,
 ) -> RegisteredMetric:
-    """Describes a metric by the name and the first line of the docstring of its function."""
+    """Describes a metric by the name, the module and the first line of the docstring of its function."""
     description = (inspect.getdoc(measure) or "").splitlines()[0]
-    name, (lowest, highest) = getattr(measure, "__name__", ""), bounds
-    metric = Metric(name, component, kind, better, unit, description=description, lowest=lowest, highest=highest)
+    name, component = getattr(measure, "__name__", ""), measure.__module__.rpartition(".")[2]
+    lowest, highest = bounds
+    metric = Metric(
+        name, component, kind, better, unit, description=description, lowest=lowest, highest=highest, source=source
+    )
     return RegisteredMetric(metric, measure)
 
 
+def _timed(
+    measure: MetricFunction, better: Direction, clock: Clock, source: Source = Source.MEASURED
+) -> RegisteredMetric:
+    """Describes a metric that is a duration by a clock."""
+    found = _registered(measure, MetricKind.TIME, better, "s", source=source)
+    return replace(found, metric=replace(found.metric, clock=clock))
+
+
 _ALL = (
-    _registered(task.success, "task", _RATE, _HIGHER),
-    _registered(task.task_time, "task", _TIME, _LOWER, "s"),
-    _registered(task.task_wall_time, "task", _TIME, _LOWER, "s"),
-    _registered(task.failed_states, "task", _COUNT, _LOWER),
-    _registered(generation.generation_time, "generation", _TIME, _LOWER, "s"),
-    _registered(generation.generation_success, "generation", _RATE, _HIGHER),
-    _registered(generation.candidates, "generation", _COUNT, _HIGHER),
-    _registered(generation.reachable_share, "generation", _VALUE, _HIGHER, bounds=_SHARE),
-    _registered(generation.best_rank, "generation", _VALUE, _LOWER, bounds=(1.0, None)),
-    _registered(planning.planning_time, "planning", _TIME, _LOWER, "s"),
-    _registered(planning.search_time, "planning", _TIME, _LOWER, "s"),
-    _registered(planning.planning_success, "planning", _VALUE, _HIGHER, bounds=_SHARE),
-    _registered(planning.path_length, "planning", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
-    _registered(planning.motion_duration, "planning", _TIME, _LOWER, "s"),
-    _registered(planning.smoothness, "planning", _VALUE, _HIGHER),
-    _registered(planning.clearance, "planning", _VALUE, _HIGHER, "m"),
-    _registered(planning.attempts, "planning", _COUNT, _LOWER),
-    _registered(kinematics.solved_share, "kinematics", _VALUE, _HIGHER, bounds=_SHARE),
-    _registered(kinematics.solving_time, "kinematics", _TIME, _LOWER, "s"),
-    _registered(kinematics.solutions, "kinematics", _COUNT, _HIGHER),
-    _registered(kinematics.position_error, "kinematics", _VALUE, _LOWER, "m", _NOT_NEGATIVE),
-    _registered(kinematics.rotation_error, "kinematics", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
-    _registered(execution.execution_time, "execution", _TIME, _LOWER, "s"),
-    _registered(execution.execution_success, "execution", _VALUE, _HIGHER, bounds=_SHARE),
-    _registered(execution.tracking_error, "execution", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
-    _registered(execution.greatest_tracking_error, "execution", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
-    _registered(execution.executed_length, "execution", _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
-    _registered(execution.executed_smoothness, "execution", _VALUE, _HIGHER),
-    _registered(execution.greatest_effort, "execution", _VALUE, _LOWER, "Nm", _NOT_NEGATIVE),
-    _registered(grasp.lift, "grasp", _VALUE, _HIGHER, "m"),
-    _registered(grasp.slip, "grasp", _VALUE, _LOWER, "m", _NOT_NEGATIVE),
-    _registered(grasp.grasp_time, "grasp", _TIME, _LOWER, "s"),
-    _registered(grasp.hold_time, "grasp", _TIME, _HIGHER, "s"),
+    _registered(task.success, _RATE, _HIGHER),
+    _timed(task.task_time, _LOWER, _SIMULATED),
+    _timed(task.task_wall_time, _LOWER, _WALL),
+    _registered(task.failed_states, _COUNT, _LOWER),
+    _timed(generation.generation_time, _LOWER, _WALL, _SAID),
+    _registered(generation.generation_success, _RATE, _HIGHER, source=_SAID),
+    _registered(generation.candidates, _COUNT, _HIGHER, source=_SAID),
+    _registered(generation.reachable_share, _VALUE, _HIGHER, bounds=_SHARE, source=_SAID),
+    _registered(generation.best_rank, _VALUE, _LOWER, bounds=(1.0, None), source=_SAID),
+    _timed(planning.planning_time, _LOWER, _WALL),
+    _timed(planning.search_time, _LOWER, _WALL),
+    _registered(planning.planning_success, _VALUE, _HIGHER, bounds=_SHARE),
+    _registered(planning.path_length, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _timed(planning.motion_duration, _LOWER, _SIMULATED),
+    _registered(planning.smoothness, _VALUE, _HIGHER),
+    _registered(planning.clearance, _VALUE, _HIGHER, "m"),
+    _registered(planning.attempts, _COUNT, _LOWER),
+    _registered(kinematics.solved_share, _VALUE, _HIGHER, bounds=_SHARE),
+    _timed(kinematics.solving_time, _LOWER, _WALL),
+    _registered(kinematics.solutions, _COUNT, _HIGHER),
+    _registered(kinematics.position_error, _VALUE, _LOWER, "m", _NOT_NEGATIVE),
+    _registered(kinematics.rotation_error, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _timed(execution.execution_time, _LOWER, _SIMULATED),
+    _registered(execution.execution_success, _VALUE, _HIGHER, bounds=_SHARE),
+    _registered(execution.tracking_error, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(execution.greatest_tracking_error, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(execution.executed_length, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(execution.executed_smoothness, _VALUE, _HIGHER),
+    _registered(execution.greatest_effort, _VALUE, _LOWER, "Nm", _NOT_NEGATIVE),
+    _registered(grasp.lift, _VALUE, _HIGHER, "m"),
+    _registered(grasp.slip, _VALUE, _LOWER, "m", _NOT_NEGATIVE),
+    _timed(grasp.grasp_time, _LOWER, _SIMULATED),
+    _timed(grasp.hold_time, _HIGHER, _SIMULATED),
 )
 
 METRICS: Mapping[str, RegisteredMetric] = {entry.metric.name: entry for entry in _ALL}

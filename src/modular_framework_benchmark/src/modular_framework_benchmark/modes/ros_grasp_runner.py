@@ -36,6 +36,7 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
     measure_gripper,
 )
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_ros.reported_figures import BEST_RANK, CANDIDATES, CHECKED, REACHABLE, Figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,10 +136,10 @@ def _reached(prepared: _Prepared, scene: GraspScene, candidates: list[GraspCandi
     return [reach.joint_travel(candidate) for candidate in candidates]
 
 
-def _figures(candidates: list[GraspCandidate], reached: list[float | None], found: list[int]) -> dict[str, float]:
+def _figures(candidates: list[GraspCandidate], reached: list[float | None], found: list[int]) -> dict[Figure, float]:
     """Returns the figures of `metrics.generation`."""
-    figures = {"candidates": float(len(candidates)), "checked": float(len(reached)), "reachable": float(len(found))}
-    return figures | ({"best_rank": float(found[0])} if found else {})
+    figures = {CANDIDATES: float(len(candidates)), CHECKED: float(len(reached)), REACHABLE: float(len(found))}
+    return figures | ({BEST_RANK: float(found[0])} if found else {})
 
 
 def _reason(method: GraspMethod, candidates: list[GraspCandidate], reached: list[float | None], outcome: str) -> str:

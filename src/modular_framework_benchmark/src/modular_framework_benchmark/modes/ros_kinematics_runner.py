@@ -26,6 +26,14 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings, settings_from
 from modular_framework_planning.robot_model.robot_model import JointGroup
+from modular_framework_ros.reported_figures import (
+    POSITION_ERROR,
+    ROTATION_ERROR,
+    SOLUTIONS,
+    SOLVED_SHARE,
+    SOLVING_TIME,
+    Figure,
+)
 
 POSITION_TOLERANCE_M = 1.0e-4
 ROTATION_TOLERANCE_RAD = 1.0e-3
@@ -126,15 +134,15 @@ def _judge(robot: Robot, tip: str, target: Transform, found: list[Array], time_s
     return _PoseResult(time_s, len(found), position_error, float(np.linalg.norm(error)))
 
 
-def _figures(results: list[_PoseResult]) -> dict[str, float]:
+def _figures(results: list[_PoseResult]) -> dict[Figure, float]:
     """Returns the figures of `metrics.kinematics`; those of solutions only where there are some."""
     solved = [result for result in results if result.is_solved]
     figures = {
-        "solved_share": len(solved) / len(results),
-        "solving_time_s": float(np.median([result.time_s for result in results])),
-        "solutions": float(np.mean([result.solutions for result in results])),
+        SOLVED_SHARE: len(solved) / len(results),
+        SOLVING_TIME: float(np.median([result.time_s for result in results])),
+        SOLUTIONS: float(np.mean([result.solutions for result in results])),
     }
     if solved:
-        figures["position_error_m"] = max(result.position_error_m for result in solved)
-        figures["rotation_error_rad"] = max(result.rotation_error_rad for result in solved)
+        figures[POSITION_ERROR] = max(result.position_error_m for result in solved)
+        figures[ROTATION_ERROR] = max(result.rotation_error_rad for result in solved)
     return figures

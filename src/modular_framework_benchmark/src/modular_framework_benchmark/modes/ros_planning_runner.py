@@ -31,6 +31,7 @@ from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineS
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
+from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, SEARCH_TIME, Figure
 
 MOTION_PERIOD_S = 0.01
 CLEARANCE_STATES = 25  # along a motion; the distances of one state cost about 0.1 s on detailed meshes
@@ -154,11 +155,11 @@ def _status(code: ErrorCode) -> EpisodeStatus:
             return EpisodeStatus.FAILED
 
 
-def _figures(problem: MotionProblem, answer: PlanningAnswer, settings: Mapping[str, Any]) -> dict[str, float]:
+def _figures(problem: MotionProblem, answer: PlanningAnswer, settings: Mapping[str, Any]) -> dict[Figure, float]:
     """Returns the figures of `metrics.planning`; the clearance only where it is asked for, because it takes seconds."""
-    figures = {"planning_time_s": answer.total_time_s, "search_time_s": answer.planning_time_s}
+    figures = {PLANNING_TIME: answer.total_time_s, SEARCH_TIME: answer.planning_time_s}
     if "clearance" in settings.get("metrics", ()):
-        figures["clearance_m"] = _clearance(problem, answer)
+        figures[CLEARANCE] = _clearance(problem, answer)
     return figures
 
 

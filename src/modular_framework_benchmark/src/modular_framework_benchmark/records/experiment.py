@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from modular_framework_ros.reported_figures import Clock, Source
+
 
 class Direction(Enum):
     """Which values of a metric are better."""
@@ -41,6 +43,8 @@ class Metric:
         description: What it says, in a sentence.
         lowest: Least value that it can have [unit]; None: 0 for counts and times, otherwise none is known.
         highest: Greatest value that it can have [unit]; None: none is known.
+        clock: Clock of a duration; None: it is no duration, or the clock is not known.
+        source: Who measures it.
     """
 
     name: str
@@ -52,6 +56,8 @@ class Metric:
     description: str = ""
     lowest: float | None = None
     highest: float | None = None
+    clock: Clock | None = None
+    source: Source = Source.MEASURED
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from modular_framework_benchmark.reports.number_text import (
 from modular_framework_benchmark.reports.report_content import SUCCESS, ReportContent
 from modular_framework_benchmark.reports.success_figures import level_words
 from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, MethodSummary, Verdict
+from modular_framework_ros.reported_figures import Source
 
 NO_BREAK = "\u00a0"
 
@@ -91,10 +92,13 @@ def _better_than_all(comparisons: Sequence[Comparison], methods: Sequence[str]) 
 
 
 def metric_title(metric: Metric) -> str:
-    """Returns the name of a metric, with its unit and an arrow to the better values."""
+    """Returns the name of a metric, with its unit, its clock, who says it, and an arrow to the better values."""
     arrow = "↑" if metric.better.value == "higher" else "↓"
     unit = "%" if metric.kind is MetricKind.RATE else metric.unit
-    return f"{words(metric.name)}{f' [{unit}]' if unit else ''}{NO_BREAK}{arrow}"
+    notes = [unit, *([metric.clock.value] if metric.clock else [])]
+    notes += [metric.source.value] if metric.source is Source.SAID else []
+    noted = ", ".join(filter(None, notes))
+    return f"{words(metric.name)}{f' [{noted}]' if noted else ''}{NO_BREAK}{arrow}"
 
 
 def _estimate(summary: MethodSummary | None) -> Estimate | None:

@@ -12,6 +12,7 @@ from typing import Any
 
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
 from modular_framework_benchmark.records.experiment import Direction, ExperimentDescription, Factor, Metric, MetricKind
+from modular_framework_ros.reported_figures import Clock, Source
 
 
 def to_json(value: Any) -> str:
@@ -47,7 +48,15 @@ def description_from_json(text: str) -> ExperimentDescription:
     content = json.loads(text)
     factors = tuple(Factor(each["name"], tuple(each["levels"])) for each in content.pop("factors"))
     metrics = tuple(
-        Metric(**{**each, "kind": MetricKind(each["kind"]), "better": Direction(each["better"])})
+        Metric(
+            **{
+                **each,
+                "kind": MetricKind(each["kind"]),
+                "better": Direction(each["better"]),
+                "clock": None if each["clock"] is None else Clock(each["clock"]),
+                "source": Source(each["source"]),
+            }
+        )
         for each in content.pop("metrics")
     )
     return ExperimentDescription(**content, factors=factors, metrics=metrics)

@@ -34,6 +34,7 @@ from modular_framework_core.grasping.grasp_messages import generate_pose_stamped
 from modular_framework_core.msg import StandardisedGrasp
 from modular_framework_ros.calls import CallError
 from modular_framework_ros.component_report import ComponentReporter
+from modular_framework_ros.reported_figures import CANDIDATES, CHECKED, REACHABLE, Figure
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_ros.start_up import start_timeout
 
@@ -231,7 +232,7 @@ class GraspGenerator:
         self._signal.publish(success)
 
     def _generate(
-        self, settings: GeneratorSettings, objects: list[SceneObject], figures: dict[str, float]
+        self, settings: GeneratorSettings, objects: list[SceneObject], figures: dict[Figure, float]
     ) -> list[StandardisedGrasp]:
         found_in: list[list[tuple[SceneObject, GraspCandidate]]] = []
         causes: list[str] = []
@@ -250,14 +251,17 @@ class GraspGenerator:
                 f"no part of {'; '.join(_sides(found) for found in objects)} can be grasped {self._method.manner}: "
                 + ("; ".join(causes) or self._usual_cause())
             )
-        figures["candidates"] = len(ranked)
+        figures[CANDIDATES] = len(ranked)
         return self._reachable(ranked, settings, figures)
 
     def _usual_cause(self) -> str:
         return f"the gripper opens to {self._gripper.max_opening:.3f} m and needs flat or round sides"
 
     def _reachable(
-        self, ranked: list[tuple[SceneObject, GraspCandidate]], settings: GeneratorSettings, figures: dict[str, float]
+        self,
+        ranked: list[tuple[SceneObject, GraspCandidate]],
+        settings: GeneratorSettings,
+        figures: dict[Figure, float],
     ) -> list[StandardisedGrasp]:
         chosen: list[StandardisedGrasp] = []
         reasons: Counter[str] = Counter()
@@ -273,7 +277,7 @@ class GraspGenerator:
             if len(chosen) >= settings.max_grasps:
                 break
         if settings.check_reachability:
-            figures |= {"checked": len(chosen) + reasons.total(), "reachable": len(chosen)}
+            figures |= {CHECKED: len(chosen) + reasons.total(), REACHABLE: len(chosen)}
         if not chosen:
             names = sorted({found.name for found, _ in tried})
             raise NoGraspError(

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Declares every figure that a component of the framework reports of its work, for reporters and for metrics alike.
+
+A component of a user's own may report further figures; `declared` gives them a declaration without unit and clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Clock(Enum):
+    """Which clock a duration is measured by."""
+
+    SIMULATED = "simulated time"
+    WALL = "real time"
+    PROCESSOR = "processor time"
+
+
+class Source(Enum):
+    """Who measured a figure."""
+
+    MEASURED = "measured"  # by the framework, from outside of the method
+    SAID = "said by the method"  # without a check
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure of one piece of work.
+
+    Attributes:
+        name: Key in reports and recordings, with its unit as suffix: `planning_time_s`.
+        component: The component that reports it.
+        unit: Unit of its values; "" for none.
+        description: What it says, in a sentence.
+        clock: Clock of a duration; None for other figures.
+        source: Who measures it in an episode of the whole stack.
+    """
+
+    name: str
+    component: str
+    unit: str = ""
+    description: str = ""
+    clock: Clock | None = None
+    source: Source = Source.SAID
+
+
+CANDIDATES = Figure("candidates", "generation", "", "Grasps found before their reachability was checked.")
+CHECKED = Figure("checked", "generation", "", "Grasps whose reachability was checked.")
+REACHABLE = Figure("reachable", "generation", "", "Grasps that the arm can reach without a collision.")
+BEST_RANK = Figure("best_rank", "generation", "", "Rank of the first reachable grasp in the method's order, from 1.")
+PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)
+SEARCH_TIME = Figure(
+    "search_time_s", "planning", "s", "Time until the planner found a path.", Clock.WALL, Source.MEASURED
+)
+CLEARANCE = Figure("clearance_m", "planning", "m", "Smallest distance along the motion.", source=Source.MEASURED)
+ATTEMPTS = Figure("attempts", "planning", "", "Searches that the planner started.", source=Source.MEASURED)
+SOLVED_SHARE = Figure("solved_share", "kinematics", "", "Fraction of the poses solved.", source=Source.MEASURED)
+SOLVING_TIME = Figure("solving_time_s", "kinematics", "s", "Median time per pose.", Clock.WALL, Source.MEASURED)
+SOLUTIONS = Figure("solutions", "kinematics", "", "Mean number of solutions per pose.", source=Source.MEASURED)
+POSITION_ERROR = Figure(
+    "position_error_m", "kinematics", "m", "Greatest distance of the tip from a solved pose.", source=Source.MEASURED
+)
+ROTATION_ERROR = Figure(
+    "rotation_error_rad", "kinematics", "rad", "Greatest angle of the tip from a solved pose.", source=Source.MEASURED
+)
+
+FIGURES = {(found.component, found.name): found for found in list(globals().values()) if isinstance(found, Figure)}
+"""Every declared figure, by component and name."""
+
+
+def declared(component: str, name: str) -> Figure:
+    """Returns the declaration of a figure; one without unit and clock for a figure of a user's own."""
+    return FIGURES.get((component, name)) or Figure(name, component)
