@@ -67,12 +67,12 @@ def test_a_launch_runs_beside_fewer_others_and_what_measures_time_alone(
     running: list[str] = []
     beside: list[list[str]] = []
 
-    def run_suite(suite: Any) -> tuple[str, Any]:
+    def run_suite(suite: Any) -> Any:
         running.append(suite.lane)
         time.sleep(0.02)
         beside.append(sorted(running))
         running.remove(suite.lane)
-        return suite.name, runner.Count(passed=1)
+        return runner.SuiteRun(suite.name, runner.Count(passed=1), (), suite.log)
 
     monkeypatch.setattr(runner, "run_suite", run_suite)
     names = [f"unit/{number}" for number in range(10 * runner.PROCESSORS)] + [
@@ -82,8 +82,8 @@ def test_a_launch_runs_beside_fewer_others_and_what_measures_time_alone(
     ]
     names += ["unit/modular_framework_drivers/a", "rostest/modular_framework_control/control_loop_node"]
     suites = [runner.Suite(name, Path(name)) for name in names]
-    counts = [count for lanes in runner.PHASES for count in runner.run_phase(lanes, suites).items()]
-    assert sorted(name for name, _ in counts) == sorted(names)
+    runs = [run for lanes in runner.PHASES for run in runner.run_phase(lanes, suites)]
+    assert sorted(run.name for run in runs) == sorted(names)
     assert beside.count(["alone"]) == 2 and beside.count(["emulated hardware"]) == 1
     launches = [group for group in beside if "whole launches" in group]
     assert launches and all(group.count("whole launches") == 1 for group in launches)
@@ -124,3 +124,79 @@ def test_options_for_pytest_come_after_those_of_the_environment(
     assert runner.pytest_options(["-k", "one or two"]) == "--color=yes -x -k 'one or two'"
     monkeypatch.delenv("PYTEST_ADDOPTS")
     assert runner.pytest_options(["-x"]) == "-x"
+
+
+@pytest.fixture
+def scripted(runner: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A kind of suites that run in a moment: a steady one, and one that fails in its second run only."""
+    paths = [tmp_path / name for name in ("steady.py", "flaky.py")]
+    for path in paths:
+        path.write_text(
+            "from pathlib import Path\n"
+            "def test_it():\n"
+            "    runs = Path(__file__).with_suffix('.runs')\n"
+            "    runs.write_text(runs.read_text() + 'x' if runs.exists() else 'x')\n"
+            f"    assert {path.name!r} == 'steady.py' or runs.read_text() != 'xx', 'the second run'\n"
+        )
+    suites = [runner.Suite(f"unit/{path.stem}", path) for path in paths]
+    monkeypatch.setattr(runner, "suites_of", lambda kind: suites if kind == "unit" else [])
+    monkeypatch.setattr(runner, "ROOT", tmp_path)
+    monkeypatch.setattr(runner, "LOGS", tmp_path / "logs")
+    monkeypatch.setattr(runner.subprocess, "run", lambda *_, **__: None)  # no loops to compile
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-p no:cacheprovider")
+    return tmp_path
+
+
+def test_repeated_suites_end_with_their_failures_counted_by_test(
+    runner: ModuleType, scripted: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert runner.main(["--repeat", "3", "unit"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "5 passed, 1 failed, 0 skipped"
+    assert lines[-5:-2] == [
+        "unit/steady: 3 of 3 runs passed",
+        "unit/flaky: 2 of 3 runs passed",
+        "    1 x test_it (flaky.2.log)",
+    ] or lines[-5:-2] == [
+        "unit/flaky: 2 of 3 runs passed",
+        "    1 x test_it (flaky.2.log)",
+        "unit/steady: 3 of 3 runs passed",
+    ]
+    assert lines[-2].startswith("---- 2 suites, 6 runs: ")
+    logs = scripted / "logs" / "unit"
+    assert "the second run" in (logs / "flaky.2.log").read_text()
+    assert sorted(path.name for path in logs.iterdir()) == [
+        f"{name}.{number}.log" for name in ("flaky", "steady") for number in (1, 2, 3)
+    ]
+
+
+def test_a_run_without_repetition_keeps_one_log_per_suite(
+    runner: ModuleType, scripted: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert runner.main(["unit/steady", "-k", "test_it"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "1 passed, 0 failed, 0 skipped"
+    assert [path.name for path in (scripted / "logs" / "unit").iterdir()] == ["steady.log"]
+
+
+@pytest.mark.parametrize("count", ["0", "-1", "many", "2.5"])
+def test_a_repetition_that_is_no_count_is_refused(
+    runner: ModuleType, capsys: pytest.CaptureFixture[str], count: str
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        runner.main([f"--repeat={count}", "unit"])
+    assert end.value.code == 2
+    assert f"got '{count}'; allowed: a whole number from 1" in capsys.readouterr().err
+
+
+def test_options_behind_the_suite_are_for_pytest(runner: ModuleType) -> None:
+    read = runner.read_arguments(["--repeat", "2", "unit/smach", "-k", "preempt", "--repeat", "x"])
+    assert (read.repeat, read.suite, read.pytest_arguments) == (2, "unit/smach", ["-k", "preempt", "--repeat", "x"])
+    assert vars(runner.read_arguments([])) == {"repeat": None, "suite": "all", "pytest_arguments": []}
+
+
+def test_a_suite_that_ends_without_a_failed_test_is_listed_as_such(runner: ModuleType) -> None:
+    run = runner.SuiteRun("system/a", runner.Count(passed=3, failed=1), (), Path("a.1.log"))
+    assert runner.repetition_table([run]) == [
+        "system/a: 0 of 1 runs passed",
+        "    1 x no test: the suite ended badly (a.1.log)",
+    ]
