@@ -14,11 +14,11 @@ import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import DisplayTrajectory, MoveItErrorCodes, PlanningScene, PositionIKRequest, RobotState
 from moveit_msgs.srv import ApplyPlanningScene, GetPositionIK
-from planning_wire import ARM, DOWN, OK, START, FakeArm, add, box, call, plan, report_of, request
+from planning_wire import ARM, DOWN, OK, START, FakeArm, add, box, call, plan, report_of, request, tip_pose, vector
 from std_msgs.msg import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, Marker, MarkerArray
 
-from modular_framework_planning.visualization.interactive_goal import InteractiveGoal
+from modular_framework_planning.visualization.interactive_goal import FOLLOW_PERIOD_S, InteractiveGoal
 from modular_framework_planning.visualization.move_group_client import planners_of_group
 
 NODE = "/interactive_goal"
@@ -246,6 +246,44 @@ def test_the_chosen_planner_is_asked_for(rviz: Rviz) -> None:
     _, report = report_of(lambda: rviz.select("Plan"), "plan")
     assert "RRTstar" in report["planner_id"]
     until(lambda: rviz.status.startswith("planned"), "the plan")
+
+
+def test_the_goal_follows_the_robot_until_it_is_set(arm: FakeArm, ros_launch: Callable[..., Any]) -> None:
+    node, shown = "/following_goal", [InteractiveMarkerInit()]
+    rospy.Subscriber(f"{node}/marker/update_full", InteractiveMarkerInit, shown.append)
+    feedback = rospy.Publisher(f"{node}/marker/feedback", InteractiveMarkerFeedback, queue_size=10)
+    ros_launch(
+        '<launch><node pkg="modular_framework_planning" type="interactive_goal" name="following_goal">'
+        '<param name="group" value="arm_and_manipulator"/></node></launch>'
+    )
+
+    def is_at(place: np.ndarray) -> bool:
+        markers = shown[-1].markers
+        return bool(markers) and bool(np.allclose(vector(markers[0].pose), place, rtol=0.0, atol=1e-3))
+
+    def robot() -> np.ndarray:
+        return vector(tip_pose([arm.positions[name] for name in ARM]))
+
+    until(lambda: is_at(robot()), "the marker where the robot is", 120.0)
+    arm.positions[ARM[0]] += 0.5
+    until(lambda: is_at(robot()), "the marker where the robot is now")
+    drag = InteractiveMarkerFeedback(client_id="rviz", marker_name="goal", pose=Pose(Point(*NEAR), DOWN))
+    drag.header.frame_id, drag.event_type = "world", InteractiveMarkerFeedback.POSE_UPDATE
+    text: list[MarkerArray] = []
+    rospy.Subscriber(f"{node}/goal_ghost", MarkerArray, text.append)
+
+    def is_set() -> bool:
+        feedback.publish(drag)  # a marker refuses a new client in its first second
+        return bool(text) and "goal is free" in [item.text for item in text[-1].markers]
+
+    until(is_set, "the dragged goal")
+    drag.event_type = InteractiveMarkerFeedback.MOUSE_UP  # the marker shows where it was dragged to
+    feedback.publish(drag)
+    until(lambda: is_at(np.array(NEAR)), "the marker where it was dragged to")
+    arm.positions[ARM[0]] -= 0.5
+    arm.settle()
+    time.sleep(3 * FOLLOW_PERIOD_S)
+    assert is_at(np.array(NEAR)), "a goal that was set stays when the robot moves"
 
 
 class WatchedLock:

@@ -161,8 +161,10 @@ def test_a_group_with_the_base_is_planned_for_within_the_workspace(arm: MoveGrou
 
 
 def test_the_marker_of_a_floating_base_moves_and_turns_about_every_axis(arm: MoveGroupCommander) -> None:
-    shown = rospy.wait_for_message("/interactive_goal/marker/update_full", InteractiveMarkerInit, 60.0)
-    ways = {marker.name: {control.name for control in marker.controls} for marker in shown.markers}
+    shown: list[InteractiveMarkerInit] = []  # the first one has no marker yet
+    rospy.Subscriber("/interactive_goal/marker/update_full", InteractiveMarkerInit, shown.append)
+    until(lambda: shown and shown[-1].markers, "the markers", 60.0)
+    ways = {marker.name: {control.name for control in marker.controls} for marker in shown[-1].markers}
     assert ways["base"] == ways["goal"] == {"menu", *(f"{way}_{axis}" for way in ("move", "rotate") for axis in "xyz")}
 
 

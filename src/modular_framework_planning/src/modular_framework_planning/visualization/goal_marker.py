@@ -53,6 +53,8 @@ Ways = tuple[tuple[str, int, Quaternion], ...]
 class GoalMarker:
     """Interactive markers, each with the ways in which it can be dragged and all with one menu.
 
+    Viewers see changes of markers at the next `apply`, all at once.
+
     Publishes and subscribes: <topic>/update, <topic>/update_full, <topic>/feedback (interactive_markers).
     """
 
@@ -102,7 +104,7 @@ class GoalMarker:
         return tick
 
     def show(self, name: str, frame: str, pose: Pose, scale_m: float, ways: Ways = SIX_WAYS) -> None:
-        """Shows a marker, or moves it to another pose and resets it."""
+        """Shows a marker, or moves it to another pose and resets it, at the next `apply`."""
         marker = InteractiveMarker(name=name, description="", pose=pose, scale=scale_m)
         marker.header.frame_id = frame
         ball = Marker(type=Marker.SPHERE)
@@ -118,18 +120,19 @@ class GoalMarker:
         ]
         self._server.insert(marker, self._on_feedback)
         self._menu.apply(self._server, name)
-        self._server.applyChanges()
 
     def hide(self, name: str) -> None:
-        """Takes a marker away; one that is not shown is no error."""
+        """Takes a marker away at the next `apply`; one that is not shown is no error."""
         self._server.erase(name)
-        self._server.applyChanges()
 
     def move(self, name: str, pose: Pose) -> None:
-        """Puts a marker elsewhere; one that is not shown stays so."""
+        """Puts a marker elsewhere at the next `apply`; one that is not shown stays so."""
         if name in self._shown():
             self._server.setPose(name, pose)
-            self._server.applyChanges()
+
+    def apply(self) -> None:
+        """Publishes the changes since the last call."""
+        self._server.applyChanges()
 
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
         if feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:

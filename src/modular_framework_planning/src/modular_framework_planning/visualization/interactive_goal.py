@@ -37,6 +37,8 @@ TEXT_ABOVE_TIP_M = 0.45  # clear of the hand
 TEXT_WIDTH, TEXT_LINES = 60, 5
 DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
 BASE_SCALE = 3.0  # the marker of the base, of the size of that at the tip
+MOVED = 1.0e-3  # [rad or m] a change of the robot's state that the goal follows
+FOLLOW_PERIOD_S = 0.5  # of the goal that follows the robot
 JOB_END_S = 0.2  # after a job has reported its end, until the next one can start
 DEFAULT_PLANNER = "move_group's default"
 
@@ -44,7 +46,8 @@ DEFAULT_PLANNER = "move_group's default"
 class InteractiveGoal:
     """A marker at the tip to drag the goal with, ghosts of start and goal, and a menu.
 
-    A group with a planar or floating base has a second marker, which places the base.
+    A group with a planar or floating base has a second marker, which places the base. The goal follows the robot until
+    it is set: at start-up the joints that move_group knows may not be those of the robot yet.
 
     Publishes: ~goal_ghost, ~start_ghost (visualization_msgs/MarkerArray, latched).
     Interactive marker: ~marker.
@@ -76,6 +79,8 @@ class InteractiveGoal:
         }
         self._scene = empty_scene(model)  # writes and reads states
         self._goal: Array = model.default_positions()
+        self._goal_is_set = False
+        self._goal_changing = threading.Lock()
         self._start: RobotState | None = None
         self._trajectory: Any = None
         self._status = ""
@@ -250,10 +255,12 @@ class InteractiveGoal:
             self._marker.show(BASE, frame, self._base_pose(), BASE_SCALE * self._scale_m, ways)
         else:
             self._marker.hide(BASE)
+        self._marker.apply()
 
     def _move_markers(self) -> None:
         self._marker.move(GOAL, self._tip_pose())
         self._marker.move(BASE, self._base_pose())
+        self._marker.apply()
 
     def _on_drag(self, marker: str, pose: Pose) -> None:
         with self._drag_changed:
@@ -265,9 +272,11 @@ class InteractiveGoal:
         while not rospy.is_shutdown():
             with self._drag_changed:
                 if self._dragged is None:
-                    self._drag_changed.wait(0.5)
+                    self._drag_changed.wait(FOLLOW_PERIOD_S)
                 drag, self._dragged = self._dragged, None
                 self._solving = drag is not None
+            if not self._goal_is_set:
+                self._guarded(self._follow_with_goal)
             if drag is not None:
                 marker, pose = drag
                 follow = self._place_base if marker == BASE else self._solve
@@ -275,6 +284,16 @@ class InteractiveGoal:
                 with self._drag_changed:
                     self._solving = False
                     self._drag_changed.notify_all()
+
+    def _follow_with_goal(self) -> None:
+        """Puts the goal where the robot is, unless the goal was set."""
+        positions = self._positions_of(self._client.state())
+        with self._goal_changing:
+            if self._goal_is_set or np.allclose(positions, self._goal, rtol=0.0, atol=MOVED):
+                return
+            self._goal = positions
+        self._show_goal()
+        self._move_markers()
 
     def _solve(self, pose: Pose) -> None:
         target = PoseStamped(pose=pose)
@@ -287,6 +306,7 @@ class InteractiveGoal:
                 problem = "" if avoid else self._client.problem_of(self._group.name, self._state_of(positions))
                 self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
                 self._marker.move(BASE, self._base_pose())
+                self._marker.apply()
                 return
         self._set_goal(self._goal, UNREACHABLE, "no inverse kinematics solution there")
 
@@ -315,7 +335,8 @@ class InteractiveGoal:
         )
 
     def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
-        self._goal, self._goal_color, self._trajectory = positions, color, None
+        with self._goal_changing:
+            self._goal, self._goal_color, self._trajectory, self._goal_is_set = positions, color, None, True
         self._set_status(status)
 
     def _set_status(self, status: str) -> None:
