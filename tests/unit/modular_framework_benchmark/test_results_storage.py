@@ -265,17 +265,6 @@ def test_the_database_of_another_program_is_told(tmp_path: Path) -> None:
         open_database(path, create=True)
 
 
-@pytest.mark.parametrize(("version", "age"), [(0, "older"), (99, "newer")])
-def test_another_version_of_the_tables_is_told(filled: Path, version: int, age: str) -> None:
-    with sqlite3.connect(filled) as connection:
-        connection.execute("UPDATE schema_version SET version = ?", (version,))
-    for read_only in (True, False):
-        with pytest.raises(
-            SchemaVersionError, match=f"has tables of version {version}, of an {age} release; allowed: 1"
-        ):
-            open_database(filled, read_only=read_only)
-
-
 def test_a_server_that_does_not_answer_keeps_the_password_to_itself(tmp_path: Path) -> None:
     error = storage_error(DBAPIError("select 1", {}, OSError("connection refused")), "postgresql://me:***@host/results")
     assert type(error) is StorageError

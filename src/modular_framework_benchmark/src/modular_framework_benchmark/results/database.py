@@ -36,7 +36,6 @@ from modular_framework_benchmark.results.errors import (
     RecordNotStoredError,
     RecordRefusedError,
     ResultsError,
-    SchemaVersionError,
     StorageError,
     UnknownExperimentError,
     storage_error,
@@ -53,6 +52,7 @@ from modular_framework_benchmark.results.schema import (
     SCHEMA,
     SCHEMA_VERSION,
 )
+from modular_framework_benchmark.results.schema_upgrade import stored_version, upgrade
 from modular_framework_benchmark.results.unwritten_records import keep_record, waiting_records
 
 _LOG = logging.getLogger(__name__)
@@ -82,23 +82,24 @@ class StoredExperiment:
 def open_database(
     target: str | Path, *, create: bool = False, read_only: bool = False, busy_timeout_s: float = BUSY_TIMEOUT_S
 ) -> ResultDatabase:
-    """Opens a result database, checks it, and takes in the records that wait beside it.
+    """Opens a result database, checks it, upgrades an older one, and takes in the records that wait beside it.
 
     Args:
         target: Path of a SQLite file, or a URL of SQLAlchemy.
         create: Makes the database if there is none.
-        read_only: Writes nothing, and leaves waiting records where they are.
+        read_only: Writes nothing, unless the tables are older than this release.
         busy_timeout_s: How long to wait for another process that writes the SQLite file [s].
 
     Raises:
         StorageError: It is not there, damaged, locked or cannot be written.
-        SchemaVersionError: Its tables are those of another version, or of another program.
+        SchemaVersionError: Its tables are those of a newer version, or of another program.
     """
     address = parse_address(target)
     engine = make_engine(address, create=create, read_only=read_only, busy_timeout_s=busy_timeout_s)
     database = ResultDatabase(address, engine)
     try:
-        database.prepare(read_only=read_only)
+        if not database.prepare(read_only=read_only):
+            open_database(target, busy_timeout_s=busy_timeout_s).close()
     except BaseException:
         database.close()
         raise
@@ -136,13 +137,16 @@ class ResultDatabase:
         """Returns the folder that the folders of episodes are relative to: the file's, or the working folder."""
         return self._address.path.parent if self._address.path else Path.cwd()
 
-    def prepare(self, *, read_only: bool) -> None:
-        """Checks the database, makes its tables if it is new, and takes in waiting records; see `open_database`."""
+    def prepare(self, *, read_only: bool) -> bool:
+        """Checks the database, makes its tables if it is new, and takes in waiting records; see `open_database`.
+
+        Returns:
+            Whether its tables are those of this release now; those that are only read may be older.
+        """
         self._check_integrity()
         if read_only:
             with self._reading() as connection:
-                self._check_version(connection)
-            return
+                return stored_version(connection, self.label) == SCHEMA_VERSION
         with self._writing() as connection:
             if not inspect(connection).get_table_names():
                 METADATA.create_all(connection)
@@ -154,9 +158,10 @@ class ResultDatabase:
                         for status, value in STATUS_VALUES.items()
                     ],
                 )
-            self._check_version(connection)
+            upgrade(connection, self._address)
             connection.execute(update(SCHEMA).values(version=SCHEMA_VERSION))  # fails now if it cannot be written
         self._take_in_waiting()
+        return True
 
     def add_experiment(self, description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> int:
         """Adds an experiment, or finds it there: then the run resumes, and episodes that are new are added.
@@ -365,20 +370,6 @@ class ResultDatabase:
         if found != "ok":
             raise DatabaseCorruptError(
                 f"{self.label}: it is damaged ({found}); restore a copy, or save what can be read with sqlite3 .recover"
-            )
-
-    def _check_version(self, connection: Connection) -> None:
-        tables = inspect(connection).get_table_names()
-        if SCHEMA.name not in tables:
-            raise SchemaVersionError(
-                f"{self.label} is no result database: its tables are {', '.join(tables) or 'none'}; name another file"
-            )
-        version = connection.execute(select(SCHEMA.c.version)).scalar_one()
-        if version != SCHEMA_VERSION:
-            age = "older" if version < SCHEMA_VERSION else "newer"
-            raise SchemaVersionError(
-                f"{self.label} has tables of version {version}, of an {age} release; allowed: {SCHEMA_VERSION}; "
-                "open it with that release, and export it there as Parquet or for Planner Arena"
             )
 
     def _take_in_waiting(self) -> None:

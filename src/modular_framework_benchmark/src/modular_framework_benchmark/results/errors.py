@@ -37,7 +37,7 @@ class DatabaseCorruptError(StorageError):
 
 
 class SchemaVersionError(ResultsError):
-    """The database has the tables of another version, or of another program."""
+    """The database has the tables of a newer version, or of another program."""
 
 
 class UnknownExperimentError(ResultsError):

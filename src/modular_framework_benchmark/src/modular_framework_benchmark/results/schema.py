@@ -26,8 +26,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.types import TypeEngine
 
-SCHEMA_VERSION = 1
-"""Raised whenever the tables change in a way that older programs cannot read or write."""
+SCHEMA_VERSION = 2
+"""Raised, with a migration in `schema_upgrade`, whenever older programs could not read or write the tables."""
 
 METADATA = MetaData()
 REAL_NUMBER: TypeEngine[float] = Double().with_variant(REAL(), "sqlite")
