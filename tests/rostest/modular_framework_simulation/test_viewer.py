@@ -30,6 +30,7 @@ from shape_msgs.msg import SolidPrimitive
 from simulation_time_msgs.srv import AdvanceTime
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectoryPoint
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 URDF = """<robot name="arm"><link name="world"/>
@@ -46,18 +47,34 @@ LAUNCH = """<launch>
     <arg name="viewer_port" value="{port}"/>
   </include>
 </launch>"""
+READ_ONLY = """<launch><group ns="watching"><include file="$(find modular_framework_simulation)/launch/viewer.launch">
+  <arg name="port" value="{port}"/><arg name="read_only" value="true"/></include></group></launch>"""
 BOX = """<sdf version="1.6"><model name="box"><static>true</static><link name="link"><visual name="v"><geometry><box>
   <size>0.1 0.2 0.3</size></box></geometry></visual></link></model></sdf>"""
 BALL = """<sdf version="1.6"><model name="ball"><link name="link"><visual name="v"><geometry><sphere>
   <radius>0.1</radius></sphere></geometry></visual></link></model></sdf>"""
 
 
+PROTOCOL: Any = f"viser-v{viser.__version__}"
+
+
+def websocket(address: str) -> str:
+    """The WebSocket that the page of viser opens."""
+    return address.replace("http:", "ws:").rstrip("/")
+
+
+def address_in(log: str) -> str:
+    """The address that the log tells the user to open."""
+    found = re.search(r"viewer: open (http://\S+/) in a browser", log)
+    assert found, log
+    return found[1]
+
+
 class Browser:
     """What a browser knows of the page: the nodes of its scene with their poses, and the controls of its panel."""
 
-    def __init__(self, port: int) -> None:
-        protocol: Any = f"viser-v{viser.__version__}"
-        self._socket = connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None, compression=None)
+    def __init__(self, address: str) -> None:
+        self._socket = connect(websocket(address), subprotocols=[PROTOCOL], max_size=None, compression=None)
         self.nodes: dict[str, dict[str, Any]] = {}
         self.controls: dict[str, dict[str, Any]] = {}
         threading.Thread(target=self._read, daemon=True).start()
@@ -124,14 +141,14 @@ def launch(ros_session: Any, port: int) -> Iterator[Any]:
     urdf = URDF.replace("<", "&lt;").replace('"', "&quot;")
     launch = ros_session.launch(LAUNCH.format(urdf=urdf, port=port))
     rospy.wait_for_service("/gazebo/spawn_sdf_model", 60.0)
-    until(lambda: "viewer: open http" in launch.log(), "the address in the log")
+    until(lambda: "/ in a browser" in launch.log(), "the address in the log")
     yield launch
     launch.stop()
 
 
 @pytest.fixture(scope="module")
-def page(launch: Any, port: int) -> Iterator[Browser]:
-    browser = Browser(port)
+def page(launch: Any) -> Iterator[Browser]:
+    browser = Browser(address_in(launch.log()))
     until(lambda: "/robot/upper" in browser.nodes, "the robot is drawn")
     yield browser
     browser.close()
@@ -182,8 +199,9 @@ def published(topic: str, kind: Any) -> Any:
 def test_the_page_is_served_on_the_loopback_address_only_and_nothing_is_done_before_it_is_opened(
     launch: Any, port: int
 ) -> None:
-    assert f"viewer: open http://127.0.0.1:{port} in a browser" in launch.log()
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5.0) as answer:
+    address = address_in(launch.log())
+    assert address.startswith(f"http://127.0.0.1:{port}/")
+    with urllib.request.urlopen(address, timeout=5.0) as answer:
         assert answer.status == 200 and b"<html" in answer.read().lower()
     addresses = [
         each.address for each in itertools.chain(*psutil.net_if_addrs().values()) if each.family == socket.AF_INET
@@ -192,6 +210,64 @@ def test_the_page_is_served_on_the_loopback_address_only_and_nothing_is_done_bef
         with pytest.raises(ConnectionRefusedError), socket.create_connection((address, port), 2.0):
             pass
     assert not {name for name in subscribed_topics() if "gazebo" in name or "joint" in name}
+
+
+@pytest.mark.parametrize(
+    ("path", "headers", "reason"),
+    [
+        ("/", {}, "token is missing or wrong"),
+        ("/{token}x", {}, "token is missing or wrong"),
+        ("/x/{token}", {}, "token is missing or wrong"),
+        ("/?{token}", {}, "token is missing or wrong"),
+        ("/{token}", {"Origin": "http://evil.example"}, "Origin 'http://evil.example' is another page"),
+        ("/{token}", {"Origin": "http://127.0.0.1:1"}, "Origin 'http://127.0.0.1:1' is another page"),
+        ("/{token}", {"Origin": "null"}, "Origin 'null' is another page"),
+        ("/{token}", {"Host": "evil.example:{port}"}, "Host 'evil.example:{port}' is not this server"),
+        ("/{token}", {"Host": "127.0.0.1:1"}, "Host '127.0.0.1:1' is not this server"),
+        ("/{token}", {"Host": "evil.example:{port}", "Origin": "http://evil.example:{port}"}, "Host 'evil.example"),
+    ],
+)
+def test_another_page_and_a_wrong_token_get_nothing(
+    launch: Any, port: int, path: str, headers: dict[str, str], reason: str
+) -> None:
+    own = websocket(address_in(launch.log()))
+    token = own.rpartition("/")[2]
+    values = {"token": token, "port": port}
+    sent = {"Host": f"127.0.0.1:{port}", **{name: value.format(**values) for name, value in headers.items()}}
+    lines = [f"{name}: {value}\r\n" for name, value in sent.items()]
+    upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    key = f"Sec-WebSocket-Key: {'a' * 22}==\r\nSec-WebSocket-Protocol: {PROTOCOL}\r\n"
+    for handshake in ("", upgrade + key):
+        with socket.create_connection(("127.0.0.1", port), 10.0) as stream:
+            text = f"GET {path.format(**values)} HTTP/1.1\r\n{''.join(lines)}{handshake}\r\n"
+            stream.sendall(text.encode())
+            answer = b"".join(iter(lambda: stream.recv(65536), b"")).decode()
+        assert answer.startswith("HTTP/1.1 403"), answer
+        assert reason.format(**values) in answer
+
+
+def test_a_browser_on_the_own_page_is_admitted(launch: Any, port: int) -> None:
+    own = websocket(address_in(launch.log()))
+    for host in (f"http://127.0.0.1:{port}", f"http://localhost:{port}"):
+        address = own.replace(f"ws://127.0.0.1:{port}", host.replace("http", "ws"))
+        with connect(address, origin=host, subprotocols=[PROTOCOL], max_size=None, compression=None) as admitted:
+            assert admitted.recv(timeout=20.0)
+    with pytest.raises(InvalidStatus):
+        connect(own, origin="http://localhost", subprotocols=[PROTOCOL])
+
+
+def test_a_read_only_page_shows_the_world_and_refuses_to_act_on_it(launch: Any, ros_session: Any) -> None:
+    watching = ros_session.launch(READ_ONLY.format(port=free_port()))
+    until(lambda: "/ in a browser" in watching.log(), "the address in the log")
+    browser = Browser(address_in(watching.log()))
+    until(lambda: "/robot/upper" in browser.nodes, "the robot is drawn")
+    until(lambda: "Time" in browser.text(), "the time is shown", 10.0)
+    browser.set("Pause", True)
+    browser.set("Reset poses and time", True)
+    until(lambda: watching.log().count("the viewer is read-only") >= 2, "both are refused", 10.0)
+    assert not is_paused()
+    browser.close()
+    watching.stop()
 
 
 def test_the_scene_follows_models_that_come_move_and_go(box: Browser) -> None:

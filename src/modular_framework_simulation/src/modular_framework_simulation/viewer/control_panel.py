@@ -73,10 +73,11 @@ class ControlPanel:
         server: The viser server.
         commands: What the buttons do.
         log: Takes a line about a command that failed.
+        read_only: Whether every command is refused and its button hidden.
     """
 
-    def __init__(self, server: Any, commands: Commands, log: Callable[[str], None]) -> None:
-        self._server, self._commands, self._log = server, commands, log
+    def __init__(self, server: Any, commands: Commands, log: Callable[[str], None], *, read_only: bool = False) -> None:
+        self._server, self._commands, self._log, self._read_only = server, commands, log, read_only
         gui = server.gui
         self._status = gui.add_markdown(str(Status(None, False, 0.0)))
         self._shown_status = ""
@@ -118,6 +119,8 @@ class ControlPanel:
 
     def _do(self, event: Any, command: Callable[[], None]) -> None:
         try:
+            if self._read_only:
+                raise CommandError("the viewer is read-only; start it with read_only:=false")
             command()
         except CommandError as error:
             self._log(str(error))
@@ -148,7 +151,7 @@ class ControlPanel:
         self._shown_status = str(status)
         self._status.content = str(status)
         for handle, visible in (
-            (self._time, status.time_s is not None),
+            (self._time, status.time_s is not None and not self._read_only),
             (self._paused, not status.paused),
             (self._resumed, status.paused),
         ):

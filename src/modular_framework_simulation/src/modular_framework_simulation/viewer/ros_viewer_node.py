@@ -49,7 +49,7 @@ class ViewerNode:
     """Draws while a browser is connected, and rests otherwise.
 
     Parameters: ~address (127.0.0.1), ~port (8080; the next free one where it is taken), ~fixed_frame (world):
-    the frame that is drawn at the origin; robot_description.
+    the frame that is drawn at the origin; ~read_only (false): no button acts on the simulation; robot_description.
 
     Subscribes, while a browser is connected: /gazebo/visible_models and /gazebo/visible_poses (std_msgs/String),
     joint_states (sensor_msgs/JointState), /tf and /tf_static where the root of the robot is not the fixed frame, and,
@@ -65,7 +65,8 @@ class ViewerNode:
     def __init__(self, server: WebServer) -> None:
         self._server = server
         fixed_frame = str(rospy.get_param("~fixed_frame", ros_names.WORLD_FRAME))
-        self._panel = ControlPanel(server.viser, GazeboCommands(), rospy.logwarn)
+        read_only = bool(rospy.get_param("~read_only", False))
+        self._panel = ControlPanel(server.viser, GazeboCommands(), rospy.logwarn, read_only=read_only)
         self._layers = {name: Layer(server.viser, name) for name in ("world", "robot", "planning scene", "plan")}
         self._world = WorldView(self._layers["world"], rospy.logwarn)
         self._plan = PlanView(self._layers["plan"], server.viser)

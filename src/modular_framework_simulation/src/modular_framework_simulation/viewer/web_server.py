@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.viewer.access import Access
 
 _TITLE = "Modular Benchmarking Framework"
 _PORTS_TRIED = 100
@@ -57,7 +58,8 @@ class WebServer:
     def __init__(self, host: str, port: int) -> None:
         import viser  # takes a second
 
-        with contextlib.redirect_stdout(io.StringIO()):  # its banner; the log says the address
+        self._access = Access()
+        with contextlib.redirect_stdout(io.StringIO()), self._access.enforced():  # without viser's banner
             self.viser: Any = viser.ViserServer(host=host, port=port, label=_TITLE, verbose=False)
         self.host, self.port = host, int(self.viser.get_port())
         self.viser.gui.configure_theme(show_share_button=False, show_logo=False, dark_mode=False)
@@ -68,7 +70,8 @@ class WebServer:
     @property
     def address(self) -> str:
         """What to open in a browser."""
-        return f"http://{self.host}:{self.port}"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}/{self._access.token}/"
 
     @property
     def has_clients(self) -> bool:

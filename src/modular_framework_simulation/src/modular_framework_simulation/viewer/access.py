@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Admits only requests that carry the viewer's address and token; any page in a local browser can send requests."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import http
+import ipaddress
+import secrets
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+from modular_framework_simulation.errors import SimulationError
+
+_HOSTNAME = socket.gethostname().lower()
+_LOCAL_NAMES = ("localhost", _HOSTNAME, f"{_HOSTNAME}.local")
+"""Names of this computer. A page whose own name was made to lead here (DNS rebinding) has another."""
+
+
+class Access:
+    """Checks each HTTP request and WebSocket handshake before viser answers it.
+
+    Attributes:
+        token: First part of every path; secret, and new at each start.
+    """
+
+    def __init__(self) -> None:
+        self.token = secrets.token_urlsafe(16)
+
+    def refusal(self, path: str, host: str, origin: str | None, port: int) -> str:
+        """Returns why a request is refused; empty if it is admitted.
+
+        Args:
+            path: Path of the request, with the query.
+            host: Its header Host.
+            origin: Its header Origin, which browsers add to every WebSocket handshake; None without.
+            port: Port of the server.
+        """
+        name, _, given_port = host.lower().rpartition(":")
+        if given_port != str(port) or not (name in _LOCAL_NAMES or _is_address(name)):
+            return f"Host '{host}' is not this server; allowed: an address or name of this computer, with port {port}"
+        if origin is not None and origin.lower() != f"http://{host.lower()}":
+            return f"Origin '{origin}' is another page; allowed: http://{host}"
+        if not secrets.compare_digest(path.split("?")[0].split("/")[1].encode(), self.token.encode()):
+            return "the token is missing or wrong; open the address in the log of the viewer"
+        return ""
+
+    @contextlib.contextmanager
+    def enforced(self) -> Iterator[None]:
+        """Checks the requests of the server that viser starts in this context; viser itself has no option for checks.
+
+        Raises:
+            SimulationError: viser started its server in an unknown manner, unchecked.
+        """
+        from websockets.asyncio import server
+
+        original, started = server.serve, []
+
+        def serve(*args: Any, process_request: Any, **options: Any) -> Any:
+            started.append(True)
+            return original(*args, process_request=functools.partial(self._process, process_request), **options)
+
+        server.serve = serve  # type: ignore[assignment, misc]
+        try:
+            yield
+        finally:
+            server.serve = original  # type: ignore[misc]
+        if not started:
+            raise SimulationError("this version of viser starts its server unchecked; install that of requirements.txt")
+
+    def _process(self, answer: Any, connection: Any, request: Any) -> Any:
+        """Answers a refused request, and passes an admitted one on without its token."""
+        host, origins = ",".join(request.headers.get_all("Host")), request.headers.get_all("Origin")
+        refusal = self.refusal(request.path, host, ",".join(origins) or None, connection.local_address[1])
+        if refusal:
+            return connection.respond(http.HTTPStatus.FORBIDDEN, f"{refusal}\n")
+        request.path = request.path.removeprefix(f"/{self.token}") or "/"
+        response = answer(connection, request)
+        if response is not None:
+            response.headers["Referrer-Policy"] = "no-referrer"  # links of the page would give the token away
+        return response
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True
