@@ -7,6 +7,7 @@ A suite imports these tests and names its method: `METHOD = Method(...)`, `metho
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,7 @@ from modular_framework_core.msg import StandardisedGrasp
 
 sys.path.insert(0, str(Path(__file__).parent / "modular_framework_core"))
 from fake_move_group import FakeMoveGroup  # noqa: E402
+from ros_session import until  # noqa: E402
 
 BOX_SIZE = (0.04, 0.07, 0.1)
 APPROACH_M, LIFT_M = 0.10, 0.15
@@ -156,6 +158,51 @@ def test_new_grasps_replace_the_ones_that_are_left(scene, method: Method) -> Non
     assert answer.success, answer.message
     assert stored() == ([], 3)
     assert_between_the_pads(get_grasp().grasp_message, 0.08, 0.5)
+
+
+def renew() -> tuple[bool, str]:
+    answer = rospy.ServiceProxy("grasp_generated/renew", Trigger)()
+    return answer.success, answer.message
+
+
+def test_a_task_begins_with_all_grasps_however_many_the_task_before_took(scene, method: Method) -> None:
+    assert method.generate()[0]
+    generated = len(scene.watcher.reasons)
+    assert renew()[1].startswith("nothing has moved"), "a complete set stays"
+    assert get_grasp().success
+    assert renew()[0]
+    assert stored() == ([], 3)
+    while get_grasp().success:
+        pass
+    assert renew()[0]
+    assert stored() == ([], 3)
+    scene.watcher.wait(generated + 2)
+
+
+def test_grasps_that_were_all_handed_out_are_generated_again_before_the_next_attempt(scene, method: Method) -> None:
+    assert method.generate()[0]
+    while get_grasp().success:
+        pass
+    answer = rospy.ServiceProxy("refresh_grasps", Trigger)()
+    assert answer.success, answer.message
+    assert "nothing has moved" not in answer.message
+    assert stored() == ([], 3)
+
+
+def test_a_task_that_begins_before_its_object_is_there_waits_for_it(scene, method: Method) -> None:
+    box = scene.objects.pop()
+    answers: list[tuple[bool, str]] = []
+    method.set("scene_timeout", 60.0)
+    task = threading.Thread(target=lambda: answers.append(renew()))
+    task.start()
+    before = scene.scene_requests
+    until(lambda: scene.scene_requests > before + 1, "the generator looks for the object")
+    assert not answers
+    scene.objects.append(box)
+    task.join(60.0)
+    method.set("scene_timeout", 1.0)
+    assert answers
+    assert answers[0][0], answers
 
 
 def test_on_demand_the_reason_reports_what_is_wrong(scene, method: Method) -> None:

@@ -16,6 +16,7 @@ from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, Robot
 from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneResponse
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger, TriggerResponse
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 import smach
@@ -163,6 +164,18 @@ def test_a_signal_sent_before_the_state_runs_is_not_lost() -> None:
     started = time.monotonic()
     assert run(state)[0] == "fail", "a signal counts once"
     assert time.monotonic() - started >= 1.9
+
+
+def test_a_latched_signal_of_an_earlier_task_counts_only_after_its_sender_has_renewed_it() -> None:
+    publisher = rospy.Publisher("grasped/before", Bool, queue_size=1, latch=True)
+    publisher.publish(True)
+    answers = [TriggerResponse(True, "there are new ones"), TriggerResponse(False, "there are none left")]
+    service = rospy.Service("grasped/before/renew", Trigger, lambda _: answers.pop(0))
+    assert run(WaitForSignal("grasped/before", timeout=30.0))[0] == "success"
+    state = WaitForSignal("grasped/before", timeout=30.0)
+    assert run(state)[0] == "fail"
+    assert "there are none left" in state.reason
+    service.shutdown()
 
 
 def test_a_false_signal_is_negative_and_its_reason_is_passed_on(monkeypatch) -> None:

@@ -8,6 +8,7 @@ import threading
 import time
 from collections import Counter
 from contextlib import nullcontext
+from enum import Enum
 
 import rospy
 from scipy.spatial.transform import Rotation
@@ -39,12 +40,27 @@ from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_ros.start_up import start_timeout
 
 SIGNAL_TOPIC = "grasp_generated"
-GENERATE_SERVICES = ("generate_grasps", "~generate")
-REFRESH_SERVICES = ("refresh_grasps", "~refresh")
 SCENE_PERIOD_S = 0.25
 SETTINGS_PERIOD_S = 2.0
 """Time between two readings of the parameters while the scene is watched [s]: each is two dozen calls of the master."""
 WAITING_PERIOD_S = 10.0
+
+
+class Kept(Enum):
+    """The grasps of the last generation that a request leaves in the manager, if no object has moved since."""
+
+    NONE = "none"
+    LEFT = "those that were not handed out yet, if there are any"
+    COMPLETE = "all, if none was handed out yet"
+
+
+SERVICES = {
+    "generate_grasps": Kept.NONE,
+    "~generate": Kept.NONE,
+    "refresh_grasps": Kept.LEFT,
+    "~refresh": Kept.LEFT,
+    f"{SIGNAL_TOPIC}/renew": Kept.COMPLETE,
+}
 
 
 class GraspGenerator:
@@ -60,8 +76,10 @@ class GraspGenerator:
     Services (std_srvs/Trigger), the names of every method first, this node's own second:
         ``generate_grasps``, ``~generate``: generates grasps.
         ``refresh_grasps``, ``~refresh``: waits until the objects rest, and generates grasps if one was moved since;
-            those that are left of the last generation stay otherwise.
-    Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``,
+            those that are left of the last generation stay otherwise, and new ones are generated if none is left.
+        ``grasp_generated/renew``: the same, and generates grasps if one was handed out since; a task calls it that
+            reads a signal, which may be left from the task before. Waits for an object, at most ``~scene_timeout``.
+    Services called: ``get_planning_scene``, ``compute_ik``, ``add_grasp``, ``remove_grasp``, ``list_grasps``,
         ``clear_anonymous_grasps``.
 
     Args:
@@ -104,9 +122,7 @@ class GraspGenerator:
         if isinstance(self._method, SeeingMethod):
             self._method.connect()
         self._services = [
-            rospy.Service(name, Trigger, lambda _, refresh=refresh: self._on_demand(refresh))
-            for refresh, names in ((False, GENERATE_SERVICES), (True, REFRESH_SERVICES))
-            for name in names
+            rospy.Service(name, Trigger, lambda _, kept=kept: self._on_demand(kept)) for name, kept in SERVICES.items()
         ]
 
     def watch(self) -> None:
@@ -136,7 +152,9 @@ class GraspGenerator:
                     if self._generated.stale(objects):
                         wait_limit = wait_limit or WaitLimit()
                         if at_rest(before, objects):
-                            self._signal_grasps(settings, objects, refresh=True)
+                            with self._generating:  # a request may have done it meanwhile
+                                if self._generated.stale(objects):
+                                    self._signal_grasps(settings, objects)
                             wait_limit = None
                     before = objects
             except (NoObjectError, CallError, CommanderError) as error:
@@ -158,51 +176,68 @@ class GraspGenerator:
         rospy.loginfo_throttle(WAITING_PERIOD_S, f"{rospy.get_name()}: waiting, for {error}.")
         return False
 
-    def _on_demand(self, refresh: bool) -> TriggerResponse:
+    def _on_demand(self, kept: Kept) -> TriggerResponse:
         try:
             settings = read_settings()
             self._time.catch_up()
-            objects = self._objects(settings, refresh)
-            return TriggerResponse(*self._signal_grasps(settings, objects, refresh))
+            with self._generating:
+                objects = self._objects(settings, kept)
+                if kept is not Kept.NONE and self._may_stay(objects, kept):
+                    names = sorted(found.name for found in objects)
+                    return TriggerResponse(True, f"nothing has moved; the grasps of {names} stay")
+                return TriggerResponse(*self._signal_grasps(settings, objects))
         except (NoGraspError, CallError, CommanderError) as error:
             self._publish(False, str(error))
             return TriggerResponse(False, str(error))
 
-    def _objects(self, settings: GeneratorSettings, refresh: bool) -> list[SceneObject]:
+    def _may_stay(self, objects: list[SceneObject], kept: Kept) -> bool:
+        """Returns whether no object has moved and the manager still has the grasps that a request needs."""
+        needed = self._stored.count if kept is Kept.COMPLETE else 1
+        return not self._generated.stale(objects) and self._stored.left() >= max(1, needed)
+
+    def _objects(self, settings: GeneratorSettings, kept: Kept) -> list[SceneObject]:
         """Returns the objects to grasp; those that the method sees, if the planning scene has none in the crop box."""
         try:
-            return self._resting(settings) if refresh else self._scene.targets(settings)
+            if kept is Kept.NONE:
+                return self._scene.targets(settings)
+            return self._resting(settings, kept)
         except NoObjectError as error:
             if settings.object_name or not isinstance(self._method, SeeingMethod):
                 raise
             try:
-                with self._generating, self._time.held("grasp generation", during_motions=True):
+                with self._time.held("grasp generation", during_motions=True):
                     return self._method.seen_objects(settings.crop, settings.seed)
             except NoCandidatesError as unseen:
                 raise NoObjectError(f"{error}; and {unseen}") from unseen
 
-    def _resting(self, settings: GeneratorSettings) -> list[SceneObject]:
+    def _resting(self, settings: GeneratorSettings, kept: Kept) -> list[SceneObject]:
         """Returns the objects to grasp once they rest, or as they are when that takes too long."""
-        before, wait_limit = self._scene.targets(settings), WaitLimit()
+        before: list[SceneObject] = []
+        wait_limit = WaitLimit()
         while True:
+            late = wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s)
+            try:
+                objects = self._scene.targets(settings)
+            except NoObjectError:
+                if late or kept is not Kept.COMPLETE or isinstance(self._method, SeeingMethod):
+                    raise
+                objects = []
+            if objects and (
+                late or at_rest(before, objects) or (kept is Kept.COMPLETE and self._may_stay(objects, kept))
+            ):
+                return objects
+            before = objects
             if self._time.enabled:
                 self._time.sleep(SCENE_PERIOD_S)
             else:
                 rospy.rostime.wallsleep(SCENE_PERIOD_S)
-            objects = self._scene.targets(settings)
-            if at_rest(before, objects) or wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s):
-                return objects
-            before = objects
 
-    def _signal_grasps(
-        self, settings: GeneratorSettings, objects: list[SceneObject], refresh: bool
-    ) -> tuple[bool, str]:
+    def _signal_grasps(self, settings: GeneratorSettings, objects: list[SceneObject]) -> tuple[bool, str]:
         """Stores grasps in place of the earlier ones and signals it, or signals that what is there cannot be grasped.
 
         Args:
             settings: The parameters.
             objects: What to grasp.
-            refresh: Whether grasps of objects that have not moved since are left as they are.
 
         Returns:
             What was signalled.
@@ -212,8 +247,6 @@ class GraspGenerator:
         """
         # a request by service may come while grasps of a new object are generated
         with self._generating, self._time.held("grasp generation", during_motions=True):
-            if refresh and not self._generated.stale(objects):
-                return True, f"nothing has moved; the grasps of {sorted(found.name for found in objects)} stay"
             with self._reporter.work(rospy.get_name()) as work:
                 try:
                     grasps = self._generate(settings, objects, work.figures)

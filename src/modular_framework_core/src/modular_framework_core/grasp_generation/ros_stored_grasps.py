@@ -10,6 +10,8 @@ from modular_framework_core.msg import StandardisedGrasp
 from modular_framework_core.srv import (
     AddStandardisedGrasp,
     AddStandardisedGraspRequest,
+    ListMessages,
+    ListMessagesRequest,
     RemoveMessage,
     RemoveMessageRequest,
 )
@@ -21,7 +23,7 @@ SERVICE_TIMEOUT_S = 10.0
 class StoredGrasps:
     """The grasps one generator has stored.
 
-    Services called: ``add_grasp``, ``remove_grasp``, ``clear_anonymous_grasps``.
+    Services called: ``add_grasp``, ``remove_grasp``, ``list_grasps``, ``clear_anonymous_grasps``.
     """
 
     def __init__(self) -> None:
@@ -36,8 +38,23 @@ class StoredGrasps:
         self._add = rospy.ServiceProxy("add_grasp", AddStandardisedGrasp)
         self._remove = rospy.ServiceProxy("remove_grasp", RemoveMessage)
         self._clear_anonymous = rospy.ServiceProxy("clear_anonymous_grasps", Trigger)
-        for proxy in (self._add, self._remove, self._clear_anonymous):
+        self._list = rospy.ServiceProxy("list_grasps", ListMessages)
+        for proxy in (self._add, self._remove, self._list, self._clear_anonymous):
             wait_for_service(proxy, timeout_s)
+
+    @property
+    def count(self) -> int:
+        """Number of grasps that were stored last."""
+        return len(self._names)
+
+    def left(self) -> int:
+        """Returns how many of them the manager still has.
+
+        Raises:
+            CallError: The manager does not answer.
+        """
+        there = call_service(self._list, ListMessagesRequest(), SERVICE_TIMEOUT_S)
+        return len(set(self._names) & set(there.names)) + min(self._names.count(""), there.anonymous)
 
     def replace(self, grasps: list[StandardisedGrasp], prefix: str) -> None:
         """Stores grasps and removes the earlier ones; anonymous ones of others go with them.

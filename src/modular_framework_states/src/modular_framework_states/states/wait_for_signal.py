@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any, Unpack
 
 import rospy
+import rosservice
 from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger, TriggerRequest
 
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
+from modular_framework_ros.calls import CallError, call_service
 
 REASON_WAIT_S = 0.5
 
@@ -21,6 +25,9 @@ class WaitForSignal(FrameworkState):
 
     The topic is listened to from the moment the state is made: the latest signal that was not read yet counts, however
     early it came. A component may explain a False by a text on ``<topic_name>/reason`` (std_msgs/String).
+
+    A latched signal may be left from an earlier task. A component that offers the service ``<topic_name>/renew``
+    (std_srvs/Trigger) makes it true again, or answers why it cannot; its answer counts instead of the signal.
 
     Args:
         topic_name: Topic of the signal (std_msgs/Bool).
@@ -54,6 +61,13 @@ class WaitForSignal(FrameworkState):
             )
         with self._lock:
             signal, self._signal = self._signal, None
+        try:
+            renew = rospy.resolve_name(f"{self._topic}/renew")
+            if rosservice.get_service_uri(renew) is not None:
+                answer = call_service(rospy.ServiceProxy(renew, Trigger), TriggerRequest(), self._timeout_s or math.inf)
+                signal, self._explanation = answer.success, answer.message
+        except (CallError, rosservice.ROSServiceException) as error:
+            return self.fail(str(error))
         if signal:
             return self.succeed()
         self.wait_until(lambda: bool(self._explanation), REASON_WAIT_S)
