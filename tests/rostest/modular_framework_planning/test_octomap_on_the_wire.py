@@ -291,6 +291,17 @@ def test_maps_are_saved_loaded_sent_and_published(camera: Camera, tmp_path: Path
     for name in (tmp_path / "no.bt", tmp_path / "missing.bt", tmp_path):
         assert not call("/move_group/load_map", LoadMap, str(name)).success
     assert not call("/move_group/save_map", SaveMap, "/no/such/folder/room.bt").success
+    (tmp_path / "notes.txt").write_text("x" * 1000)
+    (tmp_path / "link.bt").symlink_to(tmp_path / "notes.txt")
+    for name in ("notes.txt", "link.bt", "no.bt", ""):
+        assert not call("/move_group/save_map", SaveMap, str(tmp_path / name)).success
+    assert (tmp_path / "notes.txt").read_text() == "x" * 1000 and (tmp_path / "no.bt").read_text() == "no map"
+    assert call("/move_group/save_map", SaveMap, str(path)).success, "an octomap is overwritten"
+    clear()
+    saved = path.read_bytes()
+    assert not call("/move_group/save_map", SaveMap, str(path)).success, "there is no map"
+    assert path.read_bytes() == saved
+    assert call("/move_group/load_map", LoadMap, str(path)).success
     sent = call(
         "get_planning_scene", GetPlanningScene, PlanningSceneComponents(PlanningSceneComponents.OCTOMAP)
     ).scene.world

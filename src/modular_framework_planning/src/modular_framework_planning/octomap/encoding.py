@@ -164,7 +164,13 @@ def _expanded(resolution: float, starts: Keys, depths: NDArray[np.int64], values
 
 
 def write_file(path: Path, voxels: VoxelMap) -> None:
-    """Writes a .bt file atomically: an existing file stays as it was if that fails. Raises OSError."""
+    """Writes a .bt file atomically: an existing file stays as it was if that fails.
+
+    Raises:
+        OSError: it cannot be written, or is there already and is no octomap.
+    """
+    if path.exists() and not (path.is_file() and _first_line(path) in (BINARY_HEADER, FULL_HEADER)):
+        raise OSError("it is there already and is no octomap, which alone is overwritten; give the path of a new file")
     data, nodes = _binary_nodes(voxels)
     header = BINARY_HEADER + f"\nid {TREE_TYPE}\nsize {nodes}\nres {voxels.resolution!r}\ndata\n".encode()
     handle, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)
@@ -176,6 +182,11 @@ def write_file(path: Path, voxels: VoxelMap) -> None:
     except BaseException:
         os.unlink(name)
         raise
+
+
+def _first_line(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.readline(MAX_HEADER_BYTES).rstrip()
 
 
 def read_file(path: Path) -> VoxelMap:

@@ -43,7 +43,7 @@ class OctomapMonitor:
     Parameters: ~octomap_resolution (0.1 m), ~octomap_frame (planning frame), ~max_range (of clouds that name none),
     ~sensors (list, see perception/sensor_settings).
     Publishes: ~octomap_markers (MarkerArray).
-    Services: ~save_map (SaveMap), ~load_map (LoadMap): .bt files.
+    Services: ~save_map (SaveMap), ~load_map (LoadMap): .bt files; nothing but an octomap is overwritten.
     """
 
     def __init__(self, monitor: SceneMonitor) -> None:
@@ -196,8 +196,10 @@ class OctomapMonitor:
         return make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"transform of '{frame}'")
 
     def _save(self, request: Any) -> SaveMapResponse:
-        voxels = voxels_of(self._monitor.snapshot()) or empty_map(self._resolution)
+        voxels = voxels_of(self._monitor.snapshot())
         try:
+            if voxels is None:
+                raise OSError("the planning scene has no octomap; save one after a sensor has seen something")
             write_file(Path(request.filename), voxels)
         except OSError as error:
             rospy.logerr(
