@@ -106,6 +106,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         folder=end.folder,
     )
     measured = measure(end.spec.settings.get("metrics") or (), measurements)
+    invalid = end.status is EpisodeStatus.INVALID
     spans = (*_parts(end, wall_s), *states, *_components(end, recording))
     return EpisodeRecord(
         spec=end.spec,
@@ -115,7 +116,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         begun=end.begun,
         wall_s=wall_s,
         simulated_s=answer.get("simulated_s"),
-        metrics=measured.values,
+        metrics={name: None if invalid else value for name, value in measured.values.items()},
         spans=tuple(sorted(spans, key=lambda span: span.started_s)),
         snapshot=_snapshot(end, measured.faults),
         folder=str(end.folder),

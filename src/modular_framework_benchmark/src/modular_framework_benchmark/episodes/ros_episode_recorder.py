@@ -22,7 +22,6 @@ import rosgraph
 import rospy
 from controller_manager_msgs.srv import ListControllers
 from simulation_time_msgs.srv import AdvanceTime, AdvanceTimeRequest
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from modular_framework_benchmark.episodes.bag import NODE as BAG_NODE
@@ -31,7 +30,7 @@ from modular_framework_benchmark.episodes.errors import BagError, EpisodeAborted
 from modular_framework_benchmark.episodes.ros_recording import model_samples, write_parameters, write_recording
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
-from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, WorldError, spawn
+from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, FoulError, WorldError, judge, spawn
 from modular_framework_core.task_runner.ros_episode import GENERATE_SERVICE, EpisodeError, begin_episode
 from modular_framework_ros.calls import CallError, request_service, wait_until
 from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
@@ -90,13 +89,11 @@ class EpisodeRecorder:
         self._aborted = aborted
         self._samples = Samples()
         self._time = SimulatedTime()
-        self._ends: queue.Queue[dict[str, Any]] = queue.Queue()
 
     def connect(self) -> None:
         """Waits for the master and becomes a node on it."""
         self._wait(lambda: rosgraph.is_master_online() and _has_clock_parameter())
         rospy.init_node("episode_recorder", anonymous=True, disable_signals=True)
-        rospy.Subscriber("task_status", String, self._on_status)
 
     def run(self, request: EpisodeRequest) -> dict[str, Any]:
         """Runs an episode, and returns how the task ended and what became of the object."""
@@ -116,6 +113,8 @@ class EpisodeRecorder:
             except EpisodeAbortedError:
                 answer["aborted"] = True
                 self._stop_task()
+            except FoulError as error:
+                answer["foul"] = str(error)
             spawned = {entry["name"]: entry["model"] for entry in request.objects}
             answer |= write_recording(folder, self._samples, spawned, answer, turns)
         answer["parameters_digest"] = write_parameters(folder)
@@ -151,6 +150,7 @@ class EpisodeRecorder:
             answer["zero"] = self._now()
             for entry in request.objects:
                 spawn(entry)
+            answer["interventions"] = judge().number
 
         if self._time.enabled:
             begin_episode(spawn_all, SETTLE_S)
@@ -161,14 +161,14 @@ class EpisodeRecorder:
 
     def _run_task(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
         """Runs the task to its end."""
-        while not self._ends.empty():
-            self._ends.get_nowait()
+        self._samples.ends.clear()
+        answer["begin_poses"] = judge().poses
         answer["task_started_s"] = self._now() - answer["zero"]
         started, begin = request_service(START_SERVICE, Trigger, Trigger._request_class(), 30.0), time.monotonic()
         if not started.success:
             raise WorldError(f"the task did not start: {started.message}")
-        self._wait(lambda: not self._ends.empty())
-        end = self._ends.get_nowait()
+        self._wait(lambda: bool(self._samples.ends))
+        end = self._samples.ends[-1]
         answer |= {
             "outcome": end["outcome"],
             "reason": end["reason"],
@@ -183,7 +183,9 @@ class EpisodeRecorder:
         if request.target:
             self._time.sleep(request.hold_s)
         answer["checked_s"] = self._now() - answer["zero"]
-        answer["held"] = bool(request.target) and request.target in self._samples.held
+        judged, begin = judge(), answer.pop("begin_poses")
+        answer["held"] = bool(request.target) and request.target in judged.held
+        answer["lifted"] = {name: judged.poses[name][2] - begin[name][2] for name in begin if name in judged.poses}
         if request.shake_s > 0.0 and answer["held"]:
             try:
                 started_s = shake(self._samples, request.shake_s) - answer["zero"]
@@ -198,6 +200,7 @@ class EpisodeRecorder:
             lambda: samples.latest_s() >= latest_s and len(samples.models) >= models and samples.actions_ended(),
             SAMPLES_TIMEOUT_S,
         )
+        answer["foul"] = judge().foul(answer["interventions"]) or self._samples.foul()
         self._reached(request, answer, "checked")
 
     def _now(self) -> float:
@@ -213,7 +216,7 @@ class EpisodeRecorder:
             request_service(STOP_SERVICE, Trigger, Trigger._request_class(), STOP_TIMEOUT_S)
         except CallError:
             return
-        wait_until(lambda: not self._ends.empty(), STOP_TIMEOUT_S)
+        wait_until(lambda: bool(self._samples.ends), STOP_TIMEOUT_S)
 
     def _wait_for_stack(self, request: EpisodeRequest) -> None:
         """Waits until the task can start: its node, the simulation, the controllers and the method are up."""
@@ -226,11 +229,6 @@ class EpisodeRecorder:
             # a method offers the service soon after, or it has none
             until = time.monotonic() + GENERATION_SERVICE_S
             self._wait(lambda: rospy.resolve_name(GENERATE_SERVICE) in _services() or time.monotonic() > until)
-
-    def _on_status(self, message: String) -> None:
-        status = json.loads(message.data)
-        if status["event"] == "task_end":
-            self._ends.put(status)
 
     def _wait(self, condition: Callable[[], bool]) -> None:
         while not condition():

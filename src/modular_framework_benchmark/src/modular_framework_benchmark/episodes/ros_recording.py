@@ -37,13 +37,13 @@ def write_recording(
         folder: Where to write them.
         samples: What was collected.
         spawned: The models of the objects that were put into the world, by name.
-        answer: `zero`: ROS time at which the recording begins [s]; `task_started_s`, `checked_s`,
-            `simulated_s`: when the task was started, success was checked, everything had ended [s since then].
+        answer: `zero`: ROS time at which the recording begins [s]; `checked_s`, `simulated_s`: when success was checked
+            and when everything had ended [s since then].
         turns: How often joint states are published while simulated time passes [1/s]; None: all count, see
             `joint_states_in_turn`.
 
     Returns:
-        `final`: pose of each object then; `lifted`: how much higher each of `spawned` was than when the task started;
+        `final`: pose of each object when success was checked;
         `recording_fault`: what is missing in the recording, "" for nothing.
     """
     zero, end_s = float(answer["zero"]), float(answer.get("simulated_s", np.inf))
@@ -61,11 +61,9 @@ def write_recording(
     (folder / RECORDING).write_text(json.dumps(content))
     checked_s = float(answer.get("checked_s", np.inf))
     final = {name: _at(rows, checked_s) for name, rows in poses.items() if len(rows)}
-    started_s = float(answer.get("task_started_s", 0.0))
-    lifted = {name: final[name][2] - _at(poses[name], started_s)[2] for name in spawned if name in final}
     missing = 0 if turns is None else missing_turns(trajectory["time_s"].to_numpy() + zero, turns)
     fault = f"{missing} joint states of {len(trajectory) + missing} did not arrive" if missing else ""
-    return {"final": final, "lifted": lifted, "recording_fault": fault}
+    return {"final": final, "recording_fault": fault}
 
 
 def write_parameters(folder: Path) -> str:

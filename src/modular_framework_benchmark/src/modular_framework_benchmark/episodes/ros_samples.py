@@ -19,10 +19,15 @@ from moveit_msgs.msg import DisplayTrajectory
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from modular_framework_benchmark.episodes.ros_world import SIMULATION_NODE, TASK_NODE
+
 ACTIONS = {"moveit_msgs/ExecuteTrajectoryActionGoal": "execution", "modular_framework_core/GraspActionGoal": "grasp"}
 """Component that an action belongs to, by the type of its goal."""
 
 CONTROLLER_STATE = "control_msgs/JointTrajectoryControllerState"
+PLANNING_NODE = "/move_group"
+MODELS, GRASPED, TASK_STATUS = "/gazebo/model_states", "/gazebo/grasped_object", "task_status"
+REPORTS, PATHS = "/move_group/planning_report", "/move_group/display_planned_path"
 SUCCEEDED = 3
 """Number of actionlib_msgs/GoalStatus."""
 
@@ -30,8 +35,9 @@ SUCCEEDED = 3
 class Samples:
     """Messages of an episode, each with the real and the simulated time at which it came.
 
-    Subscribers: ``joint_states``, ``/gazebo/model_states``, ``/gazebo/grasped_object``, ``component_reports``,
-    ``/move_group/planning_report``, ``/move_group/display_planned_path``, the states of all trajectory controllers,
+    Subscribers: ``joint_states``, ``/gazebo/model_states``, ``/gazebo/grasped_object``, ``task_status``,
+    ``component_reports``, ``/move_group/planning_report``, ``/move_group/display_planned_path``, the states of all
+    trajectory controllers,
     goals and results of the actions in `ACTIONS`.
 
     Attributes:
@@ -41,6 +47,8 @@ class Samples:
         planning: (real time [s], report of move_group).
         paths: Motions that move_group shows.
         components: (real time [s], report of a component).
+        ends: What the task's node says of the ends of tasks.
+        forgeries: Topic and sender of the messages that came from another node than the topic's own; these are dropped.
     """
 
     def __init__(self) -> None:
@@ -49,28 +57,21 @@ class Samples:
         self._subscribers: dict[str, Any] = {}
         self._goals: dict[str, dict[str, Any]] = {}
         self._results: dict[str, dict[str, Any]] = {}
-        self._last_grasped = ""
         self.clear()
 
     def clear(self) -> None:
-        """Forgets what was collected; what is held stays known."""
+        """Forgets what was collected."""
         with self._lock:
             self.joints: list[Any] = []
             self.models: list[tuple[float, Any]] = []
-            self.grasped: list[tuple[float, str]] = (
-                [(rospy.get_time(), self._last_grasped)] if self._subscribers else []
-            )
+            self.ends: list[dict[str, Any]] = []
+            self.forgeries: set[tuple[str, str]] = set()
             self.controllers: list[tuple[str, Any]] = []
             self.planning: list[tuple[float, dict[str, Any]]] = []
             self.paths: list[Any] = []
             self.components: list[tuple[float, dict[str, Any]]] = []
             self._goals.clear()
             self._results.clear()
-
-    @property
-    def held(self) -> frozenset[str]:
-        """Names of the objects that grippers hold now."""
-        return frozenset(self._last_grasped.split(",")) - {""}
 
     def actions(self) -> list[dict[str, Any]]:
         """Returns the goals that ended, in this order, with `component`, `goal`, begin and end, `succeeded`, `reason`.
@@ -93,25 +94,43 @@ class Samples:
 
     def connect(self) -> None:
         """Subscribes to everything that is there now; may be called again."""
-        for topic, kind, callback in (
-            ("joint_states", JointState, lambda message: self.joints.append(message)),
-            ("/gazebo/model_states", ModelStates, lambda message: self.models.append((rospy.get_time(), message))),
-            ("/gazebo/grasped_object", String, self._on_grasped),
-            ("component_reports", String, lambda message: self.components.append(_report(message))),
-            ("/move_group/planning_report", String, lambda message: self.planning.append(_report(message))),
-            ("/move_group/display_planned_path", DisplayTrajectory, lambda message: self.paths.append(message)),
+        for topic, kind, owner, callback in (
+            ("joint_states", JointState, SIMULATION_NODE, lambda message: self.joints.append(message)),
+            (MODELS, ModelStates, SIMULATION_NODE, lambda message: self.models.append((rospy.get_time(), message))),
+            (GRASPED, String, SIMULATION_NODE, lambda _: None),  # read from the world; watched for others who publish it
+            (TASK_STATUS, String, TASK_NODE, self._on_status),
+            ("component_reports", String, "", lambda message: self.components.append(_report(message))),
+            (REPORTS, String, PLANNING_NODE, lambda message: self.planning.append(_report(message))),
+            (PATHS, DisplayTrajectory, PLANNING_NODE, lambda message: self.paths.append(message)),
         ):
-            self._subscribe(topic, kind, callback)
+            self._subscribe(topic, kind, callback, owner)
         for topic, type_name in rosgraph.Master(rospy.get_name()).getTopicTypes():
             if type_name == CONTROLLER_STATE:
                 name = topic.strip("/").rpartition("/")[0]
-                self._subscribe(topic, JointTrajectoryControllerState, self._controller(name))
+                self._subscribe(topic, JointTrajectoryControllerState, self._controller(name), SIMULATION_NODE)
             elif type_name in ACTIONS:
                 self._subscribe_action(topic, type_name)
 
-    def _subscribe(self, topic: str, kind: Any, callback: Callable[[Any], None]) -> None:
+    def _subscribe(self, topic: str, kind: Any, callback: Callable[[Any], None], owner: str = "") -> None:
+        """Subscribes to a topic; with an owner, messages of other nodes are dropped, and their senders noted."""
+
+        def receive(message: Any) -> None:
+            sender = message._connection_header["callerid"]
+            if owner in ("", sender):
+                callback(message)
+            else:
+                self.forgeries.add((topic, sender))
+
         if topic not in self._subscribers:
-            self._subscribers[topic] = rospy.Subscriber(topic, kind, callback, tcp_nodelay=True)
+            self._subscribers[topic] = rospy.Subscriber(topic, kind, receive, tcp_nodelay=True)
+
+    def foul(self) -> str:
+        """Returns who publishes what the world and the task's node publish themselves; "" for nobody."""
+        return "; ".join(
+            f"'{sender}', as it calls itself, publishes {topic}"
+            for topic, sender in sorted(self.forgeries)
+            if topic in (MODELS, GRASPED, TASK_STATUS)
+        )
 
     def _controller(self, name: str) -> Callable[[Any], None]:
         return lambda message: self.controllers.append((name, message))
@@ -123,8 +142,10 @@ class Samples:
         self._subscribe(topic, goal, lambda message: self.add_goal(component, message))
         self._subscribe(f"{name}/result", result, self.add_result)
 
-    def _on_grasped(self, message: String) -> None:
-        self._last_grasped = message.data
+    def _on_status(self, message: String) -> None:
+        status = json.loads(message.data)
+        if status["event"] == "task_end":
+            self.ends.append(status)
 
     def add_goal(self, component: str, message: Any) -> None:
         """Adds the goal of an action that belongs to a component."""

@@ -112,6 +112,8 @@ class TaskEpisodeRunner:
             return end.ended(EpisodeStatus.TIMED_OUT, cause, answer)
         if "fault" in answer:
             return end.broken(stack.cause_of(str(answer["fault"])))
+        if answer.get("foul"):
+            return end.ended(EpisodeStatus.INVALID, str(answer["foul"]), answer)
         cause = _failure(settings, answer)
         return end.ended(EpisodeStatus.FAILED if cause else EpisodeStatus.SUCCEEDED, cause, answer)
 

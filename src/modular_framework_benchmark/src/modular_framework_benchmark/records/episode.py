@@ -42,6 +42,7 @@ class EpisodeStatus(Enum):
     FAILED = "failed"  # it ran to its end, without success
     TIMED_OUT = "timed_out"  # it did not end within its time limit
     BROKEN = "broken"  # the launch died or the measurement failed: says nothing of the method by itself
+    INVALID = "invalid"  # what it was judged by was changed from outside: counts as a failure without any figure
 
 
 @dataclass(frozen=True, slots=True)

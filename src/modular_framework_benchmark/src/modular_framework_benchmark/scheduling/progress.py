@@ -18,6 +18,7 @@ STATUS_WORDS = {
     EpisodeStatus.FAILED: "failed",
     EpisodeStatus.TIMED_OUT: "timed out",
     EpisodeStatus.BROKEN: "broken",
+    EpisodeStatus.INVALID: "invalid",
 }
 
 
@@ -45,8 +46,8 @@ class Progress:
     def add(self, record: EpisodeRecord) -> None:
         """Counts an episode that has ended; tells what is broken at once."""
         self._counts[record.status] += 1
-        if record.status is EpisodeStatus.BROKEN:
-            self._line(f"episode {record.spec.number} ({record.spec.key}) is broken: {record.cause}")
+        if record.status in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID):
+            self._line(f"episode {record.spec.number} ({record.spec.key}) is {STATUS_WORDS[record.status]}: {record.cause}")
         self.show()
 
     def show(self, *, now: bool = False) -> None:

@@ -191,7 +191,7 @@ class EpisodeTable:
         return EpisodeCounts(
             episodes=len(statuses),
             succeeded=ended(EpisodeStatus.SUCCEEDED),
-            failed=ended(EpisodeStatus.FAILED),
+            failed=ended(EpisodeStatus.FAILED) + ended(EpisodeStatus.INVALID),
             timed_out=ended(EpisodeStatus.TIMED_OUT),
             broken=ended(EpisodeStatus.BROKEN),
             counted=len(seen.values) - missing,

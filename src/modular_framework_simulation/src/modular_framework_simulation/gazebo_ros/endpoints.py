@@ -13,6 +13,7 @@ from typing import Any
 import rospy
 
 from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.gazebo_ros import ros_names
 from modular_framework_simulation.loop.simulation_loop import SimulationLoop
 
 _ANSWER_TIMEOUT_S = 30.0
@@ -46,7 +47,9 @@ class Endpoints:
 
         def handle(request: Any) -> Any:
             try:
-                return work(request)
+                answer = work(request)
+                self._note(name, request)
+                return answer
             except Exception as error:  # any request must get an answer and must not end the node
                 return kind._response_class(success=False, status_message=f"{name}: {_reason(name, error)}")
 
@@ -58,6 +61,7 @@ class Endpoints:
         def handle(request: Any) -> Any:
             try:
                 self.in_loop(name, lambda: work(request))
+                self._note(name, request)
             except Exception as error:  # any request must get an answer and must not end the node
                 raise rospy.ServiceException(f"{name}: {_reason(name, error)}") from None
             return kind._response_class()
@@ -71,12 +75,18 @@ class Endpoints:
             def attempt() -> None:
                 try:
                     work(message)
+                    self._note(topic, message)
                 except Exception as error:  # no message may end the loop
                     _reason(f"{topic} (topic)", error)
 
             self._loop.requests.post(attempt)
 
         self._opened.append(rospy.Subscriber(topic, kind, handle, queue_size=_TOPIC_QUEUE_SIZE))
+
+    def _note(self, name: str, message: Any) -> None:
+        """Notes a request or message that changed the world."""
+        if ros_names.READING not in name:
+            self._loop.referee.note(name, caller_of(message))
 
     def close(self) -> None:
         """Closes everything; may be called twice."""
@@ -86,6 +96,11 @@ class Endpoints:
                 endpoint.shutdown("the simulation ends")
             else:
                 endpoint.unregister()
+
+
+def caller_of(message: Any) -> str:
+    """Returns the name that the sender of a request or message gave; ROS 1 does not verify it."""
+    return str((getattr(message, "_connection_header", None) or {}).get("callerid", ""))
 
 
 def _reason(name: str, error: Exception) -> str:

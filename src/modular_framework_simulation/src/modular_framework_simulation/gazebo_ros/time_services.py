@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services with which nodes hold simulated time, let it pass, and begin again with the world as at the start."""
+"""Services with which nodes hold simulated time, let it pass, begin the world again, and judge what became of it."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 import rospy
@@ -14,6 +15,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
+from modular_framework_simulation.gazebo_ros.endpoints import caller_of
 from modular_framework_simulation.gazebo_ros.planning_scene import PlanningScenePublisher
 from modular_framework_simulation.gazebo_ros.world_topics import stamp_of
 from modular_framework_simulation.loop.simulation_loop import Hook, SimulationLoop
@@ -31,7 +33,7 @@ _SLOWEST_FACTOR = 0.02
 
 
 class TimeServices:
-    """Advertises and answers /gazebo/{hold,advance,step}_time, /gazebo/restart and /gazebo/state_digest.
+    """Advertises and answers /gazebo/{hold,advance,step}_time, /gazebo/{restart,referee,state_digest}.
 
     Args:
         loop: The simulation loop.
@@ -64,6 +66,7 @@ class TimeServices:
             (ros_names.ADVANCE_TIME, AdvanceTime, self._on_advance),
             (ros_names.STEP_TIME, AdvanceTime, self._on_step),
             (ros_names.RESTART, Trigger, self._on_restart),
+            (ros_names.REFEREE, Trigger, self._on_referee),
         ):
             self._services.append(rospy.Service(name, kind, answer))
         if self._digest is not None:
@@ -154,14 +157,32 @@ class TimeServices:
         is_news = held and not self._scene.is_up_to_date(world.time_ns, world.revision)
         return stamp_of(self._loop.world), held, self._take_snapshot() if is_news else None
 
-    def _on_restart(self, _request: Any) -> TriggerResponse:
+    def _on_restart(self, request: Any) -> TriggerResponse:
         try:
             self._in_loop(ros_names.RESTART, self._loop.restart)
+            self._loop.referee.note(ros_names.RESTART, caller_of(request))
             self._after_restart()
         except SimulationError as error:
             rospy.logerr("%s: %s", ros_names.RESTART, error)
             return TriggerResponse(success=False, message=str(error))
         return TriggerResponse(success=True, message="the world is as at the start")
+
+    def _on_referee(self, _request: Any) -> TriggerResponse:
+        """Answers with the held objects, the poses of all models (xyz [m], xyzw) and the interventions, as JSON."""
+        world = self._loop.world
+
+        def look() -> dict[str, Any]:
+            poses = {name: world.body(name).state().pose for name in world.names()}
+            return {
+                "held": sorted({held.model for held in self._loop.held_objects()}),
+                "poses": {name: (*pose.position, *pose.quaternion) for name, pose in poses.items()},
+                "interventions": [asdict(each) for each in self._loop.referee.interventions],
+            }
+
+        try:
+            return TriggerResponse(success=True, message=json.dumps(self._in_loop(ros_names.REFEREE, look)))
+        except SimulationError as error:
+            return TriggerResponse(success=False, message=str(error))
 
     def _on_digest(self, _request: Any) -> TriggerResponse:
         digest = self._digest

@@ -11,6 +11,7 @@ from typing import Protocol
 
 from modular_framework_simulation.loop.grasp_watch import GraspWatch
 from modular_framework_simulation.loop.pacing import Pacer
+from modular_framework_simulation.loop.referee import Referee
 from modular_framework_simulation.loop.request_queue import RequestQueue
 from modular_framework_simulation.loop.snapshots import HeldObject
 from modular_framework_simulation.loop.time_holds import TimeHolds
@@ -87,6 +88,7 @@ class SimulationLoop:
         self.world = world
         self.pacer = pacer
         self.requests = requests
+        self.referee = Referee(world)
         self._actors = actors
         self.grasp_watches = tuple(GraspWatch() for _ in actors.robot.grippers) if actors is not None else ()
         self._hooks: list[Hook] = []
@@ -266,7 +268,8 @@ class SimulationLoop:
                 hook.action()
 
     def watch_grasps(self) -> None:
-        """Passes the contacts of the fingers to the grasp watch of their gripper; a hook."""
+        """Passes the contacts of the fingers to the grasp watch of their gripper, and lets the referee look; a hook."""
+        self.referee.look()
         if self._actors is None:
             return
         robot = self._actors.robot
