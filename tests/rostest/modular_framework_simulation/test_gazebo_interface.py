@@ -8,6 +8,7 @@ variable WRITE_GAZEBO_INTERFACE=1 it writes the page.
 from __future__ import annotations
 
 import functools
+import json
 import math
 import os
 import time
@@ -29,9 +30,10 @@ from ros_session import until as wait_until
 from roscpp.srv import GetLoggers, SetLoggerLevel
 from rosgraph_msgs.msg import Clock, Log
 from std_msgs.msg import ColorRGBA
-from std_srvs.srv import Empty
+from std_srvs.srv import Empty, Trigger
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "gazebo_interface.md"
+CHANGING = ("spawn_", "set_", "delete_", "apply_", "clear_", "pause_", "unpause_", "reset_")
 NAN, UPRIGHT = math.nan, Quaternion(0, 0, 0, 1)
 MASS = "<inertial><mass>{}</mass><inertia><ixx>.01</ixx><iyy>.01</iyy><izz>.01</izz></inertia></inertial>"
 SHAPE = "<collision name='shape'><geometry><box><size>.1 .1 .1</size></box></geometry></collision>"
@@ -651,9 +653,20 @@ def set_link_state_topic() -> str:
 # ---- the tests ----
 
 
+def interventions() -> list[dict[str, Any]]:
+    """Returns what the referee noted: who changed the world by what."""
+    return list(json.loads(call("referee", Trigger).message)["interventions"])
+
+
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_service_does_what_it_is_for(name: str) -> None:
+def test_a_service_does_what_it_is_for_and_the_referee_names_who_changed_the_world(name: str) -> None:
+    before = interventions()[-1]["number"]
     SEEN["service", name, "good"] = SERVICES[name].good()
+    callers = [
+        item["caller"] for item in interventions() if item["number"] > before and item["what"] == f"/gazebo/{name}"
+    ]
+    changes = name.startswith(CHANGING) and not name.endswith(("logger_level", "light_properties", "light"))
+    assert set(callers) == ({rospy.get_name()} if changes else set())
 
 
 @pytest.mark.parametrize("name", SERVICES)
@@ -712,7 +725,7 @@ def test_no_number_and_no_name_does_harm(simulation: Any, number: float, text: s
 def test_the_node_has_everything_of_gazebo_ros_and_the_table_leaves_nothing_out(simulation: Any) -> None:
     published, subscribed, services = rosgraph.Master("/test").getSystemState()
     own = {name for name, nodes in services if "/gazebo" in nodes}
-    additions = {"hold_time", "advance_time", "step_time", "restart"}
+    additions = {"hold_time", "advance_time", "step_time", "restart", "referee"}
     assert own == {f"/gazebo/{name}" for name in (*SERVICES, *additions)}
     topics = {name for name, nodes in (*published, *subscribed) if "/gazebo" in nodes and name.startswith("/gazebo/")}
     own_topics = ("grasped_object", "visible_models", "visible_poses")

@@ -37,7 +37,7 @@ def test_the_counts_and_the_time_left_are_those_of_this_run(tmp_path: Path) -> N
         clock.time_s += 10.0
         progress.add(fake_runners.record_of(specs[number], status))
     assert progress.text() == (
-        "20 of 48 episodes (8 before): 4 succeeded, 4 failed, 4 timed out, 0 broken; about 0:04:40 left"
+        "20 of 48 episodes (8 before): 4 succeeded, 4 failed, 4 timed out, 0 broken, 0 invalid; about 0:04:40 left"
     )
     lines = stream.getvalue().splitlines()
     assert len(lines) == 6, "a line now and then, not one for each episode"

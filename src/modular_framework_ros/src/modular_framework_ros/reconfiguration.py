@@ -35,7 +35,17 @@ class Adjustable:
 
 
 class _Server(Server):
-    """A server that refuses values that are not finite: public servers take NaN, and the bound instead of infinity."""
+    """A server that refuses values that are not finite: public servers take NaN, and the bound instead of infinity.
+
+    Attributes:
+        caller: Name that the node gave whose request is carried out, or was the last.
+    """
+
+    caller = ""
+
+    def _set_callback(self, req: Any) -> Any:
+        self.caller = str(req._connection_header.get("callerid", ""))
+        return super()._set_callback(req)
 
     def _clamp(self, config: Any) -> None:
         for name, present in self.type.defaults.items():
@@ -70,6 +80,11 @@ class Reconfiguration:
         self._namespace, self._table = namespace, tuple(table)
         self._holder, self._attribute = holder, attribute
         self._server: _Server | None = None
+
+    @property
+    def caller(self) -> str:
+        """Name that the node gave whose request is carried out, or was the last; "" for none."""
+        return self._server.caller if self._server is not None else ""
 
     def connect(self) -> None:
         """Start to serve."""

@@ -97,7 +97,7 @@ class Samples:
         for topic, kind, owner, callback in (
             ("joint_states", JointState, SIMULATION_NODE, lambda message: self.joints.append(message)),
             (MODELS, ModelStates, SIMULATION_NODE, lambda message: self.models.append((rospy.get_time(), message))),
-            (GRASPED, String, SIMULATION_NODE, lambda _: None),  # read from the world; watched for others who publish it
+            (GRASPED, String, SIMULATION_NODE, lambda _: None),  # only to see who else publishes it
             (TASK_STATUS, String, TASK_NODE, self._on_status),
             ("component_reports", String, "", lambda message: self.components.append(_report(message))),
             (REPORTS, String, PLANNING_NODE, lambda message: self.planning.append(_report(message))),

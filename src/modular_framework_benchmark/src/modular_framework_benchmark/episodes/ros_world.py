@@ -73,7 +73,7 @@ class Judgement:
             return ""
         first = foreign[0]
         caller = f" by '{first['caller']}', as it calls itself" if first["caller"] else ""
-        more = f", and {len(foreign) - 1} times more" if len(foreign) > 1 else ""
+        more = f", and {len(foreign) - 1} more" if len(foreign) > 1 else ""
         return f"the world was changed beside its physics{caller}: {first['what']} at {first['time_s']:.3f} s{more}"
 
 

@@ -47,7 +47,9 @@ class Progress:
         """Counts an episode that has ended; tells what is broken at once."""
         self._counts[record.status] += 1
         if record.status in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID):
-            self._line(f"episode {record.spec.number} ({record.spec.key}) is {STATUS_WORDS[record.status]}: {record.cause}")
+            self._line(
+                f"episode {record.spec.number} ({record.spec.key}) is {STATUS_WORDS[record.status]}: {record.cause}"
+            )
         self.show()
 
     def show(self, *, now: bool = False) -> None:

@@ -68,7 +68,7 @@ class PhysicsServices:
     def values(self, values: PhysicsValues) -> None:
         try:
             self._endpoints.in_loop(ros_names.SET_PARAMETERS, lambda: self._physics.apply(values))
-            self._loop.referee.note(ros_names.SET_PARAMETERS, "")
+            self._loop.referee.note(ros_names.SET_PARAMETERS, self._reconfiguration.caller)
         except ValueError as error:
             raise rospy.ServiceException(f"{ros_names.SET_PARAMETERS}: {error}") from None
 

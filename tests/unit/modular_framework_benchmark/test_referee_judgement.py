@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An episode is invalid when others than the task change its world, or publish what the world publishes itself."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import rospy
+
+from modular_framework_benchmark.episodes import ros_samples
+from modular_framework_benchmark.episodes.ros_samples import GRASPED, REPORTS, TASK_STATUS, Samples
+from modular_framework_benchmark.episodes.ros_world import Judgement
+
+RESTART = {"number": 4, "time_s": 0.01, "what": "/gazebo/restart", "caller": "/episode_recorder"}
+RESET = {"number": 5, "time_s": 1.0, "what": "/gazebo/reset_world", "caller": "/task"}
+PUT = {"number": 6, "time_s": 2.5, "what": "/gazebo/set_model_state", "caller": "/method"}
+JUMP = {"number": 7, "time_s": 3.0, "what": "a jump of 'cube' by 0.500 m", "caller": ""}
+
+
+@pytest.mark.parametrize(
+    ("interventions", "foul"),
+    [
+        ([RESTART], ""),
+        ([RESTART, RESET], ""),
+        (
+            [RESTART, PUT],
+            "the world was changed beside its physics by '/method', as it calls itself: /gazebo/set_model_state at "
+            "2.500 s",
+        ),
+        ([RESTART, JUMP], "the world was changed beside its physics: a jump of 'cube' by 0.500 m at 3.000 s"),
+        (
+            [RESTART, JUMP, PUT],
+            "the world was changed beside its physics: a jump of 'cube' by 0.500 m at 3.000 s, and 1 more",
+        ),
+    ],
+)
+def test_changes_since_the_objects_were_placed_are_foul_unless_the_task_made_them(
+    interventions: list[dict[str, Any]], foul: str
+) -> None:
+    assert Judgement((), {}, interventions).foul(since=4) == foul
+
+
+def test_the_latest_intervention_is_where_the_episode_begins() -> None:
+    assert Judgement((), {}, []).number == 0
+    assert Judgement((), {}, [RESTART, PUT]).number == 6
+
+
+class WireFake:
+    """Receives for a topic what a test sends, as rospy does."""
+
+    callbacks: dict[str, Any] = {}
+
+    def __init__(self, topic: str, _kind: Any, callback: Any, **_options: Any) -> None:
+        self.callbacks[topic] = callback
+
+    @classmethod
+    def send(cls, topic: str, sender: str, text: str) -> None:
+        """Delivers a message with the name of its sender."""
+        header = {"_connection_header": {"callerid": sender}}
+        cls.callbacks[topic](SimpleNamespace(data=text, **header))
+
+
+class MasterFake:
+    """A master without further topics."""
+
+    def __init__(self, _name: str) -> None: ...
+
+    def getTopicTypes(self) -> list[list[str]]:  # noqa: N802  # a name of ROS
+        """Returns none."""
+        return []
+
+
+def test_messages_of_another_node_than_the_topics_own_are_dropped_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rospy, "Subscriber", WireFake)
+    monkeypatch.setattr(ros_samples.rosgraph, "Master", MasterFake)
+    samples = Samples()
+    samples.connect()
+    WireFake.send(GRASPED, "/gazebo", "cube")
+    WireFake.send(REPORTS, "/move_group", '{"kind": "plan"}')
+    WireFake.send(TASK_STATUS, "/task", '{"event": "task_end", "succeeded": false}')
+    assert samples.foul() == ""
+
+    WireFake.send(REPORTS, "/viewer", '{"kind": "plan"}')  # of no consequence, and not counted either
+    assert samples.foul() == "" and len(samples.planning) == 1
+    WireFake.send(GRASPED, "/method", "cube")
+    WireFake.send(TASK_STATUS, "/method", '{"event": "task_end", "succeeded": true}')
+    assert samples.foul() == (
+        "'/method', as it calls itself, publishes /gazebo/grasped_object; "
+        "'/method', as it calls itself, publishes task_status"
+    )
+    assert [end["succeeded"] for end in samples.ends] == [False]
+    samples.clear()
+    assert samples.foul() == "" and samples.ends == []
