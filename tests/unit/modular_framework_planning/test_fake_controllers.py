@@ -16,7 +16,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.execution_messages import MotionPart
-from modular_framework_planning.move_group.controllers.fake_controllers import FakeMotion, initial_positions
+from modular_framework_planning.move_group.controllers.fake_controllers import (
+    FakeControllers,
+    FakeMotion,
+    initial_positions,
+)
 from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, ControllerSpec
 
 SPEC = SimpleNamespace(group_states={"arm": {"ready": {"a": 1.0, "b": 2.0, "gone": 3.0, "drive/x": 4.0}}, "hand": {}})
@@ -122,3 +126,42 @@ def test_the_robot_starts_in_named_poses_of_its_groups() -> None:
     )
     assert positions == {"a": 1.0, "b": 2.0}, "the base that moves is no part of joint_states"
     assert len(faults) == 2 and "group 'hand' has no pose 'open' in the SRDF; it has none" in faults[0]
+
+
+class LateEcho(Echo):
+    """Shows the initial positions only after they were asked for a few times, as joint_state_publisher does."""
+
+    late = 5
+
+    def positions(self) -> Any:
+        self.late -= 1
+        self._passes_on = self.late <= 0
+        return super().positions()
+
+
+def connect(echo: Echo, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Connects fake controllers with initial positions; returns their warnings."""
+    warnings: list[str] = []
+    monkeypatch.setattr(rospy, "get_param", lambda name, default: default if "rate" in name else [READY])
+    monkeypatch.setattr(rospy, "Publisher", lambda *_, **__: echo)
+    monkeypatch.setattr(rospy, "logwarn", lambda text, *values: warnings.append(text % values))
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    FakeControllers((), echo).connect()  # type: ignore[arg-type]
+    return warnings
+
+
+READY = {"group": "arm", "pose": "ready"}
+
+
+def test_the_controllers_are_connected_when_the_robot_stands_at_the_initial_positions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    echo = LateEcho()
+    assert connect(echo, monkeypatch) == []
+    assert list(echo.positions()[:2]) == [1.0, 2.0]
+
+
+def test_initial_positions_that_nobody_shows_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("modular_framework_planning.move_group.controllers.fake_controllers.SEEN_TIMEOUT_S", 0.1)
+    (warning,) = connect(Echo(passes_on=False), monkeypatch)
+    assert "joint_states does not show where the initial positions put a, b" in warning and "source_list" in warning

@@ -20,6 +20,7 @@ from modular_framework_planning.move_group.controllers.action_controllers import
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_execution.controllers import ControllerSpec
+from modular_framework_ros.calls import wait_until
 from modular_framework_ros.publishing import publish
 
 DEFAULT_RATE = 10.0
@@ -70,7 +71,7 @@ class FakeControllers:
         self._publisher: Any = None
 
     def connect(self) -> None:
-        """Publishes the initial positions."""
+        """Publishes the initial positions and waits until they have come back: until then the robot seems elsewhere."""
         self._publisher = rospy.Publisher(names.FAKE_JOINT_STATES_TOPIC, JointState, queue_size=100, latch=True)
         positions, faults = initial_positions(self._monitor.model, rospy.get_param("~initial", []))
         for fault in faults:
@@ -79,6 +80,8 @@ class FakeControllers:
             message = JointState(name=list(positions), position=list(positions.values()))
             message.header.stamp = rospy.Time.now()
             self._publisher.publish(message)
+            if not wait_until(lambda: not elsewhere(self._monitor, positions), SEEN_TIMEOUT_S):
+                rospy.logwarn("%s", _not_seen("the initial positions put", elsewhere(self._monitor, positions)))
 
     def describe(self) -> str:
         """Says how many there are."""
@@ -147,18 +150,10 @@ class FakeMotion:
         if not self._published_s:
             return False
         wanted = dict(zip(self._part.trajectory.joint_names, self._part.trajectory.points[-1].positions, strict=True))
-        now, index = self._monitor.positions(), self._monitor.model.index
-        away = [
-            name for name, value in wanted.items() if name in index and abs(now[index[name]] - value) > SEEN_TOLERANCE
-        ]
+        away = elsewhere(self._monitor, wanted)
         if away and time.monotonic() - self._published_s > SEEN_TIMEOUT_S:
-            raise PlanningError(
-                ErrorCode.CONTROL_FAILED,
-                f"{rospy.resolve_name(names.JOINT_STATES_TOPIC)} does not "
-                f"show where fake controller '{self._part.controller.name}' put {', '.join(away)} "
-                f"{SEEN_TIMEOUT_S:.0f} s ago; let joint_state_publisher run with "
-                f"{rospy.resolve_name(names.FAKE_JOINT_STATES_TOPIC)} in its source_list",
-            )
+            name = self._part.controller.name
+            raise PlanningError(ErrorCode.CONTROL_FAILED, _not_seen(f"fake controller '{name}' put", away))
         return not away
 
     def has_begun(self) -> bool:
@@ -169,6 +164,20 @@ class FakeMotion:
         """Stops at the present positions."""
         self._stopped.set()
         self._thread.join(1.0)
+
+
+def elsewhere(monitor: SceneMonitor, wanted: Mapping[str, float]) -> list[str]:
+    """Returns the joints that joint_states does not show at their wanted positions [rad or m]."""
+    now, index = monitor.positions(), monitor.model.index
+    return [name for name, value in wanted.items() if name in index and abs(now[index[name]] - value) > SEEN_TOLERANCE]
+
+
+def _not_seen(who_put: str, joints: Sequence[str]) -> str:
+    return (
+        f"{rospy.resolve_name(names.JOINT_STATES_TOPIC)} does not show where {who_put} {', '.join(joints)} "
+        f"{SEEN_TIMEOUT_S:.0f} s ago; let joint_state_publisher run with "
+        f"{rospy.resolve_name(names.FAKE_JOINT_STATES_TOPIC)} in its source_list"
+    )
 
 
 def positions_at(motion: JointTrajectory, elapsed_s: float) -> list[float]:
