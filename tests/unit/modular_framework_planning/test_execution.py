@@ -270,6 +270,44 @@ def test_a_motion_that_takes_too_long_is_stopped(clock: Any, settings: Any, spec
     assert controllers.cancelled == ["arm"]
 
 
+def test_a_motion_whose_end_came_while_the_process_stood_still_has_not_taken_too_long(clock: Any) -> None:
+    controllers = RecordedControllers(ARM)
+    controllers.answers["arm"] = False
+
+    class Stall(threading.Event):
+        """Stands still in the first wait; the end of the motion is known only some polls later."""
+
+        polls = 0
+
+        def wait(self, timeout: float | None = None) -> bool:
+            self.polls += 1
+            if self.polls == 1:
+                time.sleep(0.4)
+                clock(rospy.Time(110))
+            controllers.answers["arm"] = self.polls > 5
+            return super().wait(timeout)
+
+    executor(controllers).execute(motion("elbow", (0.0, [0.3]), (1.0, [0.5])), Stall())
+    assert controllers.cancelled == []
+
+
+def test_a_motion_of_a_fake_controller_ends_when_joint_states_shows_it_however_late(clock: Any) -> None:
+    controllers = RecordedControllers(replace(ARM, kind="interpolate"))
+    controllers.answers["arm"] = False
+
+    class Late(threading.Event):
+        polls = 0
+
+        def wait(self, timeout: float | None = None) -> bool:
+            self.polls += 1
+            clock(rospy.Time(100 + self.polls))
+            controllers.answers["arm"] = self.polls > 5
+            return super().wait(timeout)
+
+    executor(controllers).execute(motion("elbow", (0.0, [0.3]), (1.0, [0.5])), Late())
+    assert controllers.cancelled == []
+
+
 def test_without_monitoring_a_motion_may_take_for_ever(clock: Any) -> None:
     controllers = RecordedControllers(ARM)
     controllers.answers["arm"] = False

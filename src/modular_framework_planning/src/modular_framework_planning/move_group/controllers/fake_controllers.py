@@ -24,7 +24,7 @@ from modular_framework_ros.calls import wait_until
 from modular_framework_ros.publishing import publish
 
 DEFAULT_RATE = 10.0
-SEEN_TIMEOUT_S = 2.0
+SEEN_TIMEOUT_S = 5.0
 SEEN_TOLERANCE = 1.0e-3  # [rad or m]
 
 
