@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import moveit_commander
 import numpy as np
@@ -145,6 +149,19 @@ def test_both_fingers_may_be_named_in_a_goal(demo: Any) -> None:
     hand.set_joint_value_target({"panda_finger_joint2": 0.025})
     assert hand.go()
     assert hand.get_current_joint_values() == pytest.approx([0.025, 0.025], abs=1e-3)
+
+
+def test_a_motion_succeeds_whose_end_joint_states_shows_late(arm: MoveGroupCommander, demo: Any) -> None:
+    here = arm.get_current_joint_values()
+    arm.set_joint_value_target([here[0] - 0.1, *here[1:]])
+    worked, trajectory, _, _ = arm.plan()
+    assert worked and trajectory.joint_trajectory.points[-1].time_from_start.to_sec() < 1.0
+    uri = rosgraph.Master("/test").lookupNode("/joint_state_publisher")
+    publisher = int(ServerProxy(uri).getPid("/test")[2])
+    os.kill(publisher, signal.SIGSTOP)
+    threading.Timer(2.5, os.kill, (publisher, signal.SIGCONT)).start()
+    assert arm.execute(trajectory), demo.log()
+    assert arm.get_current_joint_values()[0] == pytest.approx(here[0] - 0.1, abs=1e-3)
 
 
 def test_a_stop_leaves_the_robot_on_its_way(arm: MoveGroupCommander) -> None:
