@@ -149,6 +149,35 @@ def test_a_plan_and_a_failed_one_say_what_they_took_also_to_another_process(smal
     assert copied.statistics == failed.value.statistics
 
 
+@pytest.mark.parametrize(
+    ("asked", "planner", "implementation", "replaced"),
+    [
+        ("RRTConnect", "RRTConnect", "compiled", ""),
+        ("PRM", "PRM", "OMPL", ""),
+        ("BKPIECEE", "RRTConnect", "compiled", "BKPIECEE"),
+        ("", "RRTConnect", "compiled", ""),
+    ],
+)
+def test_a_plan_says_which_planner_searched_and_what_it_replaced(
+    small: RobotModel, asked: str, planner: str, implementation: str, replaced: str
+) -> None:
+    pipeline = PipelineSpec(settings=PipelineSettings(seed=3)).build(small, KinematicsPool(small))
+    request = replace(pipeline_request(small, GOAL, 3.0), planner_id=asked)
+    run = pipeline.plan(request).statistics.as_json()["run"]
+    assert (run["pipeline"], run["planner"], run["implementation"]) == ("ompl", planner, implementation)
+    assert run["replaced"] == replaced
+
+
+def test_a_plan_says_its_settings_and_one_without_a_search_that_none_ran(small: RobotModel) -> None:
+    settings = PipelineSettings(seed=3, planner_configs={"mine": {"type": "geometric::RRTConnect", "range": 0.3}})
+    pipeline = PipelineSpec(settings=settings).build(small, KinematicsPool(small))
+    request = replace(pipeline_request(small, GOAL), planner_id="mine")
+    run = pipeline.plan(request).statistics.run
+    assert run is not None and run.settings == {"range": 0.3}
+    beside = pipeline.plan(replace(request, goals=(JointGoal({"pan": float(START[0]) + 0.01}),))).statistics.run
+    assert beside is not None and (beside.planner, beside.implementation) == ("RRTConnect", "")
+
+
 def test_the_sentence_names_the_longest_part_and_the_bodies_in_the_way() -> None:
     counts = CheckCounts(41_000, 10_000, 26_080, 20_000, 4_920, 80, 90_000)
     slow = PlanStatistics(

@@ -51,6 +51,27 @@ class Refusals:
 
 
 @dataclass(frozen=True, slots=True)
+class PlannerRun:
+    """What planned, as it was resolved.
+
+    Attributes:
+        pipeline: the planning pipeline.
+        planner: its planner.
+        settings: parameters of the planner, those of the group among them.
+        adapters: request adapters, outermost first.
+        implementation: who searched: `compiled`, `OMPL`, `CBiRRT`; empty where no search was needed or it never began.
+        replaced: the planner_id that was asked for and that the pipeline does not have; empty otherwise.
+    """
+
+    pipeline: str
+    planner: str
+    settings: Mapping[str, Any]
+    adapters: tuple[str, ...] = ()
+    implementation: str = ""
+    replaced: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class PlanStatistics:
     """Statistics of one plan, also of one that failed.
 
@@ -58,11 +79,13 @@ class PlanStatistics:
         phases_s: how long its parts took [s].
         checks: of the collision checker by part of the plan; empty for a checker that does not count.
         refusals: the two bodies that refused the most checks; None where none did.
+        run: what planned; None where the request was refused before.
     """
 
     phases_s: Mapping[str, float] = field(default_factory=dict)
     checks: Mapping[str, CheckCounts] = field(default_factory=dict)
     refusals: Refusals | None = None
+    run: PlannerRun | None = None
 
     @property
     def summary(self) -> str:
@@ -90,4 +113,5 @@ class PlanStatistics:
             "checks": {part: asdict(counts) for part, counts in self.checks.items()},
             "refusals": None if self.refusals is None else asdict(self.refusals),
             "summary": self.summary,
+            "run": None if self.run is None else asdict(self.run),
         }

@@ -6,12 +6,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.kernels.compiled_collision import CHECK_COUNTS
-from modular_framework_planning.plan_statistics import CheckCounts, PlanStatistics
+from modular_framework_planning.plan_statistics import CheckCounts, PlannerRun, PlanStatistics
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CountsChecks
 
 SETUP, GOALS, SEARCH, REPAIR, SHORTENING, TIMING, CHECK = (
@@ -33,8 +34,14 @@ class PhaseTimes:
         self._checks: dict[str, NDArray[np.int64]] = {}
         self._checker: CountsChecks | None = None
         self._counts = np.zeros(CHECK_COUNTS, np.int64)  # of the checker; it counts on in this array
+        self.run: PlannerRun | None = None
         self._inner = [0.0]  # time of the parts inside each open part
         self._inner_checks = [np.zeros(CHECK_COUNTS, np.int64)]
+
+    def searched_by(self, implementation: str) -> None:
+        """Notes who searches; what repairs the path later does not count."""
+        if self.run is not None and not self.run.implementation:
+            self.run = replace(self.run, implementation=implementation)
 
     def watch(self, checker: CollisionChecker) -> None:
         """Takes over what a new checker has counted, and what it will count; nothing where it does not count."""
@@ -59,11 +66,11 @@ class PhaseTimes:
     def statistics(self) -> PlanStatistics:
         """Returns what was measured until now."""
         if self._checker is None:
-            return PlanStatistics(dict(self.seconds))
+            return PlanStatistics(dict(self.seconds), run=self.run)
         counts = {}
         for phase, row in self._checks.items():
             asked, free, touching, states, exactly, by_spheres = row.tolist()
             if asked:
                 undecided = asked - free - touching
                 counts[phase] = CheckCounts(asked, free, touching, by_spheres, undecided, exactly, states)
-        return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals())
+        return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals(), self.run)

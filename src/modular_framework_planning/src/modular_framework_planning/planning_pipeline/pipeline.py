@@ -16,6 +16,7 @@ from modular_framework_planning.contacts import ATTACHED, WORLD, describe_contac
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
+from modular_framework_planning.plan_statistics import PlannerRun
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCheckerFactory
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
@@ -239,7 +240,9 @@ class PlanningPipeline:
         group = self._model.group(request.group)
         if not group.joints:
             raise PlanningError(ErrorCode.INVALID_GROUP_NAME, f"group '{group.name}' has no joint that can be moved")
-        planner_id, parameters = self._chosen_planner(request.planner_id, group.name)
+        planner_id, parameters, replaced = self._chosen_planner(request.planner_id, group.name)
+        adapters = tuple(type(item).__name__ for item in self._adapters_for(request))
+        phases.run = PlannerRun(self.name, planner_id, parameters, adapters, replaced=replaced)
         start = np.array(request.scene.positions)
         if not np.isfinite(start).all():
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "start state: a joint position is not finite")
@@ -274,12 +277,14 @@ class PlanningPipeline:
         improves = planner_id in getattr(self._planner, "improving_ids", ())
         return min(RESERVED_AFTER_IMPROVING_S if improves else RESERVED_S, RESERVED_SHARE * allowed_time_s)
 
-    def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any]]:
-        """Returns the planner's name and settings; raises PlanningError with the names there are."""
+    def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any], str]:
+        """Returns the planner's name and settings, and the name it replaces; raises PlanningError with known names."""
         default, known = self.settings.default_planner(group), self.planner_ids
         kind, parameters = self._kind(_without_group(asked or default), group)
+        replaced = ""
         if asked and known and kind not in known and self._replaces_bad_values:
             kind, parameters = self._kind(_without_group(default), group)
+            replaced = asked
             LOGGER.warning(
                 "planner_id '%s': pipeline '%s' has no such planner, available: %s; group '%s' is planned "
                 "for by the default planner '%s'",
@@ -295,7 +300,7 @@ class PlanningPipeline:
                 ErrorCode.PLANNING_FAILED,
                 f"planner_id '{asked}': pipeline '{self.name}' has no planner '{kind}'; available: {', '.join(known)}",
             )
-        return kind, parameters
+        return kind, parameters, replaced
 
     def _kind(self, name: str, group: str) -> tuple[str, dict[str, Any]]:
         """Returns the planner of a configuration's name, and its settings with those of the group."""

@@ -16,7 +16,7 @@ import ompl.util as ou
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.planners.ompl.constrained_search import ConstrainedSearch, constraints_are_tight
+from modular_framework_planning.planners.ompl.constrained_search import NAME, ConstrainedSearch, constraints_are_tight
 from modular_framework_planning.planners.ompl.planner_settings import (
     ANYTIME,
     DEFAULT_RANGE,
@@ -69,6 +69,7 @@ class OmplPlanner:
             if problem.edge_is_valid(start, goal, problem.settings.finest_step):
                 return PlannedPath(np.vstack([start, goal]))
         if problem.constraints is not None and (problem.planner_id == "RRTConnect" or constraints_are_tight(problem)):
+            problem.phases.searched_by(NAME)
             most_states = problem.request.most_iterations
             return ConstrainedSearch(problem, step, most_states=math.inf if most_states is None else most_states).run()
         if problem.repeatable and problem.planner_id in THREADED:
@@ -111,6 +112,7 @@ def _paths(problem: PlanningProblem, goals: Array, step: float) -> tuple[list[Ar
     paths, states = [], 0
     for _ in range(max(1, problem.request.attempts)):
         search = _search(problem, goals, step)
+        problem.phases.searched_by("OMPL" if isinstance(search, _Search) else "compiled")
         path = search.run()
         states += search.states
         if path is not None:
