@@ -64,6 +64,10 @@ def test_a_planned_motion_joins_start_and_goal_and_is_measured(
     assert record.metrics["path_length"] >= 0.999 * straight
     assert record.metrics["motion_duration"] == pytest.approx(motion["time_s"][-1])
     assert 0.0 < record.metrics["planning_time"] <= record.wall_s
+    (planner,) = record.snapshot["planners"]
+    assert planner == "RRTConnect of ompl" and set(record.snapshot["digests"]) == {
+        "robot description", "semantic description"
+    }  # fmt: skip
 
 
 def test_a_seed_repeats_a_plan_whatever_was_planned_before(

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from modular_framework_benchmark.metrics.recording_files import (
 )
 from modular_framework_benchmark.metrics.registry import measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.what_ran import WhatRan
 
 TASK_RECORDS = "task_records"
 PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
@@ -82,6 +83,9 @@ class EpisodeEnd:
 def make_record(end: EpisodeEnd) -> EpisodeRecord:
     """Returns the record of an episode; to be called when nothing of it runs any more."""
     wall_s = time.monotonic() - end.begun_monotonic
+    ran = WhatRan(**end.answer.get("ran", {}))
+    if ran.replaced:
+        end = end.broken(f"what ran is not what was named: {'; '.join(ran.replaced)}")
     recording = read_recording(end.folder)
     states = _states(end)
     answer = end.answer
@@ -118,7 +122,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         simulated_s=answer.get("simulated_s"),
         metrics={name: None if invalid else value for name, value in measured.values.items()},
         spans=tuple(sorted(spans, key=lambda span: span.started_s)),
-        snapshot=_snapshot(end, measured.faults),
+        snapshot=_snapshot(end, measured.faults) | asdict(ran),
         folder=str(end.folder),
     )
 

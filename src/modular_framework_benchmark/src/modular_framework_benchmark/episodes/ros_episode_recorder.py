@@ -28,6 +28,7 @@ from modular_framework_benchmark.episodes.bag import NODE as BAG_NODE
 from modular_framework_benchmark.episodes.bag import BagRecording
 from modular_framework_benchmark.episodes.errors import BagError, EpisodeAbortedError
 from modular_framework_benchmark.episodes.ros_recording import model_samples, write_parameters, write_recording
+from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, FoulError, WorldError, judge, spawn
@@ -117,7 +118,10 @@ class EpisodeRecorder:
                 answer["foul"] = str(error)
             spawned = {entry["name"]: entry["model"] for entry in request.objects}
             answer |= write_recording(folder, self._samples, spawned, answer, turns)
-        answer["parameters_digest"] = write_parameters(folder)
+        parameters, answer["parameters_digest"] = write_parameters(folder)
+        controllers = _running_controllers() if request.controllers else {}
+        plans = [report for _, report in self._samples.planning]
+        answer["ran"] = running_stack(parameters, controllers, _publishers(GENERATION_SIGNAL), plans)
         self._reached(request, answer, "recorded")
         return answer
 
@@ -225,7 +229,7 @@ class EpisodeRecorder:
         self._wait(lambda: wanted <= _services())
         self._wait(lambda: set(request.controllers) <= _running_controllers().keys())
         if request.method:
-            self._wait(lambda: _is_published(GENERATION_SIGNAL))
+            self._wait(lambda: bool(_publishers(GENERATION_SIGNAL)))
             # a method offers the service soon after, or it has none
             until = time.monotonic() + GENERATION_SERVICE_S
             self._wait(lambda: rospy.resolve_name(GENERATE_SERVICE) in _services() or time.monotonic() > until)
@@ -240,8 +244,9 @@ def _services() -> set[str]:
     return {name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]}
 
 
-def _is_published(topic: str) -> bool:
-    return any(name == topic for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[0])
+def _publishers(topic: str) -> list[str]:
+    published = rosgraph.Master(rospy.get_name()).getSystemState()[0]
+    return [node for name, nodes in published if name == topic for node in nodes]
 
 
 def _is_subscribed(topic: str, node: str) -> bool:

@@ -66,8 +66,8 @@ def write_recording(
     return {"final": final, "recording_fault": fault}
 
 
-def write_parameters(folder: Path) -> str:
-    """Writes all parameters of the parameter server; returns their SHA-256, hexadecimal.
+def write_parameters(folder: Path) -> tuple[dict[str, Any], str]:
+    """Writes all parameters of the parameter server; returns them and their SHA-256, hexadecimal.
 
     Args:
         folder: Where to write `parameters.json`.
@@ -76,9 +76,8 @@ def write_parameters(folder: Path) -> str:
     parameters = rosgraph.Master(rospy.get_name()).getParam("/")
     text = json.dumps(parameters, sort_keys=True, indent=1)
     (folder / PARAMETERS).write_text(text)
-    for name in OF_A_RUN:
-        parameters.pop(name, None)
-    return hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()
+    lasting = {name: value for name, value in parameters.items() if name not in OF_A_RUN}
+    return parameters, hashlib.sha256(json.dumps(lasting, sort_keys=True).encode()).hexdigest()
 
 
 def _within(rows: pd.DataFrame, end_s: float) -> pd.DataFrame:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
+from modular_framework_benchmark.records.what_ran import WhatRan
 from modular_framework_ros.reported_figures import Figure
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +35,7 @@ class ComponentReport:
         wall_s: Real time it took [s].
         figures: Its own figures, by their declarations, such as `CANDIDATES`.
         motion: The motion it made or executed; None without one.
+        ran: What did it, in the modes without simulation.
     """
 
     component: str
@@ -45,6 +47,7 @@ class ComponentReport:
     wall_s: float
     figures: Mapping[Figure, float] = field(default_factory=dict)
     motion: Motion | None = None
+    ran: WhatRan = WhatRan()
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from modular_framework_benchmark.episodes.snapshot import machine, versions
@@ -69,6 +69,7 @@ def measured_record(
         snapshot={
             **versions(),
             "machine": machine(),
+            **asdict(report.ran),
             **({"metric_faults": dict(measured.faults)} if measured.faults else {}),
         },
         folder=str(folder),

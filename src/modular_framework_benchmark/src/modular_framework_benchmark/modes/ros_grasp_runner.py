@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from modular_framework_benchmark.episodes.ros_package_sources import package_source
 from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.grasp_reach import GraspReach
@@ -24,6 +25,7 @@ from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.what_ran import WhatRan, description_digests
 from modular_framework_core.grasp_generation.grasp_candidates import (
     GraspCandidate,
     GraspMethod,
@@ -76,6 +78,7 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
             figures=_figures(candidates, reached, found),
+            ran=_ran(str(settings["method"]), prepared.robot),
         )
         status = EpisodeStatus.SUCCEEDED if found else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report, folder, watch)
@@ -89,6 +92,15 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         except GripperGeometryError as error:
             raise ModeError(f"gripper_joint '{settings['gripper_joint']}': {error}") from error
         return _Prepared(robot, robot.solvers().solver(group.name), gripper)
+
+
+def _ran(method: str, robot: Robot) -> WhatRan:
+    package = method.partition(":")[0].partition(".")[0]
+    version, sources = package_source(package)
+    return WhatRan(
+        methods={package: {"version": version, "sources": sources}},
+        digests=description_digests(*robot.model.source[:2]),
+    )
 
 
 def load_method(reference: str, numbers: GivenNumbers) -> GraspMethod:

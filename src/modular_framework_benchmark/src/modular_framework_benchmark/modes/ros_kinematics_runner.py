@@ -22,6 +22,7 @@ from modular_framework_benchmark.modes.parameters import parameters_below
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.what_ran import WhatRan, description_digests
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings, settings_from
@@ -75,6 +76,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
             ended_s=ended_s,
             wall_s=ended_s - started_s,
             figures=_figures(results),
+            ran=WhatRan(solver=solver.settings.solver, digests=description_digests(*robot.model.source[:2])),
         )
         status = EpisodeStatus.FAILED if unsolved else EpisodeStatus.SUCCEEDED
         return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)

@@ -22,7 +22,9 @@ from modular_framework_benchmark.modes.parameters import merged, parameters_belo
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.what_ran import WhatRan, description_digests, planners_of
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
 from modular_framework_planning.planning_interface.motion_problems import MotionProblem, read_problem
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
@@ -64,9 +66,11 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         prepared = self.prepared(spec.settings)
         problem = _read_problem(spec.settings, prepared.model)
         started_s, answer, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
+        statistics: PlanStatistics | None = None
         try:
             answer = prepared.seeded.plan(prepared.pipeline, problem.request, spec.seed)
         except PlanningError as error:
+            statistics = error.statistics
             code, reason = error.code, f"{problem.name}: {error.code.name}: {error.reason}"
         ended_s = watch.elapsed_s()
         if answer is not None and spec.settings.get("record", {}).get("trajectories", True):
@@ -81,6 +85,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
             wall_s=ended_s - started_s,
             figures=_figures(problem, answer, spec.settings) if answer is not None else {},
             motion=_motion(answer.trajectory) if answer is not None else None,
+            ran=_ran(answer.statistics if answer is not None else statistics, prepared.model),
         )
         return measured_record(spec, _status(code), code.name, report, folder, watch)
 
@@ -141,6 +146,11 @@ def _read_problem(settings: Mapping[str, Any], model: RobotModel) -> MotionProbl
         attempts=int(settings.get("attempts", 1)),
     )
     return MotionProblem(str(named.get("name") or problem.name), request)
+
+
+def _ran(statistics: PlanStatistics | None, model: RobotModel) -> WhatRan:
+    run = None if statistics is None else statistics.as_json()["run"]
+    return WhatRan(digests=description_digests(*model.source[:2]), **planners_of([run]))
 
 
 def _status(code: ErrorCode) -> EpisodeStatus:

@@ -133,7 +133,9 @@ def serve(pipe: Connection) -> None:
             continue
         if renderer is None:
             meshes = VisualMeshes(default_cache_folder())
-            renderer = Renderer(fastest_drawing(rospy.loginfo), meshes, rospy.logwarn)
+            drawing = fastest_drawing(rospy.loginfo)
+            rospy.set_param("gazebo/renderer", drawing.value)  # for who asks what drew the images
+            renderer = Renderer(drawing, meshes, rospy.logwarn)
         renderer.apply(update)
         for each in publishers:
             if each.camera.name in update.cameras:

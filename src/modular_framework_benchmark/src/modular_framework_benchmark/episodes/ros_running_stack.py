@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds out what a running stack consists of, from its nodes, its parameters and its planning reports."""
+
+from __future__ import annotations
+
+import hashlib
+import xmlrpc.client
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import rosgraph
+import rospkg
+import rospy
+
+from modular_framework_benchmark.episodes.ros_package_sources import package_source
+from modular_framework_benchmark.records.what_ran import WhatRan, description_digests, planners_of
+
+FILES = {
+    "world": "/gazebo/world_file",
+    "task": "/task/task_constructor_script",
+    "state machine": "/task/state_machine_to_load",
+}
+"""Parameters of nodes that name files, by what the files are."""
+DESCRIPTIONS = ("/robot_description", "/robot_description_semantic")
+
+
+def running_stack(
+    parameters: Mapping[str, Any],
+    controllers: Mapping[str, str],
+    generators: Iterable[str],
+    plans: Iterable[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Returns a `WhatRan` as JSON values.
+
+    Args:
+        parameters: All of the parameter server.
+        controllers: Types of the controllers that run, by name.
+        generators: Names of the nodes that generate grasps.
+        plans: Planning reports of move_group.
+    """
+    files = {what: Path(str(_value(parameters, name))) for what, name in FILES.items()}
+    described = description_digests(*(str(_value(parameters, name)) for name in DESCRIPTIONS))
+    digests = {what: hashlib.sha256(path.read_bytes()).hexdigest() for what, path in files.items() if path.is_file()}
+    methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
+    return asdict(
+        WhatRan(
+            methods={name: {"version": version, "sources": digest} for name, (version, digest) in methods.items()},
+            controllers=dict(controllers),
+            physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
+            renderer=str(_value(parameters, "/gazebo/renderer")),
+            digests=described | digests,
+            **planners_of(plan.get("run") for plan in plans),
+        )
+    )
+
+
+def _value(parameters: Mapping[str, Any], name: str) -> Any:
+    found: Any = parameters
+    for part in name.strip("/").split("/"):
+        found = found.get(part, "") if isinstance(found, Mapping) else ""
+    return found
+
+
+def package_of(node: str) -> str:
+    """Returns the ROS package of a running node's program; "" where it cannot be found out."""
+    try:
+        uri: Any = rosgraph.Master(rospy.get_name()).lookupNode(node)
+        _, _, process = xmlrpc.client.ServerProxy(uri).getPid(rospy.get_name())
+        words = Path(f"/proc/{process}/cmdline").read_bytes().decode(errors="replace").split("\0")
+    except (OSError, rosgraph.MasterException, xmlrpc.client.Error):
+        return ""
+    program = next((Path(word) for word in words if word.startswith("/") and Path(word).parent.name != "bin"), None)
+    if program is None:
+        return ""
+    # in devel and install spaces programs are in lib/PACKAGE
+    return rospkg.get_package_name(str(program)) or program.parent.name

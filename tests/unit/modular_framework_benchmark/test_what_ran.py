@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A record says what ran, as the running parts said it; an episode in which something else ran is invalid."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make_record
+from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
+from modular_framework_benchmark.episodes.ros_running_stack import running_stack
+from modular_framework_benchmark.episodes.snapshot import machine_load
+from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStatus
+
+
+def plan(planner: str, implementation: str, replaced: str = "") -> dict[str, Any]:
+    """A planning report of move_group."""
+    run = {"pipeline": "ompl", "planner": planner, "settings": {"range": 0.2}, "adapters": ["FixStartStateBounds"]}
+    return {"kind": "plan", "run": {**run, "implementation": implementation, "replaced": replaced}}
+
+
+def stack(tmp_path: Path, *plans: dict[str, Any]) -> dict[str, Any]:
+    (tmp_path / "table.world").write_text("<sdf/>")
+    parameters = {
+        "robot_description": "<robot/>",
+        "gazebo": {"world_file": str(tmp_path / "table.world"), "physics_engine": "mujoco"},
+    }
+    ran = running_stack(parameters, {"arm": "position_controllers/JointTrajectoryController"}, [], plans)
+    return dict(json.loads(json.dumps(ran)))  # as it comes from the other process
+
+
+def record_of(tmp_path: Path, ran: dict[str, Any]) -> Any:
+    end = EpisodeEnd(EpisodeSpec(0, {}, 0, 1, {}), tmp_path, time.time(), time.monotonic(), machine_load())
+    return make_record(end.ended(EpisodeStatus.SUCCEEDED, "", {"ran": ran, "task_s": 1.0}))
+
+
+def test_a_record_says_planner_settings_implementation_and_digests(tmp_path: Path) -> None:
+    ran = stack(tmp_path, plan("PRM", ""), plan("PRM", "OMPL"), {"kind": "ik"})
+    snapshot = record_of(tmp_path, ran).snapshot
+    assert snapshot["planners"] == {
+        "PRM of ompl": {"range": 0.2, "request_adapters": "FixStartStateBounds", "implementation": "OMPL"}
+    }
+    assert snapshot["physics_engine"] == "mujoco"
+    assert snapshot["controllers"] == {"arm": "position_controllers/JointTrajectoryController"}
+    assert set(snapshot["digests"]) == {"robot description", "world"}
+    (tmp_path / "table.world").write_text("<sdf version='1.7'/>")
+    parameters = {"gazebo": {"world_file": str(tmp_path / "table.world")}}
+    assert running_stack(parameters, {}, [], [])["digests"]["world"] != snapshot["digests"]["world"]
+
+
+def test_a_documented_substitution_is_recorded_and_the_episode_counts(tmp_path: Path) -> None:
+    record = record_of(tmp_path, stack(tmp_path, plan("PRM", "CBiRRT"), plan("PRM", "OMPL")))
+    assert record.status is EpisodeStatus.SUCCEEDED
+    assert record.snapshot["planners"]["PRM of ompl"]["implementation"] == "CBiRRT, OMPL"
+    assert record.snapshot["substitutions"] == ["CBiRRT for PRM, which cannot keep path constraints"]
+
+
+def test_an_episode_in_which_another_planner_ran_is_invalid_and_says_which(tmp_path: Path) -> None:
+    record = record_of(tmp_path, stack(tmp_path, plan("RRTConnect", "compiled", replaced="BKPIECEE")))
+    assert record.status is EpisodeStatus.BROKEN
+    assert record.cause == ("what ran is not what was named: planner 'BKPIECEE' was named, and RRTConnect planned")
+
+
+def test_the_digest_of_a_method_changes_with_its_sources_and_not_with_caches(tmp_path: Path) -> None:
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "method.py").write_text("YAW_STEP = 1")
+    before = tree_digest([tmp_path])
+    (tmp_path / "src" / "__pycache__").mkdir()
+    (tmp_path / "src" / "__pycache__" / "method.pyc").write_bytes(b"1")
+    assert tree_digest([tmp_path]) == before
+    (tmp_path / "src" / "method.py").write_text("YAW_STEP = 2")
+    assert tree_digest([tmp_path]) != before
+
+
+@pytest.mark.parametrize("package", ["top_down_grasps", "modular_framework_benchmark"])
+def test_a_package_of_the_workspace_has_a_version_and_a_digest(package: str) -> None:
+    version, digest = package_source(package)
+    assert version and len(digest) == 64
+    assert package_source("no_such_package") == ("", "")
