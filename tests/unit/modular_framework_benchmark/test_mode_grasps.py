@@ -135,8 +135,8 @@ def test_a_seed_repeats_what_is_found(runner: GraspEpisodeRunner, tmp_path: Path
     [
         ({"method": "top_down_grasps"}, "MODULE:CLASS of a grasp method"),
         ({"method": "no_such_package:Method"}, "cannot be imported (No module named 'no_such_package')"),
-        ({"method_parameters": {"yaw_stp": 0.1}}, "the method has no 'yaw_stp'; allowed are approach_distance"),
-        ({"method_parameters": {"yaw_step": 9.0}}, "'yaw_step' is 9; allowed is a number from 0.02"),
+        ({"method_parameters": {"yaw_stp": 0.1}}, "the method has no 'yaw_stp'; allowed: approach_distance"),
+        ({"method_parameters": {"yaw_step": 9.0}}, "'yaw_step' is 9.0; allowed: a number, at least 0.02"),
         ({"gripper_joint": "no_joint"}, "gripper_joint 'no_joint':"),
         ({"group": "legs"}, "legs"),
     ],

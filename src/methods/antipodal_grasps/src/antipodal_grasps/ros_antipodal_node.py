@@ -9,7 +9,6 @@ from modular_framework_core.grasp_generation.grasp_candidates import GraspCandid
 from modular_framework_core.grasp_generation.pair_grasps import candidates_of, quality_with_travel
 from modular_framework_core.grasp_generation.ros_generator_settings import (
     ParameterisedMethod,
-    number,
     read_pair_grasps,
 )
 from modular_framework_core.grasp_generation.ros_grasp_generator import run_grasp_generator
@@ -19,6 +18,7 @@ class AntipodalMethod(ParameterisedMethod):
     """Antipodal grasps; the parameters of :func:`read_antipodal_settings` are read again for every object."""
 
     manner = "between two opposite sides"
+    declared_in = ("antipodal_grasps", "antipodal_grasp_generator")
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
         """Returns the grasps of an object in the order of :func:`antipodal_grasps`, then with the hand half turned."""
@@ -30,18 +30,16 @@ class AntipodalMethod(ParameterisedMethod):
         return quality_with_travel(candidate.quality, joint_travel)
 
 
-def read_antipodal_settings(read: ReadNumber = number) -> AntipodalSettings:
+def read_antipodal_settings(read: ReadNumber) -> AntipodalSettings:
     """Reads the parameters of the method.
 
     Args:
-        read: Reads a parameter; by default from the parameter server, where a value out of range is replaced by its
-            default, and that is logged.
+        read: Reads a parameter.
     """
-    pairs = PairSettings()
     pairs = PairSettings(
-        surface_samples=int(read("~surface_samples", pairs.surface_samples, 10, 100000)),
-        lines_per_sample=int(read("~lines_per_sample", pairs.lines_per_sample, 1, 100)),
-        friction=read("~friction", pairs.friction, 0.02, 2.0),
+        surface_samples=int(read("~surface_samples")),
+        lines_per_sample=int(read("~lines_per_sample")),
+        friction=read("~friction"),
     )
     shared = read_pair_grasps(pairs.cone_cosine, read)
     return AntipodalSettings(shared.hand, shared.full_clearance_m, shared.max_poses, shared.max_candidates, pairs=pairs)

@@ -19,7 +19,6 @@ from modular_framework_core.grasp_generation.pair_grasps import candidates_of, q
 from modular_framework_core.grasp_generation.planning_scene_objects import CropBox, SceneObject
 from modular_framework_core.grasp_generation.ros_generator_settings import (
     ParameterisedMethod,
-    number,
     read_pair_grasps,
 )
 from modular_framework_core.grasp_generation.ros_grasp_generator import run_grasp_generator
@@ -44,8 +43,9 @@ class PointCloudMethod(ParameterisedMethod):
     """
 
     manner = "between two opposite sides that the camera sees"
+    declared_in = ("point_cloud_grasps", "point_cloud_grasp_generator")
 
-    def __init__(self, read: ReadNumber = number) -> None:
+    def __init__(self, read: ReadNumber | None = None) -> None:
         """Connects to nothing yet."""
         super().__init__(read)
         self._source = CloudSource()
@@ -91,11 +91,11 @@ class PointCloudMethod(ParameterisedMethod):
                 f"generative_methods_config.yaml, or '{TOPIC_PARAMETERS[1]}' in sensors_config.yaml"
             )
         frame = _text("origin_frame_name") or "world"
-        cloud = self._source.take(topic, frame, self.read("~cloud_timeout", 20.0, 0.1, 600.0))
+        cloud = self._source.take(topic, frame, self.read("~cloud_timeout"))
         points = cloud.points[region.hold(cloud.points)]
         robot = self._robot_bodies()
         poses = self._source.link_poses(robot.links, frame, cloud.stamp)
-        return points[~robot.hide(points, poses, self.read("~robot_padding", 0.02, 0.0, 0.5))]
+        return points[~robot.hide(points, poses, self.read("~robot_padding"))]
 
     def reached_quality(self, candidate: GraspCandidate, joint_travel: float) -> float:
         """Ranks by the quality of the hold, and by how little the arm moves between the poses of the grasp."""
@@ -109,18 +109,13 @@ class PointCloudMethod(ParameterisedMethod):
         return self._robot
 
 
-def read_cloud_settings(read: ReadNumber = number) -> CloudSettings:
+def read_cloud_settings(read: ReadNumber) -> CloudSettings:
     """Reads the parameters of the method.
 
     Args:
-        read: Reads a parameter; by default from the parameter server, where a value out of range is replaced by its
-            default, and that is logged.
+        read: Reads a parameter.
     """
-    pairs, defaults = CloudPairSettings(), CloudSettings()
-    pairs = CloudPairSettings(
-        contact_samples=int(read("~contact_samples", pairs.contact_samples, 10, 3000)),
-        friction=read("~friction", pairs.friction, 0.02, 2.0),
-    )
+    pairs = CloudPairSettings(contact_samples=int(read("~contact_samples")), friction=read("~friction"))
     shared = read_pair_grasps(pairs.cone_cosine, read)
     return CloudSettings(
         shared.hand,
@@ -128,8 +123,8 @@ def read_cloud_settings(read: ReadNumber = number) -> CloudSettings:
         shared.max_poses,
         shared.max_candidates,
         pairs=pairs,
-        region_padding_m=read("~region_padding", defaults.region_padding_m, 0.0, 0.5),
-        min_height_m=read("~min_height", defaults.min_height_m, 0.0, 0.1),
+        region_padding_m=read("~region_padding"),
+        min_height_m=read("~min_height"),
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import asdict
 import numpy as np
 
 from modular_framework_core.grasp_generation.grasp_candidates import GraspCandidate, GraspQuery, ReadNumber
-from modular_framework_core.grasp_generation.ros_generator_settings import ParameterisedMethod, number, read_hand_motion
+from modular_framework_core.grasp_generation.ros_generator_settings import ParameterisedMethod, read_hand_motion
 from modular_framework_core.grasp_generation.ros_grasp_generator import run_grasp_generator
 from top_down_grasps.top_down import TopDownGrasp, TopDownSettings, top_down_grasps
 
@@ -18,6 +18,7 @@ class TopDownMethod(ParameterisedMethod):
     """Grasps from above; the parameters of :func:`read_top_down_settings` are read again for every object."""
 
     manner = "from above"
+    declared_in = ("top_down_grasps", "top_down_grasp_generator")
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
         """Returns the grasps of an object, best first."""
@@ -44,21 +45,19 @@ def _candidate(grasp: TopDownGrasp, settings: TopDownSettings) -> GraspCandidate
     )
 
 
-def read_top_down_settings(read: ReadNumber = number) -> TopDownSettings:
+def read_top_down_settings(read: ReadNumber) -> TopDownSettings:
     """Reads the parameters of the method.
 
     Args:
-        read: Reads a parameter; by default from the parameter server, where a value out of range is replaced by its
-            default, and that is logged.
+        read: Reads a parameter.
     """
-    defaults = TopDownSettings()
     return TopDownSettings(
         **asdict(read_hand_motion(read)),
-        min_side_alignment=read("~min_side_alignment", defaults.min_side_alignment, 0.5, 0.999),
-        yaw_step_rad=read("~yaw_step", defaults.yaw_step_rad, 0.02, math.pi),
-        place_step_m=read("~place_step", defaults.place_step_m, 0.002, 0.5),
-        best_reach_m=read("~best_reach", defaults.best_reach_m, 0.0, 10.0),
-        base_xy_m=(read("~base_x", 0.0), read("~base_y", 0.0)),
+        min_side_alignment=read("~min_side_alignment"),
+        yaw_step_rad=read("~yaw_step"),
+        place_step_m=read("~place_step"),
+        best_reach_m=read("~best_reach"),
+        base_xy_m=(read("~base_x"), read("~base_y")),
     )
 
 

@@ -3,45 +3,37 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from typing import Any
 
 from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_core.files.faults import listing, nearest
+from modular_framework_ros.parameter_declarations import NodeDeclaration
 
 
-class GivenNumbers:
-    """Reads numbers that were given by name; implements `ReadNumber` of the grasp methods.
+class GivenParameters:
+    """Reads parameters that were given by name; implements `ReadNumber` of the grasp methods.
 
     Args:
-        values: Numbers by name, without the ~ of a node's own parameters.
+        values: Values by name, without the ~ of a node's own parameters.
+        declared: Parameters that the method declares.
+
+    Raises:
+        ModeError: The method declares no such parameter, or a value is not allowed.
     """
 
-    def __init__(self, values: Mapping[str, float]) -> None:
-        self._values = values
-        self._known: set[str] = set()
+    def __init__(self, values: Mapping[str, Any], declared: NodeDeclaration) -> None:
+        own = {name[1:]: item for name, item in declared.parameters.items() if name.startswith("~")}
+        faults = []
+        for name, value in values.items():
+            if name not in own:
+                faults.append(f"the method has no '{name}'; {listing(sorted(own))}{nearest(name, own)}")
+            elif own[name].fault(value):
+                faults.append(f"'{name}' {own[name].fault(value)}")
+        if faults:
+            raise ModeError(f"method_parameters: {'; '.join(faults)}")
+        self._values = {name: values.get(name, item.default) for name, item in own.items()}
 
-    def __call__(self, name: str, default: float, low: float = -math.inf, high: float = math.inf) -> float:
-        """Returns a number; its default when it was not given.
-
-        Raises:
-            ModeError: It is out of range.
-        """
-        key = name.removeprefix("~")
-        self._known.add(key)
-        value = float(self._values.get(key, default))
-        if not low <= value <= high:
-            raise ModeError(f"method_parameters: '{key}' is {value:g}; allowed is a number from {low:g} to {high:g}")
-        return value
-
-    def check_all_read(self) -> None:
-        """Checks, once the method has read its parameters, that it has all that were given.
-
-        Raises:
-            ModeError: It did not ask for one, so that one would have no effect.
-        """
-        unknown = sorted(set(self._values) - self._known)
-        if unknown:
-            raise ModeError(
-                f"method_parameters: the method has no {' and no '.join(map(repr, unknown))}; allowed are "
-                f"{', '.join(sorted(self._known)) or 'none'}"
-            )
+    def __call__(self, name: str) -> Any:
+        """Returns a parameter; its default when it was not given."""
+        return self._values[name.removeprefix("~")]

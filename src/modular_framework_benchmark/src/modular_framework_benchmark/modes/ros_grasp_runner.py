@@ -20,7 +20,7 @@ from modular_framework_benchmark.metrics.measurements import ComponentReport
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.grasp_reach import GraspReach
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
-from modular_framework_benchmark.modes.method_parameters import GivenNumbers
+from modular_framework_benchmark.modes.method_parameters import GivenParameters
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
@@ -38,6 +38,7 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
     measure_gripper,
 )
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
+from modular_framework_ros.parameter_declarations import NodeDeclaration, node_declaration
 from modular_framework_ros.reported_figures import BEST_RANK, CANDIDATES, CHECKED, REACHABLE, Figure
 
 
@@ -60,12 +61,10 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         settings = spec.settings
         prepared = self.prepared(settings)
         scene = grasp_scene(prepared.robot.model, settings["objects"], str(settings["target"]))
-        numbers = GivenNumbers(settings.get("method_parameters") or {})
-        method = load_method(str(settings["method"]), numbers)
+        method = load_method(str(settings["method"]), settings.get("method_parameters") or {})
         started_s, start = watch.elapsed_s(), time.perf_counter()
         candidates, cause = _candidates(method, scene, prepared.gripper, spec.seed)
         search_s = time.perf_counter() - start
-        numbers.check_all_read()
         reached = _reached(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
         found = [place for place, travel in enumerate(reached, start=1) if travel is not None]
         outcome = "reachable" if found else ("out_of_reach" if candidates else "no_grasp")
@@ -103,25 +102,28 @@ def _ran(method: str, robot: Robot) -> WhatRan:
     )
 
 
-def load_method(reference: str, numbers: GivenNumbers) -> GraspMethod:
+def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:
     """Makes a method.
 
     Args:
         reference: MODULE:CLASS, such as `top_down_grasps.ros_top_down_node:TopDownMethod`; the class takes what reads
-            its parameters.
-        numbers: What reads its parameters.
+            its parameters, and its `declared_in` names the file that declares them.
+        parameters: Values that differ from the defaults, by name without ~.
 
     Raises:
-        ModeError: It cannot be imported.
+        ModeError: It cannot be imported, or a parameter is not allowed.
     """
     module, _, name = reference.partition(":")
+    allowed = "allowed: MODULE:CLASS of a grasp method, such as top_down_grasps.ros_top_down_node:TopDownMethod"
     try:
-        made: GraspMethod = getattr(importlib.import_module(module), name)(numbers)
+        kind = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, ValueError, TypeError) as error:
-        raise ModeError(
-            f"method '{reference}' cannot be imported ({error}); allowed: MODULE:CLASS of a grasp method, such as "
-            "top_down_grasps.ros_top_down_node:TopDownMethod"
-        ) from error
+        raise ModeError(f"method '{reference}' cannot be imported ({error}); {allowed}") from error
+    declared = node_declaration(*getattr(kind, "declared_in", ("", ""))) or NodeDeclaration()
+    try:
+        made: GraspMethod = kind(GivenParameters(parameters, declared))
+    except TypeError as error:
+        raise ModeError(f"method '{reference}' cannot be made ({error}); {allowed}") from error
     return made
 
 

@@ -73,14 +73,14 @@ class NoCandidatesError(RuntimeError):
 class ReadNumber(Protocol):
     """Reads a parameter of a method, which is a number."""
 
-    def __call__(self, name: str, default: float, low: float = -math.inf, high: float = math.inf) -> float:
-        """Returns its value; where it comes from, and what becomes of a wrong one, is decided by who reads.
+    def __call__(self, name: str) -> float:
+        """Returns its value, or the default that is declared for it.
 
         Args:
             name: Parameter, with ~ in front as of a node's own.
-            default: Value when it is not set.
-            low: Smallest value that is allowed.
-            high: Greatest value that is allowed.
+
+        Raises:
+            Exception: It is not declared, or the value is not allowed; the kind depends on who reads.
         """
 
 

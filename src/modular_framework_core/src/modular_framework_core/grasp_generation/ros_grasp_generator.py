@@ -35,6 +35,7 @@ from modular_framework_core.grasping.grasp_messages import generate_pose_stamped
 from modular_framework_core.msg import StandardisedGrasp
 from modular_framework_ros.calls import CallError
 from modular_framework_ros.component_report import ComponentReporter
+from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.reported_figures import CANDIDATES, CHECKED, REACHABLE, Figure
 from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_ros.start_up import start_timeout
@@ -100,16 +101,12 @@ class GraspGenerator:
 
         Raises:
             NoGraspError: Something needed is missing; the text names it.
+        ParameterError: A parameter is not allowed.
         """
         self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
         self._reporter = ComponentReporter("generation")
         self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
         settings = read_settings()
-        if not settings.gripper_joint:
-            raise NoGraspError(
-                f"parameter '{rospy.resolve_name('~gripper_joint')}' is not set; it has to name the "
-                "actuated joint of the fingers; set it in generative_methods_config.yaml"
-            )
         self._commander = ArmCommander(settings.arm_group)
         try:
             self._commander.connect()
@@ -186,7 +183,7 @@ class GraspGenerator:
                     names = sorted(found.name for found in objects)
                     return TriggerResponse(True, f"nothing has moved; the grasps of {names} stay")
                 return TriggerResponse(*self._signal_grasps(settings, objects))
-        except (NoGraspError, CallError, CommanderError) as error:
+        except (NoGraspError, CallError, CommanderError, ParameterError) as error:
             self._publish(False, str(error))
             return TriggerResponse(False, str(error))
 
@@ -373,6 +370,6 @@ def _work(method: GraspMethod, codes: list[int]) -> None:
     except Exception as error:  # whatever it is must end the node, which would stay without doing anything
         if not rospy.is_shutdown():
             codes.append(1)
-            rospy.logfatal("%s: %s", rospy.get_name(), error, exc_info=not isinstance(error, NoGraspError))
+            rospy.logfatal("%s: %s", rospy.get_name(), error, exc_info=not isinstance(error, NoGraspError | ParameterError))
     finally:
         rospy.signal_shutdown("the generator has ended")
