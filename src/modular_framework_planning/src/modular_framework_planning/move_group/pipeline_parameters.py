@@ -19,8 +19,11 @@ from modular_framework_planning.planning_interface.planning_request import (
     SamplingSettings,
 )
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, read_pipeline_spec
-from modular_framework_planning.planning_pipeline.plugins import DEFAULT_PLANNER
+from modular_framework_planning.planning_pipeline.pipeline_spec import (
+    PipelineSpec,
+    pipelines_of,
+    read_pipeline_spec,
+)
 from modular_framework_planning.reproducible.request_seeds import RequestCounts, request_digest
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -116,25 +119,6 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         )
 
 
-def pipeline_parameters() -> tuple[dict[str, dict[str, Any]], str]:
-    """Returns the parameters of every pipeline and the default's name.
-
-    Noetic's layout is ~planning_pipelines/<name>/... and ~default_planning_pipeline; older config packages load the
-    parameters of their only pipeline into the node's own namespace.
-    """
-    own = rospy.get_param("~", {}) or {}
-    given = own.get("planning_pipelines") or {}
-    pipelines = {name: dict(item) for name, item in given.items() if isinstance(item, dict)}
-    default = str(own.get("default_planning_pipeline") or "")
-    if not pipelines:
-        name = default or str(own.get("planning_plugin") or DEFAULT_PLANNER).split("_interface")[0].split("/")[0]
-        inner = own.get(name)
-        pipelines = {name: {**own, **(inner if isinstance(inner, dict) else {})}}
-    if not default:
-        default = "ompl" if "ompl" in pipelines else next(iter(pipelines))
-    return pipelines, default
-
-
 def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_detector: str) -> PipelineSet:
     """Builds every pipeline; one that cannot be built is left out, with its reason in the log.
 
@@ -146,7 +130,7 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_dete
     Raises:
         ModelError: the default pipeline is not among the parameters, or cannot be built.
     """
-    parameters, default = pipeline_parameters()
+    parameters, default = pipelines_of(rospy.get_param("~", {}) or {})
     loaded: dict[str, PlanningPipeline] = {}
     refused: dict[str, str] = {}
     specs: list[PipelineSpec] = []

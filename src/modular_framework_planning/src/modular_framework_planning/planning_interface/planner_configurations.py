@@ -54,3 +54,25 @@ class PlannerConfigurations:
         with self._lock:
             old = {} if replace else self._entries.get((group, name), {})
             self._entries[group, name] = {**old, **values}
+
+
+def planner_kind(
+    own: Mapping[str, Any], groups: Mapping[str, Mapping[str, Any]], name: str, group: str
+) -> tuple[str, dict[str, Any]]:
+    """Returns the planner of a configuration's name, and its settings with those of the group.
+
+    Args:
+        own: Settings of that name.
+        groups: Settings of the pipeline's groups.
+        name: Name of the planner or configuration.
+        group: Planning group.
+    """
+    kind = str(own.get("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
+    not_settings = ("planner_configs", "default_planner_config")
+    of_group = {key: value for key, value in groups.get(group, {}).items() if key not in not_settings}
+    return kind, of_group | {key: value for key, value in own.items() if key != "type"}
+
+
+def without_group(planner_id: str) -> str:
+    """Returns the planner in a name such as arm[RRTConnect]."""
+    return planner_id.split("[")[-1].rstrip("]") if planner_id.endswith("]") and "[" in planner_id else planner_id

@@ -22,7 +22,11 @@ from modular_framework_planning.planning_interface.collision_detectors import DE
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.path_repair import EdgeError
 from modular_framework_planning.planning_interface.phase_times import SETUP, PhaseTimes
-from modular_framework_planning.planning_interface.planner_configurations import PlannerConfigurations
+from modular_framework_planning.planning_interface.planner_configurations import (
+    PlannerConfigurations,
+    planner_kind,
+    without_group,
+)
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
     PipelineSettings,
@@ -280,10 +284,10 @@ class PlanningPipeline:
     def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any], str]:
         """Returns the planner's name and settings, and the name it replaces; raises PlanningError with known names."""
         default, known = self.settings.default_planner(group), self.planner_ids
-        kind, parameters = self._kind(_without_group(asked or default), group)
+        kind, parameters = self._kind(without_group(asked or default), group)
         replaced = ""
         if asked and known and kind not in known and self._replaces_bad_values:
-            kind, parameters = self._kind(_without_group(default), group)
+            kind, parameters = self._kind(without_group(default), group)
             replaced = asked
             LOGGER.warning(
                 "planner_id '%s': pipeline '%s' has no such planner, available: %s; group '%s' is planned "
@@ -304,16 +308,7 @@ class PlanningPipeline:
 
     def _kind(self, name: str, group: str) -> tuple[str, dict[str, Any]]:
         """Returns the planner of a configuration's name, and its settings with those of the group."""
-        own = self.configurations.get(name, group)
-        kind = str(own.pop("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
-        return kind, {
-            **{
-                key: value
-                for key, value in self.settings.groups.get(group, {}).items()
-                if key not in ("planner_configs", "default_planner_config")
-            },
-            **own,
-        }
+        return planner_kind(self.configurations.get(name, group), self.settings.groups, name, group)
 
     def _scaled_limits(self, request: PlanningRequest, group: JointGroup) -> tuple[Array, Array]:
         factors = []
@@ -381,8 +376,3 @@ def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
         f"the motion found in {spent:.2f} s fails the last check: "
         f"{fault}; move the goal or the start away from contact",
     )
-
-
-def _without_group(planner_id: str) -> str:
-    """Returns the planner in a name such as arm[RRTConnect]."""
-    return planner_id.split("[")[-1].rstrip("]") if planner_id.endswith("]") and "[" in planner_id else planner_id

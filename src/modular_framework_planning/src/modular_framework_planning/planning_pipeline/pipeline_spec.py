@@ -54,6 +54,27 @@ class PipelineSpec:
         )
 
 
+def pipelines_of(node: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], str]:
+    """Returns the parameters of every pipeline, by name, and the default's name.
+
+    Noetic's layout is planning_pipelines/<name>/... and default_planning_pipeline; older config packages load the
+    parameters of their only pipeline into the node's own namespace.
+
+    Args:
+        node: Parameters of move_group.
+    """
+    given = node.get("planning_pipelines") or {}
+    pipelines = {name: dict(item) for name, item in given.items() if isinstance(item, dict)}
+    default = str(node.get("default_planning_pipeline") or "")
+    if not pipelines:
+        name = default or str(node.get("planning_plugin") or DEFAULT_PLANNER).split("_interface")[0].split("/")[0]
+        inner = node.get(name)
+        pipelines = {name: {**node, **(inner if isinstance(inner, dict) else {})}}
+    if not default:
+        default = "ompl" if "ompl" in pipelines else next(iter(pipelines))
+    return pipelines, default
+
+
 def read_pipeline_spec(
     name: str,
     parameters: Mapping[str, Any],

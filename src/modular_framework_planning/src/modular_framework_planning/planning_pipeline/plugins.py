@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from modular_framework_planning.errors import ModelError
 from modular_framework_planning.planning_interface.planner_interface import Planner
@@ -59,13 +60,19 @@ def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> 
         ModelError: there is no such class, or it has no method `plan`; lists the planners there are.
         PlanningError: the planner refuses its parameters.
     """
+    kind = planner_class(plugin)
+    planner: Planner = kind.configure(model, settings) if hasattr(kind, "configure") else kind()
+    return planner
+
+
+def planner_class(plugin: str) -> Any:
+    """Returns the class that a planning_plugin names; arguments and errors as for `make_planner`."""
     name = plugin.replace("::", "/")
     known = f"known are {', '.join(sorted(PLANNERS))} and module/Class of a class with a method plan(problem)"
     kind = plugin_class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", known)
-    planner = kind.configure(model, settings) if hasattr(kind, "configure") else kind()
-    if not callable(getattr(planner, "plan", None)):
+    if not callable(getattr(kind, "plan", None)):
         raise ModelError(f"planning_plugin '{plugin}': class {kind.__name__} has no method plan; {known}")
-    return planner
+    return kind
 
 
 def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import difflib
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,34 +25,45 @@ def _bool(value: object) -> bool:
     return text in ("1", "true", "1.0")
 
 
-def _float(value: object) -> float:
-    return float(str(value))
+def _number(low: float = -math.inf, high: float = math.inf, whole: bool = False) -> Callable[[object], Any]:
+    """Returns a reader of finite numbers from a range, both ends included."""
+    words = f"a {'whole ' if whole else ''}number"
+    words += "" if low == -math.inf else f" of at least {low:g}" if high == math.inf else f" from {low:g} to {high:g}"
+
+    def read(value: object) -> float | int:
+        try:
+            number = float(str(value))
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number) or not low <= number <= high or (whole and number != int(number)):
+            raise ValueError(words)
+        return int(number) if whole else number
+
+    return read
 
 
-def _int(value: object) -> int:
-    return int(float(str(value)))
-
-
+_NOT_NEGATIVE, _FRACTION, _COUNT = _number(0.0), _number(0.0, 1.0), _number(1, whole=True)
+_POSITIVE = _number(1e-9)
 Setting = tuple[str, Callable[[object], Any]]
-_RANGE: dict[str, Setting] = {"range": ("setRange", _float)}
-_BIAS: dict[str, Setting] = {"goal_bias": ("setGoalBias", _float)}
+_RANGE: dict[str, Setting] = {"range": ("setRange", _NOT_NEGATIVE)}
+_BIAS: dict[str, Setting] = {"goal_bias": ("setGoalBias", _FRACTION)}
 _INTERMEDIATE: dict[str, Setting] = {"intermediate_states": ("setIntermediateStates", _bool)}
 _CELLS: dict[str, Setting] = {
-    "border_fraction": ("setBorderFraction", _float),
-    "min_valid_path_fraction": ("setMinValidPathFraction", _float),
+    "border_fraction": ("setBorderFraction", _FRACTION),
+    "min_valid_path_fraction": ("setMinValidPathFraction", _FRACTION),
 }
-_FAILED: dict[str, Setting] = {"failed_expansion_score_factor": ("setFailedExpansionCellScoreFactor", _float)}
+_FAILED: dict[str, Setting] = {"failed_expansion_score_factor": ("setFailedExpansionCellScoreFactor", _FRACTION)}
 _STAR: dict[str, Setting] = {
     "delay_collision_checking": ("setDelayCC", _bool),
     "focus_search": ("setFocusSearch", _bool),
     "informed_sampling": ("setInformedSampling", _bool),
     "new_state_rejection": ("setNewStateRejection", _bool),
-    "number_sampling_attempts": ("setNumSamplingAttempts", _int),
+    "number_sampling_attempts": ("setNumSamplingAttempts", _COUNT),
     "ordered_sampling": ("setOrderedSampling", _bool),
-    "ordering_batch_size": ("setBatchSize", _int),
-    "prune_threshold": ("setPruneThreshold", _float),
+    "ordering_batch_size": ("setBatchSize", _COUNT),
+    "prune_threshold": ("setPruneThreshold", _FRACTION),
     "pruned_measure": ("setPrunedMeasure", _bool),
-    "rewire_factor": ("setRewireFactor", _float),
+    "rewire_factor": ("setRewireFactor", _POSITIVE),
     "sample_rejection": ("setSampleRejection", _bool),
     "tree_pruning": ("setTreePruning", _bool),
     "use_admissible_heuristic": ("setAdmissibleCostToCome", _bool),
@@ -59,26 +72,26 @@ _STAR: dict[str, Setting] = {
 _MARCHING: dict[str, Setting] = {
     "cache_cc": ("setCacheCC", _bool),
     "extended_fmt": ("setExtendedFMT", _bool),
-    "free_space_volume": ("setFreeSpaceVolume", _float),
+    "free_space_volume": ("setFreeSpaceVolume", _NOT_NEGATIVE),
     "heuristics": ("setHeuristics", _bool),
     "nearest_k": ("setNearestK", _bool),
-    "num_samples": ("setNumSamples", _int),
-    "radius_multiplier": ("setRadiusMultiplier", _float),
+    "num_samples": ("setNumSamples", _COUNT),
+    "radius_multiplier": ("setRadiusMultiplier", _POSITIVE),
 }
 _BATCHES: dict[str, Setting] = {
     "delay_rewiring_to_first_solution": ("setDelayRewiringUntilInitialSolution", _bool),
     "drop_unconnected_samples_on_prune": ("setDropSamplesOnPrune", _bool),
     "find_approximate_solutions": ("setConsiderApproximateSolutions", _bool),
-    "prune_threshold_as_fractional_cost_change": ("setPruneThresholdFraction", _float),
-    "rewire_factor": ("setRewireFactor", _float),
-    "samples_per_batch": ("setSamplesPerBatch", _int),
+    "prune_threshold_as_fractional_cost_change": ("setPruneThresholdFraction", _FRACTION),
+    "rewire_factor": ("setRewireFactor", _POSITIVE),
+    "samples_per_batch": ("setSamplesPerBatch", _COUNT),
     "stop_on_each_solution_improvement": ("setStopOnSolnImprovement", _bool),
     "use_graph_pruning": ("setPruning", _bool),
     "use_just_in_time_sampling": ("setJustInTimeSampling", _bool),
     "use_k_nearest": ("setUseKNearest", _bool),
     "use_strict_queue_ordering": ("setStrictQueueOrdering", _bool),
 }
-_ROADMAP: dict[str, Setting] = {"max_nearest_neighbors": ("setMaxNearestNeighbors", _int)}
+_ROADMAP: dict[str, Setting] = {"max_nearest_neighbors": ("setMaxNearestNeighbors", _COUNT)}
 
 PLANNERS: dict[str, tuple[type, dict[str, Setting]]] = {
     "RRTConnect": (og.RRTConnect, {**_RANGE, **_INTERMEDIATE}),
@@ -102,16 +115,16 @@ THREADED = frozenset({"PRM", "PRMstar"})
 ANYTIME = frozenset({"AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar"})
 PATH_LENGTH = "PathLengthOptimizationObjective"
 # Keys of ompl_planning.yaml that are read elsewhere, and those of which this OMPL supports one value only.
-GENERAL_KEYS = (
-    "type",
-    "projection_evaluator",
-    "longest_valid_segment_fraction",
-    "maximum_waypoint_distance",
-    "simplify_solutions",
-    "optimization_objective",
-    "enforce_joint_model_state_space",
-    "enforce_constrained_state_space",
-)
+GENERAL_KEYS: dict[str, Callable[[object], Any]] = {
+    "type": str,
+    "projection_evaluator": str,
+    "longest_valid_segment_fraction": _number(1e-9, 1.0),
+    "maximum_waypoint_distance": _NOT_NEGATIVE,
+    "simplify_solutions": _bool,
+    "optimization_objective": str,
+    "enforce_joint_model_state_space": _bool,
+    "enforce_constrained_state_space": _bool,
+}
 # Settings OMPL has, but not in its Python interface.
 NOT_SETTABLE = {"BFMT": ("balanced", "optimality")}
 
@@ -128,10 +141,13 @@ def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[st
         elif key in known:
             faults += _unreadable(key, known[key][1], value)
         elif key not in GENERAL_KEYS:
+            near = difflib.get_close_matches(key, (*known, *GENERAL_KEYS), n=1)
             faults.append(
                 f"{planner_id} has no setting '{key}'; it is ignored; allowed are "
-                f"{', '.join(sorted((*known, *GENERAL_KEYS)))}"
+                f"{', '.join(sorted((*known, *GENERAL_KEYS)))}" + "".join(f"; did you mean '{name}'?" for name in near)
             )
+        elif faulty := _unreadable(key, GENERAL_KEYS[key], value):
+            faults += faulty
         elif key == "optimization_objective" and str(value) != PATH_LENGTH:
             faults.append(f"optimization_objective '{value}' is not available and ignored; allowed is {PATH_LENGTH}")
     return faults
@@ -143,7 +159,7 @@ def _unreadable(key: str, read: Callable[[object], Any], value: object) -> list[
     try:
         read(value)
     except ValueError as error:
-        return [f"'{key}' is '{value}', which cannot be read: {error}"]
+        return [f"'{key}' is '{value}', which cannot be read; allowed: {error}"]
     return []
 
 
