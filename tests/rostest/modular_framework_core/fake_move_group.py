@@ -16,6 +16,7 @@ from moveit_msgs.msg import (
     ExecuteTrajectoryAction,
     ExecuteTrajectoryResult,
     MoveItErrorCodes,
+    PlannerInterfaceDescription,
 )
 from moveit_msgs.srv import (
     GetMotionPlan,
@@ -26,6 +27,8 @@ from moveit_msgs.srv import (
     GetPositionIKResponse,
     GetStateValidity,
     GetStateValidityResponse,
+    QueryPlannerInterfaces,
+    QueryPlannerInterfacesResponse,
 )
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
@@ -85,6 +88,7 @@ class FakeMoveGroup:
             rospy.Service("compute_ik", GetPositionIK, self._ik),
             rospy.Service("check_state_validity", GetStateValidity, self._validity),
             rospy.Service("get_planning_scene", GetPlanningScene, self._scene),
+            rospy.Service("query_planner_interface", QueryPlannerInterfaces, self._planners),
         ]
         self._server = actionlib.SimpleActionServer("execute_trajectory", ExecuteTrajectoryAction, self._execute, False)
         self._server.start()
@@ -110,6 +114,15 @@ class FakeMoveGroup:
             while not rospy.is_shutdown():
                 self._joints.publish(JointState(name=list(self.positions), position=list(self.positions.values())))
                 time.sleep(0.02)
+
+    def _planners(self, _):
+        return QueryPlannerInterfacesResponse(
+            [
+                PlannerInterfaceDescription(pipeline_id="ompl", planner_ids=["RRTConnect", "RRT", "arm[Quick]"]),
+                PlannerInterfaceDescription(pipeline_id="pilz", planner_ids=["LIN"]),
+                PlannerInterfaceDescription(pipeline_id="anything"),
+            ]
+        )
 
     def _plan(self, request):
         self.requests.append(request.motion_plan_request)

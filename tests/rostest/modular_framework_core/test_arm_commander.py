@@ -65,6 +65,40 @@ def test_settings_and_targets_arrive_in_the_request(commander) -> None:
     assert [(c.joint_name, c.position) for c in request.goal_constraints[0].joint_constraints] == [("jx", 0.4)]
 
 
+@pytest.mark.parametrize(
+    ("name", "asked_for"),
+    [
+        ("RRT", ("ompl", "RRT")),
+        ("pilz/LIN", ("pilz", "LIN")),
+        ("LIN", ("pilz", "LIN")),
+        ("Quick", ("ompl", "Quick")),
+        ("anything/mine", ("anything", "mine")),
+        ("", ("", "")),
+    ],
+)
+def test_a_planner_is_asked_for_in_the_pipeline_that_has_it(commander, name: str, asked_for: tuple[str, str]) -> None:
+    commander.set_planner_id(name)
+    assert commander.plan_to_joint_value_target({"jx": 0.4}).success
+    request = commander.fake.requests[-1]
+    assert (request.pipeline_id, request.planner_id) == asked_for
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("RRTConect", "There is no planner 'RRTConect'; allowed: LIN, Quick,.*; did you mean 'RRTConnect'?"),
+        ("pils/LIN", "There is no pipeline 'pils'; allowed: anything, ompl, pilz; did you mean 'pilz'?"),
+        ("pilz/RRT", "There is no planner 'pilz/RRT'; allowed: .*pilz/LIN"),
+    ],
+)
+def test_a_planner_that_is_not_there_is_refused_and_nothing_changes(commander, name: str, fault: str) -> None:
+    commander.set_planner_id("RRT")
+    with pytest.raises(CommanderError, match=fault):
+        commander.set_planner_id(name)
+    assert commander.plan_to_joint_value_target({"jx": 0.4}).success
+    assert commander.fake.requests[-1].planner_id == "RRT"
+
+
 def test_another_group_is_planned_for_with_settings_of_its_own(commander) -> None:
     commander.set_num_planning_attempts(3)
     hand = commander.of_group("hand")

@@ -45,6 +45,7 @@ from modular_framework_core.commander.results import ExecutionResult, IkResult, 
 from modular_framework_core.commander.robot_groups import Group, RobotModelError, read_group
 from modular_framework_core.commander.ros_joint_monitor import JointMonitor
 from modular_framework_core.commander.ros_planning_reports import PlanningReports
+from modular_framework_core.files.faults import listing, nearest
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import (
     CallError,
@@ -185,9 +186,26 @@ class ArmCommander:
         self._velocity_scaling = float(factor)
 
     def set_planner_id(self, planner_id: str) -> None:
-        """Sets the planner by the name move_group knows it by, or ``pipeline/planner``; empty for the default."""
+        """Sets the planner by the name move_group knows it by, or ``pipeline/planner``; empty for the default.
+
+        A name without pipeline stands for the only pipeline that has the planner.
+
+        Raises:
+            CommanderError: move_group has no such planner, or does not answer.
+        """
         pipeline, _, planner = str(planner_id).rpartition("/")
-        self._pipeline_id, self._planner_id = pipeline, planner
+        offered = self._planners() if planner_id else {}
+        if pipeline and pipeline not in offered:
+            known = listing(sorted(offered))
+            raise CommanderError(f"There is no pipeline '{pipeline}'; {known}{nearest(pipeline, offered)}")
+        having = [name for name, planners in offered.items() if planner in planners or (pipeline and not planners)]
+        if planner_id and not (pipeline in having if pipeline else having):
+            known = self.planner_names()
+            raise CommanderError(
+                f"There is no planner '{planner_id}'; {listing(known)}{nearest(str(planner_id), known)}"
+            )
+        self._pipeline_id = pipeline or (having[0] if len(having) == 1 else "")
+        self._planner_id = planner
 
     def planner_names(self) -> list[str]:
         """Returns the planners move_group offers: all by their names alone, and as ``pipeline/planner``.
@@ -195,18 +213,27 @@ class ArmCommander:
         Raises:
             CommanderError: move_group does not answer.
         """
+        offered = self._planners().items()
+        return sorted(
+            {name for item, planners in offered for planner in planners for name in (planner, f"{item}/{planner}")}
+        )
+
+    def _planners(self) -> dict[str, set[str]]:
+        """Returns the planners of each pipeline that this group may ask for."""
         request = QueryPlannerInterfacesRequest()
         try:
             answer = request_service(PLANNERS_SERVICE, QueryPlannerInterfaces, request, SERVICE_TIMEOUT_S)
         except CallError as error:
             raise CommanderError(str(error)) from error
-        names = {
-            name
+        own = f"{self.group_name}["
+        return {
+            item.pipeline_id: {
+                name.removeprefix(own).removesuffix("]")
+                for name in item.planner_ids
+                if name.startswith(own) or not name.endswith("]")
+            }
             for item in answer.planner_interfaces
-            for planner in item.planner_ids
-            for name in (planner, f"{item.pipeline_id}/{planner}")
         }
-        return sorted(names)
 
     def set_num_planning_attempts(self, attempts: int) -> None:
         """Sets the number of planning attempts.

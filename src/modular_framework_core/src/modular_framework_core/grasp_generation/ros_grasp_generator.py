@@ -370,6 +370,8 @@ def _work(method: GraspMethod, codes: list[int]) -> None:
     except Exception as error:  # whatever it is must end the node, which would stay without doing anything
         if not rospy.is_shutdown():
             codes.append(1)
-            rospy.logfatal("%s: %s", rospy.get_name(), error, exc_info=not isinstance(error, NoGraspError | ParameterError))
+            rospy.logfatal(
+                "%s: %s", rospy.get_name(), error, exc_info=not isinstance(error, NoGraspError | ParameterError)
+            )
     finally:
         rospy.signal_shutdown("the generator has ended")

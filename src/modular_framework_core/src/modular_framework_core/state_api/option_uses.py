@@ -28,7 +28,8 @@ class Named:
 
     Attributes:
         kind: What it names: joint_state, trajectory, pose, plan or grasp, a state of the manipulator's group
-            (posture), or a planning group (group); ``option:<name>`` for the kind that another option says.
+            (posture), a planning group (group), or a planner (planner); ``option:<name>`` for the kind that another
+            option says.
         made: Whether the state itself stores something under the name.
         userdata: Whether the name ``userdata`` takes what userdata has under ``selected_<kind>``, an input key then.
     """

@@ -24,7 +24,7 @@ from modular_framework_core.task_constructor.task_spec import MachineSpec, State
 from modular_framework_core.task_constructor.userdata_checks import declared_keys
 
 _PLURALS = {"trajectory": "trajectories"}
-_WORDS = {"posture": "posture", "group": "planning group"}
+_WORDS = {"posture": "posture", "group": "planning group", "planner": "planner"}
 
 
 def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
@@ -116,10 +116,14 @@ class _Checker:
             f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {word} '{name}' is "
             f"unknown; {listing(sorted(names), 'there is none')}"
         )
-        origin = self._known.origins.get(kind, "the manager's file")
+        origin = self._known.origins.get(kind, "" if kind == "planner" else "the manager's file")
         meant = nearest(name, sorted(names))
         if kind in _WORDS:
-            return f"{text}; name one of these, or add it to {origin}{meant}"
+            return (
+                f"{text}; name one of these{meant}"
+                if not origin
+                else f"{text}; name one of these, or add it to {origin}{meant}"
+            )
         maker = "let a state make it (plan_name)" if kind == "plan" else f"add it to {origin}"
         return f"{text}; {maker}, or name it in external_names of the task where another node adds it{meant}"
 

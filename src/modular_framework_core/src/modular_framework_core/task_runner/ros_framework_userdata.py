@@ -91,11 +91,15 @@ def initialise_acm(manipulator_prefix: str) -> None:
 
 
 def make_arm_commander(parameters: UserdataParameters) -> ArmCommander:
-    """Returns a connected commander for the planning group of the parameters, with their planner settings."""
+    """Returns a connected commander for the planning group of the parameters, with their planner settings.
+
+    Raises:
+        CommanderError: Something needed is missing, or there is no planner of that name.
+    """
     commander = ArmCommander(name=parameters.arm_group_name, set_ground=False)
     commander.set_max_velocity_scaling_factor(parameters.robot_speed_factor)
-    commander.set_planner_id(parameters.planner_name)
     commander.set_num_planning_attempts(parameters.number_plan_attempt)
     commander.set_planning_time(parameters.planning_max_time)
     commander.connect()
+    commander.set_planner_id(parameters.planner_name)
     return commander

@@ -95,7 +95,7 @@ class PlannerRegistry:
             )
             if not asked and known:
                 kind = known[0]
-            if kind in known or (not known and item == order[0]):
+            if kind in known or (wanted and not known):
                 return ResolvedPlanner(item, spec.planner, kind, settings, spec.adapters)
         raise UnknownNameError("planner", name, self.names())
 

@@ -27,7 +27,7 @@ class SetPlanner(FrameworkState):
 
     def __init__(
         self,
-        planner_id: str = "",
+        planner_id: Annotated[str, Named("planner")] = "",
         planning_time: Annotated[float, Limits(above=0.0, at_most=86400.0)] | None = None,
         attempts: Annotated[int, Limits(at_least=1)] | None = None,
         speed_factor: Share | None = None,
@@ -47,9 +47,6 @@ class SetPlanner(FrameworkState):
         try:
             commander = userdata.arm_commander.of_group(self._group)
             if self._planner_id:
-                known = commander.planner_names()
-                if self._planner_id not in known:
-                    return self.fail(f"there is no planner '{self._planner_id}'; move_group has {', '.join(known)}")
                 commander.set_planner_id(self._planner_id)
             for setter, value in self._settings.items():
                 if value is not None:
