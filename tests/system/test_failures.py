@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
 import time
 from pathlib import Path
 from xmlrpc.client import ServerProxy
@@ -21,7 +22,6 @@ HEADLESS = {"gui": "false", "rviz": "false"}
 REQUIRED = (
     "gazebo",
     "custom_controller_spawner",
-    "robot_state_publisher",
     "move_group",
     "managers",
     "sensors_tf2_broadcaster",
@@ -29,6 +29,22 @@ REQUIRED = (
     "top_down_grasp_generator",
     "task",
 )
+LAST_STAMP = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import rospy
+from ros_session import until
+from sensor_msgs.msg import JointState
+rospy.init_node("last_stamp", disable_signals=True)
+publisher = rospy.Publisher("/joint_states", JointState, queue_size=1)
+message = JointState(name=["elbow_joint"], position=[1.3870131566])
+message.header.stamp = rospy.Time(2**32 - 1)
+def ended():
+    publisher.publish(message)
+    return not Path("/proc", sys.argv[2]).exists()
+until(ended, "robot_state_publisher has ended")
+"""
 KILLED = ("move_group", "moveit_grasp_action_server", "rosout")
 """A node that the launch file requires, one that another node starts, and the one that comes with the master."""
 
@@ -48,7 +64,18 @@ def test_the_launch_file_requires_the_node(nodes: dict[str, bool], node: str) ->
 
 
 def test_there_are_no_other_nodes(nodes: dict[str, bool]) -> None:
-    assert set(nodes) == set(REQUIRED)
+    assert set(nodes) == {*REQUIRED, "robot_state_publisher"}
+
+
+def test_a_joint_state_of_the_last_second_that_a_stamp_can_name_does_not_end_the_task(session: RosSession) -> None:
+    """Debian's robot_state_publisher dies of that stamp."""
+    launch = session.run_framework(**HEADLESS)
+    _wait_for_text(launch, "first state running", 120.0)
+    before = _pid_of(session, "robot_state_publisher")
+    command = [sys.executable, "-c", LAST_STAMP, str(Path(__file__).parents[1]), str(before)]
+    subprocess.run(command, env=session.env, check=True, timeout=60.0)
+    assert launch.wait(TASK_TIMEOUT_S) == 0, launch.log()
+    assert "[robot_state_publisher-" in launch.log() and "restarting process" in launch.log()
 
 
 def test_object_out_of_reach_ends_the_task_in_failure_and_says_why(session: RosSession) -> None:

@@ -100,6 +100,7 @@ def generate_launch_description() -> LaunchDescription:
         package="robot_state_publisher",
         executable="robot_state_publisher",
         name="robot_state_publisher",
+        respawn=True,
         output="both",
         parameters=[moveit_config.robot_description],
     )

@@ -61,16 +61,18 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
             self.task_exit_code = exit_code
             if not self.ends_with_task:
                 return
-        elif exit_code != 0 or self._is_required(name):
+        elif self._is_missed(name, exit_code):
             self.dead_node = (name, exit_code)
         else:
             return
         self.last_process = process_name
         self._end_launch()
 
-    def _is_required(self, name: str) -> bool:
+    def _is_missed(self, name: str, exit_code: int | None) -> bool:
+        """Returns whether the launch ends with a node: it failed or is required, and is not started again."""
         nodes = self.parent.config.nodes if self.parent is not None and self.parent.config is not None else []
-        return any(node.name == name and node.required for node in nodes)
+        named = [node for node in nodes if node.name == name]
+        return not any(node.respawn for node in named) and (exit_code != 0 or any(node.required for node in named))
 
     def _end_launch(self) -> None:
         if self.at_end is not None:
