@@ -127,6 +127,52 @@ def way_after(loop: Any, duration_s: float = 3.0) -> float:
     return furthest
 
 
+class HeavyRobotHW(WalledRobotHW):
+    """Fake hardware whose joints, like those of an arm, cannot stop at once.
+
+    Attributes:
+        strength: largest acceleration of a joint [rad/s^2].
+    """
+
+    strength = 5.0
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._last = [0.0, 0.0]
+
+    def read(self, time_s: float, period_s: float) -> None:
+        for index, joint in enumerate(self.joints):
+            state, pace = joint.state, (joint.command - self._last[index]) / max(period_s, 1e-9)
+            behind, self._last[index] = self._last[index] - state.position, joint.command
+            wanted = pace + math.copysign(min(FASTEST, 0.8 * math.sqrt(2.0 * self.strength * abs(behind))), behind)
+            change = self.strength * period_s
+            state.velocity += min(max(wanted - state.velocity, -change), change)
+            state.position += state.velocity * period_s
+
+
+@pytest.mark.parametrize("end", ["cancel", "restart"])
+def test_a_heavy_joint_that_is_stopped_without_a_ramp_does_not_turn_back_and_the_next_goal_succeeds(
+    start: Callable[..., Any], end: str
+) -> None:
+    limits = {**LIMITS, "has_acceleration_limits": True, "max_acceleration": HeavyRobotHW.strength}
+    loop = start(limits=limits, tolerance={"goal": 0.02}, hw=HeavyRobotHW())
+    goal_handle = send(loop, (2.0, (2.0, -1.0), (0.0, 0.0)))
+    loop.run(1.0)
+    assert loop.robot_hw.joints[0].velocity > 1.5
+    if end == "cancel":
+        loop.controllers["c"].cancel(goal_handle)
+    else:
+        assert loop.switch(["c"], ["c"]) is None
+    loop.run(0.1)
+    seen = []
+    for _ in range(70):
+        loop.step()
+        seen.append(positions(loop)[0])
+    assert max(before - after for before, after in pairwise(seen)) < 1e-3
+    assert max(seen) - seen[-1] < 0.02
+    assert_next_goal_succeeds(loop)
+
+
 def assert_next_goal_succeeds(loop: Any) -> None:
     target = tuple(position + 0.05 for position in positions(loop))
     goal_handle = send(loop, (1.0, target, (0.0, 0.0)))

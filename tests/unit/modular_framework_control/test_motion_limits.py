@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -164,10 +165,19 @@ def test_a_ramp_that_may_not_brake_so_hard_takes_as_much_longer() -> None:
     assert np.abs(sampled(track, 0.0)[:, 2]).max() == pytest.approx(20.0, rel=1e-3)
 
 
-@pytest.mark.parametrize(("duration_s", "rate"), [(0.0, 1.0), (0.5, 0.0)])
-def test_without_a_duration_and_while_the_robot_is_paused_the_measured_position_is_held(
-    duration_s: float, rate: float
+@pytest.mark.parametrize("velocity", [2.0, -2.0, 1e-3])
+def test_without_a_duration_a_joint_brakes_evenly_nearly_as_hard_as_it_may(velocity: float) -> None:
+    track = StopMotion(0.0, BOUND).tracks(np.array([[0.0], [velocity]]), np.array([[0.0], [velocity]]), 3.0, 1.0)[0]
+    moving = sampled(track, 3.0)[np.linspace(3.0, track.end_s + 0.1, 2000) < track.end_s]
+    assert np.abs(moving[:, 2]) == pytest.approx(0.9 * 20.0, rel=1e-6)
+    assert track.sample(4.0)[:, 0] == pytest.approx([velocity * abs(velocity) / (2.0 * 0.9 * 20.0), 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("duration_s", "rate", "braking"), [(0.0, 1.0, math.inf), (0.0, 0.0, 20.0), (0.5, 0.0, 20.0)])
+def test_the_measured_position_is_held_while_the_robot_is_paused_and_where_no_deceleration_is_known(
+    duration_s: float, rate: float, braking: float
 ) -> None:
     actual = np.array([[0.5], [2.0]])
-    track = StopMotion(duration_s, BOUND).tracks(np.array([[1.5], [2.0]]), actual, 3.0, rate)[0]
+    bound = replace(BOUND, braking=np.array([braking]))
+    track = StopMotion(duration_s, bound).tracks(np.array([[1.5], [2.0]]), actual, 3.0, rate)[0]
     assert track.sample(4.0)[:, 0].tolist() == [0.5, 0.0, 0.0]

@@ -34,6 +34,7 @@ class FakeLink:
         self.program_failed_s = 0.0
         self.commanding = True
         self.positions: Sequence[float] = ZEROS
+        self.velocities: tuple[float, ...] = ZEROS
         self.runtime_state = PLAYING
         self.sent: list[list[float]] = []
 
@@ -43,7 +44,7 @@ class FakeLink:
             time.monotonic(),
             0.0,
             tuple(self.positions),
-            ZEROS,
+            self.velocities,
             ZEROS,
             ZEROS,
             1.0,
@@ -97,6 +98,24 @@ def test_what_a_paused_arm_was_commanded_meanwhile_is_not_caught_up_with_in_a_ju
     assert np.abs(speeds).max() <= np.pi * 1.001
     assert np.abs(np.diff(speeds, axis=0, prepend=0.0)).max() <= 40.0 * PERIOD_S * 1.001
     assert way[-1] == pytest.approx([0.3] * 6)
+
+
+def test_joints_that_are_held_in_a_motion_brake_and_do_not_come_back(hw: UrArmHardware) -> None:
+    link, handles = FakeLink.made, hw.get(PositionJointInterface).handles
+    run(hw, 30, lambda cycle: 0.008 * cycle)
+    link.velocities = (1.0,) * 6
+    hw.read(0.0, PERIOD_S)
+    for handle in handles:
+        handle.hold(handle.position - 0.02)  # measured late
+    first = len(link.sent)
+    for _ in range(100):
+        hw.write(0.0, PERIOD_S)
+        hw.read(0.0, PERIOD_S)
+        link.velocities = ZEROS
+    way = np.array(link.sent[first - 1 :])[:, 0]
+    assert (np.diff(way) >= -1e-9).all()
+    assert 0.0 < way[-1] - way[0] < 0.05 + 1.0 / (2.0 * 0.9 * 40.0)
+    assert handles[0].command == pytest.approx(way[-1])
 
 
 @pytest.mark.parametrize("pause_s", [0.1, 0.45, 3600.0])

@@ -59,7 +59,7 @@ class JointTrajectoryController(Controller):
 
     A goal beyond the limits of its joints, where they are known, is refused. Whatever ends a motion before its goal
     (cancel, abort, a trajectory without points) stops it from where the joints are measured, within their limits:
-    with `stop_trajectory_duration` 0 they are held there.
+    with `stop_trajectory_duration` 0 each brakes as hard as it may, and is held at once if that is not known.
 
     While the hardware has a fault the joints are held where they are measured, and goals are refused with its reason.
     When a measured position is not a number the goal is aborted, the joints stop, and goals are refused until it is.
@@ -169,6 +169,7 @@ class JointTrajectoryController(Controller):
             raise ControllerError(self._unmeasured)
         self._plan.hold(self._actual[POSITION], time_s)
         self._rest()
+        self._stop()  # the joints may still move
         self._running = True
 
     def stopping(self, time_s: float) -> None:
@@ -359,11 +360,11 @@ class JointTrajectoryController(Controller):
     def _stop(self) -> None:
         """Stops the motion, beginning at the measured positions."""
         desired, actual = self._desired_and_measured()
-        self._plan.follow(
-            self._stop_motion.tracks(desired, actual, self._clock.now_s, self._clock.rate), self._clock.now_s
-        )
-        for handle in self._handles:
-            handle.held = self._stop_motion.holds(self._clock.rate)
+        now_s = self._clock.now_s
+        tracks = self._stop_motion.tracks(desired, actual, now_s, self._clock.rate)
+        self._plan.follow(tracks, now_s)
+        for joint in (joint for track in tracks if track.end_s <= now_s for joint in track.joints):
+            self._handles[joint].held = True
 
     def _check(self, goal: ValidatedGoal, now_s: float, error: Array) -> bool:
         """Ends a goal that is reached or whose tolerances are violated; returns whether the motion must stop."""

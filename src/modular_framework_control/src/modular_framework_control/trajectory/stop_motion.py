@@ -27,6 +27,9 @@ COMMAND_S = 0.01
 FOLLOWING_SHARE = 0.1
 """A joint whose measured velocity differs from the desired one by at most this share of it counts as following; a ramp
 then begins at the desired velocity, because measured velocities are late and noisy."""
+SHARP_BRAKING_SHARE = 0.9
+"""Share of the largest deceleration that a stop without a ramp takes. The rest is for a joint that follows late to catch
+up, so that it does not run past the end of the stop and come back."""
 PEAK_OF_RAMP = 1.5
 """Largest deceleration of a ramp, as a multiple of its mean one."""
 
@@ -35,17 +38,14 @@ class StopMotion:
     """Makes the motion in which joints stop.
 
     Args:
-        duration_s: of a ramp [s], longer where a joint may not brake that hard; 0 to hold the measured positions.
+        duration_s: of a ramp [s], longer where a joint may not brake that hard; 0 to brake as hard as each joint may: a
+            joint whose largest deceleration is not known is held where it is measured.
         limits: of the joints.
     """
 
     def __init__(self, duration_s: float, limits: MotionLimits) -> None:
         self._duration_s = duration_s
         self._limits = limits
-
-    def holds(self, rate: float) -> bool:
-        """Whether the joints are held where they are, at this rate of the trajectories' clock, and not slowed down."""
-        return self._duration_s * rate <= SHORTEST_SEGMENT_S
 
     def tracks(self, desired: Array, actual: Array, time_s: float, rate: float) -> list[Track]:
         """The motion of all joints from `time_s` on.
@@ -56,10 +56,7 @@ class StopMotion:
             time_s: now [s of the trajectories' clock].
             rate: how fast that clock runs, 0 to 1; a slowed robot has as much less speed to lose.
         """
-        limits = self._limits
-        joints = range(actual.shape[1])
-        if self.holds(rate):
-            return [Track.hold(list(joints), actual[POSITION], time_s)]
+        limits, sharp = self._limits, self._duration_s * rate <= SHORTEST_SEGMENT_S
         follows = np.abs(desired[VELOCITY] - actual[VELOCITY]) <= FOLLOWING_SHARE * np.abs(desired[VELOCITY])
         velocity = np.clip(np.where(follows, desired[VELOCITY], actual[VELOCITY]), -limits.fastest, limits.fastest)
         under_way = FOLLOWING_LAG_S * np.minimum(np.abs(actual[VELOCITY]), limits.fastest) + COMMAND_S * np.minimum(
@@ -69,22 +66,30 @@ class StopMotion:
         limits = limits.with_positions(actual[POSITION])
         position = np.clip(actual[POSITION] + ahead, limits.lowest, limits.highest)
         with np.errstate(divide="ignore", invalid="ignore"):
-            braking_s = np.where(limits.braking > 0.0, PEAK_OF_RAMP * np.abs(velocity) / limits.braking, 0.0)
-        durations_s = rate * np.maximum(self._duration_s, braking_s)
+            braking_s = np.where(limits.braking > 0.0, np.abs(velocity) / limits.braking, 0.0)
+        durations_s = rate * np.maximum(
+            self._duration_s, braking_s * (1.0 / SHARP_BRAKING_SHARE if sharp else PEAK_OF_RAMP)
+        )
+        if not (durations_s > SHORTEST_SEGMENT_S).any():
+            return [Track.hold(list(range(len(durations_s))), actual[POSITION], time_s)]
         return [
             _ramp(
                 joint,
-                (position[joint], velocity[joint] / rate),
+                (position[joint], velocity[joint] / rate) if duration_s > 0.0 else (actual[POSITION, joint], 0.0),
                 time_s,
-                durations_s[joint],
+                duration_s,
                 limits.highest[joint] if velocity[joint] > 0.0 else limits.lowest[joint],
+                3 if sharp else 5,
             )
-            for joint in joints
+            for joint, duration_s in enumerate(durations_s.tolist())
         ]
 
 
-def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: float, bound: float) -> Track:
-    """A velocity that falls as 1 - 3s^2 + 2s^3, so that half of the way without it is gone; `bound` ends it earlier."""
+def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: float, bound: float, order: int) -> Track:
+    """A ramp to rest on which half of the way without it is gone; `bound` ends it earlier.
+
+    The velocity falls evenly with `order` 3, as 1 - 3s^2 + 2s^3 with 5.
+    """
     position, velocity = start
     left = abs(bound - position)
     if 0.5 * abs(velocity) * duration_s > left:
@@ -94,5 +99,5 @@ def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: flo
     if duration_s <= SHORTEST_SEGMENT_S:
         return Track.hold([joint], begin[POSITION], time_s)
     end[POSITION] = position + 0.5 * duration_s * velocity
-    coefficients = segment_coefficients(begin, end, duration_s, 5)[np.newaxis]
+    coefficients = segment_coefficients(begin, end, duration_s, order)[np.newaxis]
     return Track([joint], [time_s], coefficients, time_s + duration_s, end[POSITION], time_s)

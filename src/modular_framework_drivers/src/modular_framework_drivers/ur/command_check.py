@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits, SoftJointLimits
 from modular_framework_control.hardware_interface.joint_limits import soft_velocities
 from modular_framework_control.trajectory.motion_limits import CURVE_MARGIN
+from modular_framework_control.trajectory.stop_motion import FOLLOWING_LAG_S, SHARP_BRAKING_SHARE
 
 _SLACK = 1e-6  # tolerance for rounding [rad], and as a share of a limit
 
@@ -82,6 +83,13 @@ class CommandCheck:
         self._targets = list(positions)
         self._velocities = [0.0] * len(self._joints)
 
+    def rest_after(self, index: int, position: float, velocity: float) -> float:
+        """Returns where a joint at `position` [rad] with `velocity` [rad/s] comes to rest if it brakes now [rad]."""
+        joint = self._joints[index]
+        lowest, highest = joint.range_from(position)
+        way = velocity * FOLLOWING_LAG_S + math.copysign(_braking_distance(velocity, joint), velocity)
+        return min(max(position + way, lowest), highest)
+
     def admit(self, commands: Sequence[float], period_s: float) -> str:
         """Sets `sent` to the command for the arm.
 
@@ -105,7 +113,7 @@ class CommandCheck:
         return reason
 
     def _reason_to_refuse(self, commands: Sequence[float]) -> str:
-        for command, sent, joint in zip(commands, self.sent, self._joints, strict=True):
+        for command, sent, velocity, joint in zip(commands, self.sent, self._velocities, self._joints, strict=True):
             limits = joint.limits
             if not math.isfinite(command):
                 return f"joint '{joint.name}': command {command} is no position; the arm holds"
@@ -115,7 +123,7 @@ class CommandCheck:
                     f"joint '{joint.name}': command {command:.6g} rad is outside its range "
                     f"[{limits.min_position:.6g}, {limits.max_position:.6g}] rad; the arm holds"
                 )
-            if abs(command - sent) > self._max_jump:
+            if abs(command - sent) > self._max_jump + _braking_distance(velocity, joint):
                 return (
                     f"joint '{joint.name}': command {command:.6g} rad is {abs(command - sent):.3g} rad away from "
                     f"{sent:.6g} rad where the arm is told to be; at most {self._max_jump:g} rad at once "
@@ -154,6 +162,10 @@ class CommandCheck:
         velocity += min(max(min(max(goal, slowest), fastest) - velocity, -change), change)
         self._velocities[index] = velocity
         self.sent[index] = position + velocity * period_s
+
+
+def _braking_distance(velocity: float, joint: CheckedJoint) -> float:
+    return velocity**2 / (2.0 * SHARP_BRAKING_SHARE * joint.limits.max_acceleration)
 
 
 def _closing_speed(distance: float, deceleration: float, period_s: float) -> float:

@@ -161,6 +161,9 @@ class UrArmHardware(RobotHW):
         period_s = min(period_s, _LONGEST_PERIOD_S)
         if period_s > 0.0:
             self._servo_time_s += _PERIOD_SMOOTHING * (max(period_s, _SHORTEST_PERIOD_S) - self._servo_time_s)
+        for index, handle in enumerate(self._handles):
+            if handle.held:  # no joint stops at once where it was measured, and it must not come back
+                handle.command, handle.held = self._check.rest_after(index, handle.command, handle.velocity), False
         refused = self._check.admit([handle.command for handle in self._handles], period_s)
         if refused and refused != self._refused:
             LOGGER.error("command refused: %s", refused)
