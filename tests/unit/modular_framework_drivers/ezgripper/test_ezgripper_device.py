@@ -19,6 +19,7 @@ from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper import mx64
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
 from modular_framework_drivers.ezgripper.grip import Motion
+from modular_framework_drivers.ezgripper.gripper_servos import joint_from_ticks
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
 from modular_framework_drivers.ezgripper.mx64 import ServoErrors
 
@@ -264,6 +265,36 @@ def test_fingers_under_way_when_the_cable_is_pulled_stop_when_it_is_back(
     assert there > 0.1
     time.sleep(0.3)
     assert gripper.state().reading.position == pytest.approx(there, abs=0.05)
+
+
+@pytest.mark.parametrize(("torque", "farthest"), [(100, 0.12), (400, 0.4)])
+def test_fingers_under_way_do_not_go_on_to_their_goal_without_the_cable(
+    line: DynamixelLine, gripper: EzGripper, torque: int, farthest: float
+) -> None:
+    arrive(gripper, 0.2)
+    gripper.command(1.9, torque)
+    until(lambda: gripper.state().reading.position > 0.5)
+    line.unplug()
+    there = joint_from_ticks(line.fingers[0].opening)
+    time.sleep(0.2)
+    until(lambda: abs(line.fingers[0].speed) < 1.0)
+    assert 0.0 < joint_from_ticks(line.fingers[0].opening) - there < farthest
+
+
+def test_a_moment_without_power_that_the_line_endures_is_a_fault_and_no_grasp(
+    line: DynamixelLine, gripper: EzGripper
+) -> None:
+    arrive(gripper, 0.2)
+    faults = gripper.state().faults
+    gripper.command(1.9, 100)
+    until(lambda: gripper.state().reading.position > 0.5)
+    line.power_off()
+    time.sleep(0.75 * LINK_TIMEOUT_S)
+    line.power_on()
+    until(lambda: gripper.state().faults != faults)
+    assert "without power" in gripper.state().last_fault or "does not answer" in gripper.state().last_fault
+    until(lambda: not gripper.state().fault)
+    assert gripper.state().motion is not Motion.HOLDING
 
 
 def test_turns_of_the_shaft_are_counted_anew_after_a_loss_of_power(line: DynamixelLine, gripper: EzGripper) -> None:

@@ -96,7 +96,7 @@ def parameters(line: DynamixelLine) -> dict[str, Any]:
         "type": "modular_framework_drivers/EzGripperRobotHW",
         "start_position": 1.5,
         "hold_torque": 300,
-        "link_timeout": 0.4,
+        "link_timeout": 0.8,
     }
     return {
         "port_name": str(line.link),
@@ -167,7 +167,8 @@ def test_what_is_held_stays_held_when_the_goal_is_over_and_when_the_cable_was_ou
 def test_a_trajectory_controller_moves_it_along_a_curve(line: DynamixelLine, loop: Loop) -> None:
     line.remove_object()
     go(loop, 1.5)
-    loop.manager.load_controller("swing")
+    if "swing" not in loop.controllers:
+        loop.manager.load_controller("swing")
     loop.switch(["swing"], ["grip"])
     goal_handle: TrajectoryGoalHandle = TrajectoryGoalHandle()
     points = (TrajectoryPoint(0.5, (1.2,)), TrajectoryPoint(1.0, (1.7,)))
@@ -194,6 +195,40 @@ def test_a_lost_link_ends_the_goal_with_the_reason_and_nothing_moves_when_it_is_
     line.plug()
     loop.run(lambda: not loop.robot_hw.fault())
     assert go(loop, 0.9).status is GoalStatus.SUCCEEDED
+
+
+@pytest.mark.parametrize("fault", ["power_off", "lose", "corrupt"])
+@pytest.mark.parametrize("name", ["grip", "swing"])
+def test_fingers_of_which_nothing_is_heard_hold_nothing(line: DynamixelLine, loop: Loop, fault: str, name: str) -> None:
+    """The controllers would find a stall, or a violated tolerance, before the line counts as lost."""
+    line.remove_object()
+    go(loop, 0.9)
+    goal_handle: Any
+    if name == "grip":
+        goal_handle = GripperGoalHandle()
+        loop.controllers[name].submit(1.9, 0.1, goal_handle)
+    else:
+        if name not in loop.controllers:
+            loop.manager.load_controller(name)
+        loop.switch([name], ["grip"])
+        goal_handle = TrajectoryGoalHandle()
+        points = (TrajectoryPoint(1.2, (1.9,)),)
+        loop.controllers[name].submit(TrajectoryGoal(JointTrajectory((JOINT,), points)), goal_handle)
+    handle = loop.robot_hw.get(PositionJointInterface).get_handle(JOINT)
+    loop.run(lambda: handle.position > 1.1)
+    line.commands[fault]()
+    try:
+        loop.run(lambda: not goal_handle.open)
+    finally:
+        line.power_on()
+        line.clear()
+        loop.run(lambda: not loop.robot_hw.fault())
+        if name != "grip":
+            loop.switch(["grip"], [name])
+    assert goal_handle.status is GoalStatus.ABORTED
+    assert goal_handle.text.startswith("hardware fault: EzGripper: servo 1 on"), goal_handle.text
+    if name == "grip":
+        assert not goal_handle.result.stalled
 
 
 def test_an_overload_is_no_grasp(line: DynamixelLine, loop: Loop) -> None:

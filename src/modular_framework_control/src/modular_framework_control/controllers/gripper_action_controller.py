@@ -57,7 +57,8 @@ class GripperActionController(Controller):
 
     A joint is stalled when it has stayed within `stall_velocity_threshold * stall_timeout` of one position for
     `stall_timeout`. That compares the mean velocity over this time with the threshold, not the velocity of one cycle,
-    because a contact makes the joint vibrate. The time counts from the start of the goal at the earliest.
+    because a contact makes the joint vibrate. The time counts from the start of the goal at the earliest. While the
+    measured values are stale the goal is not judged, and this time does not count.
 
     While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason. When
     the measured position is not a number the goal is aborted, and the joint is held where it was measured last.
@@ -184,7 +185,7 @@ class GripperActionController(Controller):
             self._hold()
         self._apply(period_s)
         if self._active is not None:
-            self._check(self._active, time_s)
+            self._check(self._active, time_s, period_s)
 
     def _carry_out(self, goal: _Goal | GripperGoalHandle, time_s: float) -> None:
         if isinstance(goal, _Goal) and self._fault:
@@ -205,9 +206,12 @@ class GripperActionController(Controller):
         self._feedback_turns.start(time_s)
         goal.goal_handle.activate()
 
-    def _check(self, goal: _Goal, time_s: float) -> None:
+    def _check(self, goal: _Goal, time_s: float, period_s: float) -> None:
         position = self._handle.position
         error = goal.position - position
+        if self._handle.state.stale:
+            self._rest_since_s += period_s
+            return
         if abs(error) <= self._goal_tolerance:
             self._finish(GoalStatus.SUCCEEDED, self._state(False, True), "goal position reached")
             return

@@ -368,6 +368,8 @@ class JointTrajectoryController(Controller):
 
     def _check(self, goal: ValidatedGoal, now_s: float, error: Array) -> bool:
         """Ends a goal that is reached or whose tolerances are violated; returns whether the motion must stop."""
+        if any(handle.state.stale for handle in self._handles):
+            return False
         tolerances, late_s = goal.tolerances, now_s - self._plan.end_s
         if late_s < 0.0:
             outside = violations(error, tolerances.path, self.joint_names) if tolerances.checks_path else ""

@@ -22,15 +22,17 @@ class JointStateHandle:
         position: [rad] or [m].
         velocity: [rad/s] or [m/s].
         effort: [Nm] or [N].
+        stale: whether these values are older than a few cycles of the device; controllers judge no goal by them.
     """
 
-    __slots__ = ("name", "position", "velocity", "effort")
+    __slots__ = ("name", "position", "velocity", "effort", "stale")
 
     def __init__(self, name: str, position: float = 0.0, velocity: float = 0.0, effort: float = 0.0) -> None:
         self.name = name
         self.position = position
         self.velocity = velocity
         self.effort = effort
+        self.stale = False
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, position={self.position:.6g})"

@@ -28,8 +28,8 @@ FOLLOWING_SHARE = 0.1
 """A joint whose measured velocity differs from the desired one by at most this share of it counts as following; a ramp
 then begins at the desired velocity, because measured velocities are late and noisy."""
 SHARP_BRAKING_SHARE = 0.9
-"""Share of the largest deceleration that a stop without a ramp takes. The rest is for a joint that follows late to catch
-up, so that it does not run past the end of the stop and come back."""
+"""Share of the largest deceleration that a stop without a ramp takes. The rest is for a joint that follows late to
+catch up, so that it does not run past the end of the stop and come back."""
 PEAK_OF_RAMP = 1.5
 """Largest deceleration of a ramp, as a multiple of its mean one."""
 

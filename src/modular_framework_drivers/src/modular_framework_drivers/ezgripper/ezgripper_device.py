@@ -23,6 +23,7 @@ from modular_framework_drivers.ezgripper.gripper_servos import (
     GripperReading,
     GripperServos,
     describe_errors,
+    with_set_point_near,
 )
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
 from modular_framework_drivers.ezgripper.mx64 import MOTOR_FAULTS, TORQUE_MAX, UNWATCHED_TORQUE, WARM, ServoErrors
@@ -30,6 +31,10 @@ from modular_framework_drivers.ezgripper.mx64 import MOTOR_FAULTS, TORQUE_MAX, U
 LOGGER = logging.getLogger("rosout.ezgripper")
 SILENT_S = 1.0
 """A state older than this, plus the time a servo has for its answer, counts as lost [s]."""
+
+
+SET_POINT_PERIODS = 2.0
+"""Periods that a set point must last: until the next one is due, and as long again if that comes late."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +154,11 @@ class EzGripper:
         """Requests a stop at the present position; an object that is held stays held."""
         self._request = _Request(None, self._state.faults)
 
+    @property
+    def stale(self) -> bool:
+        """Whether the latest state is too old to judge a motion by."""
+        return time.monotonic() - self._state.stamp_s > self.settings.rules.stale_s
+
     # ---- the gripper's thread ----
 
     def _run(self) -> None:
@@ -208,7 +218,12 @@ class EzGripper:
             self._follow_anew(reading.position)
         elif known:
             self._grip.stop(reading.position)
-        self._servos.drive(self._grip.update(reading.position, now_s))
+        self._drive(reading.position, now_s)
+
+    def _drive(self, position: float, now_s: float) -> None:
+        period_s = min(max(now_s - self._state.stamp_s, self.settings.poll_period_s), self.settings.rules.stale_s)
+        drive = self._grip.update(position, now_s)
+        self._servos.drive(with_set_point_near(drive, position, SET_POINT_PERIODS * period_s))
 
     def _follow_anew(self, position: float) -> None:
         """Replaces the state machine and its goal; the new goal is `position` [rad]."""
@@ -220,13 +235,15 @@ class EzGripper:
         if reading.errors & MOTOR_FAULTS:
             self._handle_motor_fault(reading, now_s)
             return
+        if self.stale and self._servos.lost_power():
+            raise GripperError("the servos were without power for a moment; check the power supply and its cable")
         if self._off_since_s is not None:  # the motor is on again, but has lost its torque limit
             self._off_since_s = None
             self._servos.forget()
             self._follow_anew(reading.position)
         self._warn_of_heat(reading.temperature)
         self._handle_request(reading.position, now_s)
-        self._servos.drive(self._grip.update(reading.position, now_s))
+        self._drive(reading.position, now_s)
         self._ready |= self._grip.motion is not Motion.MOVING
         self._publish(reading, now_s, "")
 

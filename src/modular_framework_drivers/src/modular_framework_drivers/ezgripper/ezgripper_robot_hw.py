@@ -92,6 +92,7 @@ class EzGripperRobotHW(RobotHW):
             return
         state, joint = self._gripper.state(), self._handle.state
         joint.position, joint.velocity = state.reading.position, 0.0 if state.fault else state.reading.velocity
+        joint.stale = self._gripper.stale
         joint.effort = state.reading.load * TORQUE_MAX / FULL_TORQUE * self._full_effort
         self._missed = state.last_fault if state.faults != self._faults else ""
         self._faults = state.faults

@@ -54,6 +54,7 @@ class GripRules:
         stall_s: for how long they must stand still short of the goal to count as stalled [s].
         still: largest motion that counts as standing still [rad].
         hold_torque: largest torque to hold an object with; the motor can sustain it [units of the servo].
+        stale_s: of the time between two measured positions no more than this counts as standing still [s].
     """
 
     position_tolerance: float = 0.03
@@ -61,6 +62,7 @@ class GripRules:
     stall_s: float = 0.25
     still: float = 0.01
     hold_torque: int = 400
+    stale_s: float = 0.1
 
 
 class Motion(Enum):
@@ -86,7 +88,8 @@ class Grip:
         self._direction = 1
         self._free_beyond = goal.position
         self._rest_position = math.nan
-        self._rest_since_s = 0.0
+        self._still_s = 0.0
+        self._updated_s = -math.inf
 
     def retarget(self, goal: Goal, position: float, time_s: float) -> None:
         """Sets a new goal.
@@ -118,25 +121,26 @@ class Grip:
 
     def update(self, position: float, time_s: float) -> Drive:
         """Returns the command to the motor for fingers that are at `position` [rad] at `time_s` [s]."""
+        self._still_s += min(time_s - self._updated_s, self._rules.stale_s)
+        self._updated_s = time_s
         if not abs(position - self._rest_position) <= self._rules.still:
-            self._rest_position, self._rest_since_s = position, time_s
-        still_s = time_s - self._rest_since_s
+            self._rest_position, self._still_s = position, 0.0
         error = self.goal.position - position
         arrived = abs(error) <= self._rules.position_tolerance
         free_again = self.motion is Motion.HOLDING and (self._free_beyond - position) * self._direction <= 0.0
         pushed_away = self.motion is Motion.REACHED and not arrived
         if free_again or pushed_away:
             self._begin(position, time_s)
-        elif self.motion is Motion.MOVING and arrived and still_s >= self._rules.settle_s:
+        elif self.motion is Motion.MOVING and arrived and self._still_s >= self._rules.settle_s:
             self.motion = Motion.REACHED
-        elif self.motion is Motion.MOVING and not arrived and still_s >= self._rules.stall_s:
+        elif self.motion is Motion.MOVING and not arrived and self._still_s >= self._rules.stall_s:
             self.motion, self._direction = Motion.HOLDING, 1 if error > 0.0 else -1
             self._free_beyond = self.goal.position
         return self._drive()
 
     def _begin(self, position: float, time_s: float) -> None:
         self.motion = Motion.MOVING
-        self._rest_position, self._rest_since_s = position, time_s
+        self._rest_position, self._still_s, self._updated_s = position, 0.0, time_s
 
     def _drive(self) -> Drive:
         held = min(self.goal.torque, self._rules.hold_torque)

@@ -9,7 +9,7 @@ knuckle joint moves from 1.94 rad to 0.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import fmean
 
 from modular_framework_drivers.ezgripper import mx64
@@ -72,6 +72,21 @@ def joint_from_ticks(ticks: float) -> float:
 def ticks_from_joint(position: float) -> int:
     """Angle of the shaft from its zero [ticks] for a position of the knuckle joint [rad]."""
     return round(TRAVEL_TICKS * (1.0 - position / CLOSED_POSITION))
+
+
+def with_set_point_near(drive: Drive, position: float, duration_s: float) -> Drive:
+    """Brings the set point so near that fingers whose line is cut, since no servo has a watchdog, do not go far.
+
+    Args:
+        drive: the command.
+        position: measured [rad].
+        duration_s: for how long the motor must be able to use its torque before the set point is renewed [s].
+    """
+    if drive.position is None:
+        return drive
+    ticks = drive.torque * (mx64.TICKS_PER_TORQUE + mx64.TOP_SPEED_TICKS_S / mx64.TORQUE_MAX * duration_s)
+    lead = ticks * CLOSED_POSITION / TRAVEL_TICKS
+    return replace(drive, position=min(max(drive.position, position - lead), position + lead))
 
 
 class GripperServos:
@@ -185,6 +200,17 @@ class GripperServos:
         return mx64.TORQUE_ENABLE in servo.written and all(
             mx64.from_bytes(self._bus.read(servo.servo_id, register)[0]) == value % (1 << 8 * register.size)
             for register, value in servo.written.items()
+        )
+
+    def lost_power(self) -> bool:
+        """Returns whether a motor that was switched on is off, though its servo reports no error.
+
+        Raises:
+            BusError: a servo does not answer.
+        """
+        return any(
+            servo.written.get(mx64.TORQUE_ENABLE) and not any(self._bus.read(servo.servo_id, mx64.TORQUE_ENABLE)[0])
+            for servo in self._servos
         )
 
     def forget(self) -> None:

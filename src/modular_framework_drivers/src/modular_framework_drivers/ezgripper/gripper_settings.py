@@ -14,6 +14,9 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 FULL_TORQUE = 800
 """Torque that an intensity of 1 stands for at most, by the maker's advice [units of the servo]."""
 
+STALE_PERIODS, STALE_S = 5.0, 0.1
+"""Age at which a measured position is stale: in periods of polling, and at least so much per servo on the line [s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class GripperSettings:
@@ -81,12 +84,13 @@ def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> Grip
     servo_ids = connection.get_param("servo_ids", [1])
     if not _are_ids(servo_ids):
         faults.append(_fault(connection, "servo_ids", servo_ids, f"a list of different numbers from 0 to {LARGEST_ID}"))
+    period_s = 1.0 / number("poll_rate", 50.0, 200.0, 1.0)
     rules = GripRules(
         position_tolerance=number("position_tolerance", 0.03, 0.5, 0.002),
         stall_s=number("stall_time", 0.25, 5.0, 0.05),
         hold_torque=int(number("hold_torque", 400, TORQUE_MAX)),
+        stale_s=max(STALE_PERIODS * period_s, STALE_S * (len(servo_ids) if isinstance(servo_ids, list) else 1)),
     )
-    period_s = 1.0 / number("poll_rate", 50.0, 200.0, 1.0)
     start_position = number("start_position", 0.0, CLOSED_POSITION)
     link_timeout_s = number("link_timeout", 0.1, 10.0)
     if faults:

@@ -15,6 +15,10 @@ MODELS = {MODEL_NUMBER_MX64: "MX-64", 320: "MX-106"}
 TICKS_PER_TURN = 4096
 SPEED_UNIT_TICKS_S = 0.114 / 60.0 * TICKS_PER_TURN
 """One unit of the speed registers, 0.114 turns a minute [ticks/s]."""
+TOP_SPEED_TICKS_S = 63.0 / 60.0 * TICKS_PER_TURN
+"""Speed without load at full torque and 12 V, 63 turns a minute [ticks/s]."""
+TICKS_PER_TORQUE = 8.0 / 32.0
+"""Distance from the goal position per unit of torque that the position control applies, with its initial gain 32."""
 TORQUE_MAX = 1023
 """Largest word of the torque registers: the full torque of the motor."""
 UNWATCHED_TORQUE = 100
