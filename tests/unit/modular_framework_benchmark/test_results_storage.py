@@ -36,6 +36,7 @@ from modular_framework_benchmark.results.errors import (
     StorageError,
     storage_error,
 )
+from modular_framework_benchmark.results.json_records import record_to_json
 
 FORK = multiprocessing.get_context("fork")
 NOBODY = 65534
@@ -143,6 +144,8 @@ def test_a_file_system_that_turns_read_only_loses_no_episode(filled: Path) -> No
     assert f"{filled}: it cannot be written; give write permission to the file and its folder" in answer
     filled.parent.chmod(0o777)
     filled.chmod(0o666)
+    for path in (filled.parent / "ros_home").rglob("*"):
+        os.chown(path, os.geteuid(), -1)  # the same user takes in what waits
     assert EPISODES[1].key in finished(filled)
 
 
@@ -207,6 +210,47 @@ def test_a_waiting_record_that_cannot_be_used_stays_with_a_warning(
     assert "torn.json: no record of an episode" in caplog.text
     assert "is none of experiment 'picks'" in caplog.text
     assert {path.name for path in waiting.iterdir()} == {"torn.json", saved.name}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can make files of another user")
+@pytest.mark.parametrize(
+    "planted", ["folder of another", "folder that anybody may fill", "file of another", "link"]
+)
+def test_planted_records_are_not_taken_in(filled: Path, planted: str, caplog: pytest.LogCaptureFixture) -> None:
+    waiting = filled.with_name("results.db.unwritten")
+    waiting.mkdir(mode=0o700)
+    record = json.loads(record_to_json(sample_record(EPISODES[1])))
+    file = waiting / "1.json"
+    file.write_text(json.dumps({"database": str(filled), "experiment": 1, "record": record}))
+    file.chmod(0o600)
+    match planted:
+        case "folder of another":
+            os.chown(waiting, NOBODY, NOBODY)
+        case "folder that anybody may fill":
+            waiting.chmod(0o777)
+        case "file of another":
+            os.chown(file, NOBODY, NOBODY)
+        case _:
+            waiting.rename(waiting.with_name("elsewhere"))
+            waiting.symlink_to(waiting.with_name("elsewhere"))
+    assert finished(filled) == {EPISODES[0].key}
+    assert "others could have filled it" in caplog.text
+    if planted == "folder that anybody may fill":
+        waiting.chmod(0o700)
+        assert finished(filled) == {EPISODES[0].key, EPISODES[1].key}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+def test_a_waiting_folder_that_cannot_be_entered_does_not_end_the_opening(filled: Path) -> None:
+    filled.with_name("results.db.unwritten").mkdir(mode=0o700)
+    for path in (filled, filled.parent):
+        os.chown(path, NOBODY, NOBODY)
+
+    def open_as_nobody() -> str:
+        os.setuid(NOBODY)
+        return ",".join(finished(filled))
+
+    assert in_child(open_as_nobody) == EPISODES[0].key
 
 
 def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:

@@ -89,6 +89,10 @@ def test_a_killed_worker_costs_no_other_episode_and_its_own_is_tried_twice(
             assert "tried 2 times" in record.cause
         else:
             assert record.succeeded, "the second try succeeds"
+            earlier = record.snapshot.get("earlier_tries", [])
+            assert len(earlier) == (record.spec.trial == 1)
+            assert all("was killed by signal SIGKILL" in text and text.startswith("begun 2") for text in earlier)
+    assert not list(bench.folder.rglob("*.tries")), "the notes are removed once the records are stored"
 
 
 def test_an_exception_of_the_runner_is_a_broken_episode_with_its_cause(bench: Bench) -> None:
@@ -178,6 +182,14 @@ def test_a_database_has_one_run_at_a_time(tmp_path: Path) -> None:
     target = str(tmp_path / "a.db")
     with RunLock(target, tmp_path), pytest.raises(RunLockError, match=f"process {os.getpid()} runs episodes of"):
         RunLock(target, tmp_path).__enter__()
+    link = tmp_path / "link.db"
+    link.symlink_to(target)
+    for spelling in (f"sqlite:///{target}", str(link), os.path.relpath(target), f"{tmp_path}/../{tmp_path.name}/a.db"):
+        with RunLock(target, tmp_path), pytest.raises(RunLockError, match="runs episodes of"):
+            RunLock(spelling, tmp_path).__enter__()
+    server = "postgresql+psycopg://me@lab/results"
+    with RunLock(server, tmp_path), pytest.raises(RunLockError):
+        RunLock("postgresql+psycopg2://you:secret@lab/results", tmp_path).__enter__()
     with RunLock(target, tmp_path) as lock, RunLock(str(tmp_path / "b.db"), tmp_path) as other:
         assert lock.run != other.run
 

@@ -43,6 +43,18 @@ def left_in(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
+def test_permissions_follow_the_umask(tmp_path: Path, mask: int, mode: int) -> None:
+    before = os.umask(mask)
+    try:
+        write_atomically(tmp_path / "shared.yaml", "new")
+        write_atomically(tmp_path / "own.yaml", "new", mode=0o600)
+    finally:
+        os.umask(before)
+    assert (tmp_path / "shared.yaml").stat().st_mode & 0o777 == mode
+    assert (tmp_path / "own.yaml").stat().st_mode & 0o777 == 0o600
+
+
 def test_a_failed_save_leaves_the_old_file_alone_and_names_its_path(tmp_path: Path) -> None:
     path = tmp_path / "kept.yaml"
     path.write_text("old")

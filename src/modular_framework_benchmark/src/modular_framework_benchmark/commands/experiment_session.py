@@ -7,14 +7,13 @@ import shlex
 import signal
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType
 
 from modular_framework_benchmark.commands.mode_runners import runner_factory
 from modular_framework_benchmark.commands.stopping_rules import RunSettings, stopping_rule
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.reports.errors import ReportError
-from modular_framework_benchmark.results.connection import shown_target
+from modular_framework_benchmark.results.connection import parse_address, shown_target
 from modular_framework_benchmark.results.database import ResultDatabase
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import LocalPool, Pool
@@ -61,7 +60,8 @@ class ExperimentSession:
         self._settings = settings
         self._name = description.name
         self._shown = shown_target(options.target)
-        stem = self._name if "://" in options.target else Path(options.target).stem
+        path = parse_address(options.target).path
+        stem = path.stem if path else self._name
         self._folder = database.folder.resolve() / f"{stem}_episodes" / self._name
 
     def run(self) -> int:

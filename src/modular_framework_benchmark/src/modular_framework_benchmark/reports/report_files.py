@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import tempfile
 from pathlib import Path
 
 from modular_framework_benchmark.reports.errors import ReportError
+from modular_framework_core.files.atomic_files import write_atomically
 
 
 def write_file(path: Path, content: bytes) -> None:
@@ -17,19 +15,9 @@ def write_file(path: Path, content: bytes) -> None:
     Raises:
         ReportError: when it cannot be written.
     """
-    written = None
     try:
-        with tempfile.NamedTemporaryFile(dir=path.absolute().parent, prefix=f".{path.name}.", delete=False) as file:
-            written = Path(file.name)
-            file.write(content)
-        mask = os.umask(0)
-        os.umask(mask)
-        written.chmod(0o666 & ~mask)
-        written.replace(path)
+        write_atomically(path, content)
     except OSError as error:
-        if written is not None:
-            with contextlib.suppress(OSError):
-                written.unlink()
         raise ReportError(
             f"{path}: {error.strerror}; name a file in a folder that is there and can be written"
         ) from error

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import urllib.parse
 from dataclasses import dataclass
@@ -33,6 +34,14 @@ class DatabaseAddress:
     label: str
     path: Path | None
     url: URL | None
+
+    @property
+    def identity(self) -> str:
+        """Returns a text that is the same for every spelling of a database: through links, by any driver or user."""
+        if self.url is None:
+            return os.path.realpath(self.label)
+        server = self.url.host or self.url.query.get("host") or "localhost"
+        return f"{self.url.get_backend_name()}://{server}:{self.url.port or ''}/{self.url.database}"
 
 
 def parse_address(target: str | Path) -> DatabaseAddress:

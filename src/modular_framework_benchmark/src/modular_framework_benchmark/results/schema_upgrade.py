@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Table, inspect, select, update
+from sqlalchemy import Connection, Table, insert, inspect, select, update
 
 from modular_framework_benchmark.results.connection import DatabaseAddress
 from modular_framework_benchmark.results.errors import DatabaseFullError, SchemaVersionError
-from modular_framework_benchmark.results.schema import DESCRIPTIONS, SCHEMA, SCHEMA_VERSION
+from modular_framework_benchmark.results.schema import DESCRIPTIONS, ENUMS, SCHEMA, SCHEMA_VERSION
 
 _LOG = logging.getLogger(__name__)
 
@@ -116,7 +116,8 @@ _CLOCKS_OF_1 = {
 
 
 def _say_clocks(connection: Connection) -> None:
-    """Version 1 to 2: descriptions say by which clock a metric is measured, by whom, and which files decided it."""
+    """Version 1 to 2: descriptions say by which clock a metric is measured, and by whom; episodes may be invalid."""
+    connection.execute(insert(ENUMS).values(name="status", value=4, description="invalid"))
     clocks = {name: clock for clock, names in _CLOCKS_OF_1.items() for name in names}
     for row in connection.execute(select(DESCRIPTIONS.c.id, DESCRIPTIONS.c.content)).all():
         content: Mapping[str, Any] = json.loads(row.content)
@@ -130,5 +131,5 @@ def _say_clocks(connection: Connection) -> None:
         connection.execute(update(DESCRIPTIONS).where(DESCRIPTIONS.c.id == row.id).values(content=text))
 
 
-MIGRATIONS: Mapping[int, Migration] = {1: Migration((DESCRIPTIONS,), _say_clocks)}
+MIGRATIONS: Mapping[int, Migration] = {1: Migration((DESCRIPTIONS, ENUMS), _say_clocks)}
 """By the version that they begin with."""

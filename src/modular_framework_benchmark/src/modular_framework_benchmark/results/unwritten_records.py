@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import logging
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -41,7 +43,7 @@ def waiting_folders(address: DatabaseAddress) -> list[Path]:
     Beside the database; where ROS keeps its files; in the system's folder for temporary files: they lie on other file
     systems, as a rule, when the first one is full or read-only.
     """
-    mark = hashlib.sha256(address.label.encode()).hexdigest()[:16]
+    mark = hashlib.sha256(address.identity.encode()).hexdigest()[:16]
     ros_home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
     others = [ros_home, Path(tempfile.gettempdir())]
     beside = [address.path.with_name(f"{address.path.name}.unwritten")] if address.path else []
@@ -60,7 +62,8 @@ def keep_record(address: DatabaseAddress, experiment: int, record: EpisodeRecord
     name = hashlib.sha256(f"{experiment}\n{record.spec.key}".encode()).hexdigest()[:32]
     for folder in waiting_folders(address):
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            _require_own(folder)
             write_atomically(folder / f"{name}.json", content)
         except OSError as error:
             _LOG.warning("%s takes no record: %s", folder, error)
@@ -69,11 +72,34 @@ def keep_record(address: DatabaseAddress, experiment: int, record: EpisodeRecord
     return None
 
 
+def _require_own(path: Path) -> None:
+    """Raises PermissionError unless a file or folder is the user's own and nobody else may write it."""
+    found = path.lstat()
+    if stat.S_ISLNK(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o022:
+        raise PermissionError(
+            errno.EPERM, f"others could have filled it ({stat.filemode(found.st_mode)}, user {found.st_uid})", str(path)
+        )
+
+
 def waiting_records(address: DatabaseAddress) -> Iterator[UnwrittenRecord]:
-    """Reads the records that wait for a database; a file that cannot be read stays, with a warning."""
+    """Reads the records that wait for a database; a file that cannot be read stays, with a warning.
+
+    Only files and folders count that belong to the user and that nobody else may write.
+    """
     for folder in waiting_folders(address):
-        for path in sorted(folder.glob("*.json")):
+        try:
+            if not os.path.lexists(folder):
+                continue
+            _require_own(folder)
+            paths = sorted(folder.glob("*.json"))
+        except OSError as error:
+            _LOG.warning(
+                "records in %s are not taken in: %s; remove it, or make it your own (chmod 700)", folder, error
+            )
+            continue
+        for path in paths:
             try:
+                _require_own(path)
                 content = json.loads(read_text(path))
                 yield UnwrittenRecord(path, int(content["experiment"]), record_from_json(json.dumps(content["record"])))
             except (OSError, ValueError, KeyError, TypeError) as error:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results.database import ResultDatabase
+from modular_framework_benchmark.scheduling.earlier_tries import forget_tries
 from modular_framework_benchmark.scheduling.episode_queue import EpisodeQueue
 from modular_framework_benchmark.scheduling.local_pool import Pool
 from modular_framework_benchmark.scheduling.progress import Progress
@@ -111,6 +112,7 @@ class ExperimentRun:
             folder.rmdir()
         relative = str(folder.relative_to(self._database.folder)) if has_files else ""
         self._database.write(self._experiment, dataclasses.replace(record, folder=relative))
+        forget_tries(folder)
         self._watch.ended(record.spec)
 
     def _results(self) -> ExperimentResults:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.scheduling.earlier_tries import end_try
 from modular_framework_benchmark.scheduling.episode_runner import RunnerFactory, unrun_record
 from modular_framework_benchmark.scheduling.worker_process import Running, WorkerProcess
 
@@ -111,6 +112,7 @@ class LocalPool:
             return dataclasses.replace(record, worker=record.worker or worker.name)
         cause = worker.cause_of_death()
         self._end(worker)
+        end_try(running.folder, cause)
         if running.tries < TRIES:
             self._begin(worker.name, running.spec, running.folder, running.tries + 1)
             return None

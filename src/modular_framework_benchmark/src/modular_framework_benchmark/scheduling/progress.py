@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TextIO
 
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeStatus
+from modular_framework_benchmark.scheduling.earlier_tries import EARLIER_TRIES
 
 BAR_PERIOD_S, LINE_PERIOD_S = 0.2, 15.0
 BAR_WIDTH = 24
@@ -46,10 +47,11 @@ class Progress:
     def add(self, record: EpisodeRecord) -> None:
         """Counts an episode that has ended; tells what is broken at once."""
         self._counts[record.status] += 1
+        episode = f"episode {record.spec.number} ({record.spec.key})"
         if record.status in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID):
-            self._line(
-                f"episode {record.spec.number} ({record.spec.key}) is {STATUS_WORDS[record.status]}: {record.cause}"
-            )
+            self._line(f"{episode} is {STATUS_WORDS[record.status]}: {record.cause}")
+        elif record.snapshot.get(EARLIER_TRIES):
+            self._line(f"{episode} ran again after a try without a record: {'; '.join(record.snapshot[EARLIER_TRIES])}")
         self.show()
 
     def show(self, *, now: bool = False) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from modular_framework_benchmark.results.connection import shown_target
+from modular_framework_benchmark.results.connection import parse_address, shown_target
 from modular_framework_benchmark.scheduling.marked_processes import end_marked_processes
 from modular_framework_core.files.default_folders import framework_home
 
@@ -28,8 +28,7 @@ class RunLock:
     """
 
     def __init__(self, target: str, folder: Path | None = None) -> None:
-        where = target if "://" in target else str(Path(target).resolve())
-        self.run = hashlib.sha256(where.encode()).hexdigest()[:16]
+        self.run = hashlib.sha256(parse_address(target).identity.encode()).hexdigest()[:16]
         self._target = shown_target(target)
         self._file = (folder or framework_home() / "runs") / f"{self.run}.lock"
         self._handle = -1

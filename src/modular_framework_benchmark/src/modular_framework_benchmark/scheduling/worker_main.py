@@ -8,6 +8,7 @@ that started it is gone, it ends what it has started, and itself.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import os
 import shutil
 import sys
@@ -18,6 +19,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.scheduling.earlier_tries import EARLIER_TRIES, begin_try
 from modular_framework_benchmark.scheduling.episode_runner import EpisodeRunner, RunnerFactory, unrun_record
 from modular_framework_benchmark.scheduling.marked_processes import MARK, end_marked_processes
 
@@ -64,10 +66,14 @@ def run_episode(runner: EpisodeRunner, spec: EpisodeSpec, folder: Path) -> tuple
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
+    earlier = begin_try(folder)
     print(f"---- episode {spec.number}: {spec.key}", flush=True)
     begun, start = time.time(), time.monotonic()
     try:
-        return runner.run(spec, folder), True
+        record = runner.run(spec, folder)
+        if earlier:
+            record = dataclasses.replace(record, snapshot={**record.snapshot, EARLIER_TRIES: earlier})
+        return record, True
     except Exception as error:  # a fault of the mode's code or of a user's: the others can run
         traceback.print_exc()
         with contextlib.suppress(Exception):

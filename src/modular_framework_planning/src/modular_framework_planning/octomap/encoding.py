@@ -8,8 +8,7 @@ binary: of each inner node two bits a child: 1 free leaf, 2 occupied leaf, 3 inn
 
 from __future__ import annotations
 
-import os
-import tempfile
+import uuid
 from pathlib import Path
 from typing import Any
 
@@ -173,15 +172,13 @@ def write_file(path: Path, voxels: VoxelMap) -> None:
         raise OSError("it is there already and is no octomap, which alone is overwritten; give the path of a new file")
     data, nodes = _binary_nodes(voxels)
     header = BINARY_HEADER + f"\nid {TREE_TYPE}\nsize {nodes}\nres {voxels.resolution!r}\ndata\n".encode()
-    handle, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)
+    written = path.with_name(f".{uuid.uuid4().hex}.{path.name}")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with written.open("xb") as file:
             file.write(header + data)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+        written.replace(path)
+    finally:
+        written.unlink(missing_ok=True)
 
 
 def _first_line(path: Path) -> bytes:

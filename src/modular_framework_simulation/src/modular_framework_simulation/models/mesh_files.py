@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import tempfile
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -139,11 +139,11 @@ def write_folder(folder: Path, files: dict[str, bytes]) -> None:
         DescriptionError: There is no room or no permission for it.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(dir=folder.parent))
+    scratch = folder.with_name(f".{uuid.uuid4().hex}")
+    scratch.mkdir()
     try:
         for name, content in files.items():
             (scratch / name).write_bytes(content)
-        scratch.chmod(0o755)
         scratch.rename(folder)
     except OSError as error:
         if not folder.is_dir():  # else another process finished the same mesh first; its result is as good as ours
