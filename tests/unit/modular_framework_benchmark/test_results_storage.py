@@ -213,9 +213,7 @@ def test_a_waiting_record_that_cannot_be_used_stays_with_a_warning(
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can make files of another user")
-@pytest.mark.parametrize(
-    "planted", ["folder of another", "folder that anybody may fill", "file of another", "link"]
-)
+@pytest.mark.parametrize("planted", ["folder of another", "folder that anybody may fill", "file of another", "link"])
 def test_planted_records_are_not_taken_in(filled: Path, planted: str, caplog: pytest.LogCaptureFixture) -> None:
     waiting = filled.with_name("results.db.unwritten")
     waiting.mkdir(mode=0o700)

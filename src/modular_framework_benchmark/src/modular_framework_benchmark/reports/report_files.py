@@ -18,6 +18,4 @@ def write_file(path: Path, content: bytes) -> None:
     try:
         write_atomically(path, content)
     except OSError as error:
-        raise ReportError(
-            f"{path}: {error.strerror}; name a file in a folder that is there and can be written"
-        ) from error
+        raise ReportError(f"{path}: {error.strerror}") from error
