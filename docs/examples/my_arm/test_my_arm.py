@@ -23,8 +23,9 @@ URDF = """<robot name="my_robot">
 class TestMyArm(RobotHWConformance):
     """Two joints with limits."""
 
-    def make_robot_hw(self) -> MyArm:
-        root = MappingNodeHandle({"robot_description": URDF, "my_arm": {"joints": ["shoulder", "elbow"]}})
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> MyArm:
+        my_arm = {"joints": ["shoulder", "elbow"], "start_positions": dict(positions or {})}
+        root = MappingNodeHandle({"robot_description": URDF, "my_arm": my_arm})
         robot_hw = MyArm()
         assert robot_hw.init(root, root.child("my_arm"))
         return robot_hw

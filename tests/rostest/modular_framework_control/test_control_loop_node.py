@@ -22,6 +22,7 @@ from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryG
 from controller_manager_msgs.srv import ListControllers, LoadController, SwitchController
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -105,6 +106,25 @@ SECOND = """
     <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen">
       <rosparam>{joints: [shoulder]}</rosparam>
     </node>
+  </group>
+</launch>
+"""
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
+STANDING = f"""
+<launch>
+  <env name="ROS_PACKAGE_PATH" value="{EXAMPLES}:$(env ROS_PACKAGE_PATH)"/>
+  <env name="PYTHONPATH" value="{EXAMPLES}/my_arm/src:$(env PYTHONPATH)"/>
+  <group ns="third">
+    <rosparam>
+      robot_hardware: [my_arm, stray]
+      my_arm: {{type: my_arm/MyArm, joints: [bend], start_positions: {{bend: 1.0}}}}
+      stray: {{type: modular_framework_control/MockRobotHW, joints: [far], initial_positions: {{far: 2.5}}}}
+      joint_limits: {{far: {{has_position_limits: true, min_position: -1.0, max_position: 1.0,
+                           has_velocity_limits: true, max_velocity: 1.0}}}}
+      states: {{type: joint_state_controller/JointStateController, publish_rate: 50}}
+    </rosparam>
+    <node pkg="modular_framework_control" type="robot_hw" name="robot_hw" output="screen"/>
   </group>
 </launch>
 """
@@ -302,3 +322,26 @@ def test_every_listed_hardware_that_is_not_ready_in_time_is_named(
     while expected not in session.log():
         assert time.monotonic() < deadline, session.log()
         time.sleep(0.1)
+
+
+def test_arms_stay_where_they_stand_when_the_node_starts_and_what_is_unusual_is_said(
+    ros_launch: Callable[..., Any],
+) -> None:
+    session = ros_launch(STANDING)
+    rospy.wait_for_service("third/controller_manager/load_controller", 60.0)
+    assert rospy.ServiceProxy("third/controller_manager/load_controller", LoadController)("states").ok
+    switch = rospy.ServiceProxy("third/controller_manager/switch_controller", SwitchController)
+    assert switch(["states"], [], 2, False, 0.0).ok
+    for _ in range(10):
+        message = rospy.wait_for_message("third/joint_states", JointState, 30.0)
+        assert dict(zip(message.name, message.position, strict=True)) == {"bend": 1.0, "far": 2.5}
+    text = "joint 'far' is held at 2.5, outside its range -1 to 1, until a goal brings it back"
+    deadline = time.monotonic() + 30.0
+    while True:
+        (status,) = rospy.wait_for_message("/diagnostics", DiagnosticArray, 30.0).status
+        if status.name == "third/robot_hw: control loop" and text in status.message:
+            break
+        assert time.monotonic() < deadline, status
+    assert status.level == 1 and {value.key: value.value for value in status.values}["outside_limits"] == text
+    assert text in session.log()
+    assert "no limits in robot_description or joint_limits: velocity and position of joint 'bend'" in session.log()

@@ -380,8 +380,15 @@ def test_a_gripper_of_efforts_reaches_its_goal_within_the_bound_of_its_effort(
 def test_a_gripper_of_efforts_that_meets_something_stalls_and_goes_on_squeezing(start: Callable[..., Any]) -> None:
     loop = start("effort", "GripperActionController", joint="a", gains={"a": STIFF}, stall_timeout=0.2)
     goal_handle: GripperGoalHandle = RealtimeGoalHandle()
-    loop.controllers["c"].submit(1.5, 2.0, goal_handle)
-    loop.run(3.0)
+    loop.controllers["c"].submit(0.9, 2.0, goal_handle)
+    for _ in range(300):
+        loop.robot_hw.read(loop.time_s, loop.period_s)
+        finger = joint(loop, "effort").state
+        if finger.position > 0.5:  # an object is there
+            finger.position, finger.velocity = 0.5, 0.0
+        loop.manager.update(loop.time_s, loop.period_s)
+        loop.robot_hw.write(loop.time_s, loop.period_s)
+        loop.time_s += loop.period_s
     assert goal_handle.status is GoalStatus.ABORTED and goal_handle.result is not None and goal_handle.result.stalled
     assert joint(loop, "effort").command == 2.0
     assert loop.switch([], ["c"]) is None

@@ -27,6 +27,7 @@ from modular_framework_control.hardware_interface.joint_limits import (
     VelocityJointSaturation,
     limit_handle,
     limits_with_parameters,
+    outside_limits,
     soft_limits_from_urdf,
     soft_limits_with_parameters,
 )
@@ -84,20 +85,77 @@ def test_holding_a_position_that_is_not_a_number_keeps_the_last_command(soft: So
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_joint_outside_its_range_comes_back_no_faster_than_its_velocity_limit(side: float) -> None:
-    joint = handle(side * 1.5, command=side * 1.5)
-    limiter, seen = PositionJointSaturation(joint, LIMITS), [side * 1.5]
-    for joint.command in [side * 1.5] * 30:
+@pytest.mark.parametrize("soft", [None, SOFT])
+def test_a_joint_outside_its_range_stays_until_a_goal_brings_it_back_no_faster_than_its_velocity_limit(
+    side: float, soft: SoftJointLimits | None
+) -> None:
+    joint = handle(side * 1.5, command=math.nan)
+    limiter, seen = PositionJointSaturation(joint, LIMITS, soft), [side * 1.5]
+    for joint.command in [math.nan, side * 1.5, side * 9.0] * 10:
+        limiter.enforce_limits(0.01)
+        assert joint.command == side * 1.5
+    for joint.command in [side * 0.5] * 60:
         limiter.enforce_limits(0.01)
         seen.append(joint.command)
     assert max(abs(after - before) for before, after in pairwise(seen)) <= LIMITS.max_velocity * 0.01 + 1e-12
-    assert seen[-1] == pytest.approx(side)
+    assert seen[-1] == pytest.approx(side * 0.5)
+    for joint.command in [side * 1.5] * 60:
+        limiter.enforce_limits(0.01)
+    assert side * joint.command <= 1.0, "once inside it does not leave its range again"
 
 
-def test_a_joint_beyond_its_soft_end_is_led_back_at_once() -> None:
+def test_a_joint_whose_position_is_held_outside_its_range_stays_there() -> None:
     joint = handle(0.9, command=0.9)
-    PositionJointSaturation(joint, LIMITS, SOFT).enforce_limits(0.01)
-    assert joint.command == pytest.approx(0.9 - 10.0 * 0.1 * 0.01)
+    limiter = PositionJointSaturation(joint, LIMITS)
+    limiter.enforce_limits(0.01)
+    joint.state.position = 1.3  # moved by hand
+    joint.hold(1.3)
+    for _ in range(10):
+        limiter.enforce_limits(0.01)
+        assert joint.command == 1.3
+
+
+@pytest.mark.parametrize(
+    ("interface", "controller"),
+    [
+        ("PositionJointInterface", "position_controllers/JointTrajectoryController"),
+        ("PositionJointInterface", "position_controllers/JointGroupPositionController"),
+        ("PosVelJointInterface", "pos_vel_controllers/JointTrajectoryController"),
+        ("VelocityJointInterface", "velocity_controllers/JointTrajectoryController"),
+        ("EffortJointInterface", "effort_controllers/JointTrajectoryController"),
+    ],
+)
+def test_a_joint_outside_its_range_stays_without_a_controller_and_when_one_starts(
+    make_loop: Callable[..., Any], interface: str, controller: str
+) -> None:
+    loop = make_loop(
+        {
+            "robot_description": URDF,
+            "hw": {"joints": ["j"], "initial_positions": {"j": 2.5}, "command_interface": interface},
+            "c": {"type": controller, "joints": ["j"], "gains": {"j": {"p": 10.0, "d": 1.0}}},
+        }
+    )
+    loop.run(1.0)
+    joint = loop.robot_hw.interfaces[1].handles[0]
+    assert joint.position == 2.5
+    loop.spawn("c")
+    loop.run(1.0)
+    assert joint.position == 2.5
+    (text,) = outside_limits(loop.robot_hw).values()
+    assert text == "joint 'j' is held at 2.5, outside its range -1 to 1, until a goal brings it back"
+
+
+def test_joints_without_limits_are_named_when_the_controllers_get_their_hardware(
+    make_loop: Callable[..., Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    make_loop({"robot_description": URDF, "hw": {"joints": ["j", "other"]}})
+    assert "velocity and position of joint 'other' (hardware_interface/PositionJointInterface)" in caplog.text
+    assert "'j'" not in caplog.text
+    caplog.clear()
+    make_loop({"robot_description": URDF, "hw": {"joints": ["j"], "command_interface": "EffortJointInterface"}})
+    assert not caplog.records
+    make_loop({"hw": {"joints": ["j"], "command_interface": "EffortJointInterface"}})
+    assert "effort of joint 'j' (hardware_interface/EffortJointInterface)" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -106,7 +164,8 @@ def test_a_joint_beyond_its_soft_end_is_led_back_at_once() -> None:
         (0.0, 0.0, 9.0, 2.0),
         (0.0, 0.0, -9.0, -2.0),
         (0.75, 0.0, 9.0, 0.5),
-        (0.85, 0.0, 9.0, -0.5),
+        (0.85, 0.0, 9.0, 0.0),
+        (0.85, 0.0, -9.0, -2.0),
         (-0.75, 0.0, -9.0, -0.5),
         (0.0, 0.0, math.nan, 0.0),
     ],
@@ -162,17 +221,15 @@ def test_a_velocity_ends_at_the_end_of_the_range_whatever_change_that_takes() ->
 
 @pytest.mark.parametrize("limiter_class", [VelocityJointSaturation, EffortJointSaturation])
 def test_a_limited_command_is_not_taken_for_a_command_of_a_controller(limiter_class: Any) -> None:
-    joint = handle(1.1, command=0.0)
+    joint = handle(1.1, 0.5, command=9.0)
     limiter = limiter_class(joint, LIMITS, SOFT)
     limiter.enforce_limits(0.01)
-    assert joint.command < 0.0, "it is led back into its soft range"
-    joint.state.position = 0.0
+    assert joint.command <= 0.0, "it goes no farther"
+    joint.state.position = joint.state.velocity = 0.0
     limiter.enforce_limits(0.01)
-    assert joint.command == 0.0, "nobody ever commanded more"
-    joint.state.position = 1.1
-    limiter.enforce_limits(0.01)
+    assert joint.command > 0.0, "what the controller commanded is still in force"
     limiter.reset()
-    assert joint.command == 0.0
+    assert joint.command == 9.0
     joint.command = 0.1
     joint.state.position = 0.0
     limiter.enforce_limits(0.01)
@@ -258,7 +315,7 @@ def test_efforts_drive_no_joint_out_of_its_range_or_speed(
 
 
 def test_velocity_and_acceleration_beside_a_position_are_bounded_too() -> None:
-    joint = PosVelAccJointHandle(JointStateHandle("j"), 9.0)
+    joint = PosVelAccJointHandle(JointStateHandle("j", 0.0), 9.0)
     joint.command_velocity, joint.command_acceleration = -9.0, math.nan
     limiter = limit_handle(PosVelAccJointInterface, joint, JointLimits(-1.0, 1.0, 2.0, max_acceleration=3.0))
     limiter.enforce_limits(0.1)
@@ -396,7 +453,7 @@ def test_between_controller_and_hardware_the_limits_hold(
             assert joint.position <= 1.0 and abs(joint.command) <= 5.0
         else:
             assert joint.position <= 0.8 + 1e-2
-    assert joint.position == pytest.approx(0.8, abs=1e-2)
+    assert joint.velocity == pytest.approx(0.0, abs=1e-2) and joint.position >= 0.79
     assert 1.0 < fastest <= 2.0 + 5.0 * 0.01 + 1e-9
 
 

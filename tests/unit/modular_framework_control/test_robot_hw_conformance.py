@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from modular_framework_control.hardware_interface.interfaces import PositionJoin
 from modular_framework_control.hardware_interface.joint_limits import JointLimits
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.hardware_interface.robot_hw_conformance import RobotHWConformance
-from modular_framework_ros.node_handle import MappingNodeHandle
+from modular_framework_ros.node_handle import MappingNodeHandle, NodeHandle
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
@@ -42,40 +42,70 @@ ROBOT = """<robot name="lab"><link name="base"/>
 {links}
 </robot>"""
 LINK = """
-<link name="{name}_link"><inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+<link name="{name}_link"><inertial><mass value="1"/><inertia ixx="2" ixy="0" ixz="0" iyy="2" iyz="0" izz="2"/>
 </inertial></link>
 <joint name="{name}" type="{kind}"><parent link="base"/><child link="{name}_link"/><axis xyz="0 0 1"/>
   <limit lower="-0.5" upper="0.5" velocity="2" effort="100"/></joint>
 <transmission name="{name}_drive"><type>transmission_interface/SimpleTransmission</type><joint name="{name}">
-  <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint></transmission>"""
+  <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface>
+  <hardwareInterface>hardware_interface/VelocityJointInterface</hardwareInterface>
+  <hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint></transmission>"""
 
 
 class TestMock(RobotHWConformance):
     """The fake hardware, with limits of the description and of parameters."""
 
     settle_s = 0.2
+    interface = "PositionJointInterface"
+    kind: type[MockRobotHW] = MockRobotHW
 
-    def make_robot_hw(self) -> MockRobotHW:
-        robot_hw = MockRobotHW()
-        root = MappingNodeHandle(
-            {
-                "robot_description": URDF,
-                "joint_limits": {"elbow": {**LIMITED, "max_velocity": 3.0}},
-                "hw": {"joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
-            }
-        )
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> MockRobotHW:
+        robot_hw = self.kind()
+        hardware = {
+            "joints": ["shoulder", "elbow"],
+            "initial_positions": dict(positions or {"shoulder": 0.5}),
+            "command_interface": self.interface,
+        }
+        limits = {"elbow": {**LIMITED, "max_velocity": 3.0}}
+        root = MappingNodeHandle({"robot_description": URDF, "joint_limits": limits, "hw": hardware})
         assert robot_hw.init(root, root.child("hw"))
         return robot_hw
 
     def limits(self) -> Mapping[str, JointLimits]:
-        return {"shoulder": JointLimits(-1.0, 1.0, 2.0), "elbow": JointLimits(-1.0, 1.0, 3.0)}
+        return {"shoulder": JointLimits(-1.0, 1.0, 2.0, 10.0), "elbow": JointLimits(-1.0, 1.0, 3.0, 10.0)}
+
+
+class TestMockByVelocity(TestMock):
+    """Joints that take velocities."""
+
+    interface = "VelocityJointInterface"
+
+
+class TestMockByEffort(TestMock):
+    """Joints that take efforts."""
+
+    interface = "EffortJointInterface"
+
+
+class TestMockByPositionAndVelocity(TestMock):
+    """Joints that take velocities with their positions."""
+
+    interface = "PosVelJointInterface"
+
+
+class TestMockByPositionVelocityAndAcceleration(TestMock):
+    """Joints that take velocities and accelerations with their positions."""
+
+    interface = "PosVelAccJointInterface"
 
 
 class TestPyBullet(RobotHWConformance):
-    """A lift and a turntable in the simulated world."""
+    """A lift and a turntable in the simulated world, which take positions, velocities and efforts."""
 
     settle_s = 0.6
     test_the_constructor_needs_no_arguments = None  # type: ignore[assignment]  # the simulation makes it, not a `type`
+
+    _robots = 0
 
     @pytest.fixture(autouse=True)
     def world_of_it(self, tmp_path: Path) -> Iterator[None]:
@@ -84,18 +114,18 @@ class TestPyBullet(RobotHWConformance):
         yield
         self._world.close()
 
-    def make_robot_hw(self) -> SimulatedRobotHW:
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> SimulatedRobotHW:
         joints = (("lift", "prismatic"), ("turn", "revolute"))
         links = "".join(LINK.format(name=name, kind=kind) for name, kind in joints)
-        body = RobotBody(
-            self._world, read_robot(ROBOT.format(links=links), no_packages, self._parts, False), "lab", Pose(), {}
-        )
+        description = read_robot(ROBOT.format(links=links), no_packages, self._parts, False)
+        self._robots += 1
+        body = RobotBody(self._world, description, f"lab{self._robots}", Pose(), positions or {})
         robot_hw = SimulatedRobotHW(body)
         assert robot_hw.init(MappingNodeHandle(), MappingNodeHandle())
         return robot_hw
 
     def limits(self) -> Mapping[str, JointLimits]:
-        return {name: JointLimits(-0.5, 0.5, 2.0) for name in ("lift", "turn")}
+        return {name: JointLimits(-0.5, 0.5, 2.0, 100.0) for name in ("lift", "turn")}
 
     def advance(self, period_s: float) -> None:
         for _ in range(round(period_s / self._world.settings.time_step_s)):
@@ -108,9 +138,9 @@ class TestSlidingGripper(TestMock):
     initial_position = 0.0
     tolerance = 0.001
 
-    def make_robot_hw(self) -> MockRobotHW:
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> MockRobotHW:
         self.made = MockRobotHW()
-        part = {"joints": ["finger"], "initial_positions": {"finger": self.initial_position}}
+        part = {"joints": ["finger"], "initial_positions": dict(positions or {"finger": self.initial_position})}
         root = MappingNodeHandle({"robot_description": SLIDE, "hw": part})
         assert self.made.init(root, root.child("hw"))
         return self.made
@@ -143,8 +173,13 @@ class LimitlessMock(TestMock):
 
     __test__ = False
 
-    def make_robot_hw(self) -> MockRobotHW:
-        robot_hw, root = MockRobotHW(), MappingNodeHandle({"hw": {"joints": ["shoulder", "elbow"]}})
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> MockRobotHW:
+        hardware = {
+            "joints": ["shoulder", "elbow"],
+            "initial_positions": dict(positions or {}),
+            "command_interface": self.interface,
+        }
+        robot_hw, root = MockRobotHW(), MappingNodeHandle({"hw": hardware})
         assert robot_hw.init(root, root.child("hw"))
         return robot_hw
 
@@ -165,18 +200,49 @@ class SuiteOfOneThread(TestMock):
     """Hardware whose connection belongs to the thread of the control loop."""
 
     __test__ = False
-
-    def make_robot_hw(self) -> MockRobotHW:
-        robot_hw = MockOfOneThread()
-        root = MappingNodeHandle({"robot_description": URDF, "hw": {"joints": ["shoulder", "elbow"]}})
-        assert robot_hw.init(root, root.child("hw"))
-        return robot_hw
+    kind = MockOfOneThread
 
 
-def failures(suite: RobotHWConformance) -> set[str]:
-    """Names of the tests of a suite that its hardware fails."""
+class MockThatWaits(MockRobotHW):
+    """Waits for its device in every other cycle."""
+
+    _cycles = 0
+
+    def read(self, time_s: float, period_s: float) -> None:
+        self._cycles += 1
+        time.sleep(0.05 * (self._cycles % 2))
+        super().read(time_s, period_s)
+
+
+class SuiteThatWaits(TestMock):
+    """Hardware that holds the control loop up."""
+
+    __test__ = False
+    kind = MockThatWaits
+
+
+class MockThatGoesTo0(MockRobotHW):
+    """Has commands of its own making, as hardware had whose handles began at 0."""
+
+    def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
+        made = super().init(root_nh, robot_hw_nh)
+        for interface in self.interfaces:
+            for handle in interface.handles if interface.claims_resources else ():
+                handle.command = 0.0
+        return made
+
+
+class SuiteThatGoesTo0(TestMock):
+    """Hardware whose joints move before they are commanded."""
+
+    __test__ = False
+    kind = MockThatGoesTo0
+
+
+def failures(suite: RobotHWConformance, tests: Sequence[str] = ()) -> set[str]:
+    """Names of the tests of a suite, of all or of these, that its hardware fails."""
     failed = set()
-    for name in [name for name in dir(suite) if name.startswith("test_")]:
+    for name in tests or [name for name in dir(suite) if name.startswith("test_")]:
         suite.setup_method()
         try:
             getattr(suite, name)()
@@ -187,11 +253,31 @@ def failures(suite: RobotHWConformance) -> set[str]:
     return failed
 
 
-def test_hardware_without_limits_fails() -> None:
-    assert failures(LimitlessMock()) == {
-        "test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows",
-        "test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them",
-    }
+BEYOND_LIMITS = "test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them"
+JUMP = "test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows"
+
+
+@pytest.mark.parametrize(
+    ("interface", "failed"),
+    [
+        ("PositionJointInterface", {JUMP, BEYOND_LIMITS}),
+        ("PosVelJointInterface", {JUMP, BEYOND_LIMITS}),
+        ("VelocityJointInterface", {BEYOND_LIMITS}),
+        ("EffortJointInterface", {"test_no_effort_exceeds_the_limits_or_makes_a_joint_faster_than_its_velocity_limit"}),
+    ],
+)
+def test_hardware_without_limits_fails(interface: str, failed: set[str]) -> None:
+    suite = LimitlessMock()
+    suite.interface = interface
+    assert failures(suite) == failed
+
+
+def test_hardware_that_waits_for_its_device_fails() -> None:
+    assert failures(SuiteThatWaits(), ("test_read_and_write_do_not_wait",))
+
+
+def test_hardware_whose_joints_move_before_they_are_commanded_fails() -> None:
+    assert "test_wherever_it_stands_at_the_start_it_stays_until_it_is_commanded" in failures(SuiteThatGoesTo0())
 
 
 def test_hardware_whose_connection_belongs_to_one_thread_passes() -> None:

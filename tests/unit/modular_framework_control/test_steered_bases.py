@@ -117,11 +117,11 @@ class Cart(RobotHW):
         self.reason = ""
         states, velocities, positions = JointStateInterface(), VelocityJointInterface(), PositionJointInterface()
         self.wheels = {
-            name: velocities.register_handle(JointHandle(states.register_handle(JointStateHandle(name))))
+            name: velocities.register_handle(JointHandle(states.register_handle(JointStateHandle(name, 0.0)), 0.0))
             for name in wheels
         }
         self.steerings = {
-            name: positions.register_handle(JointHandle(states.register_handle(JointStateHandle(name))))
+            name: positions.register_handle(JointHandle(states.register_handle(JointStateHandle(name, 0.0)), 0.0))
             for name in steerings
         }
         for interface in (states, velocities, positions):

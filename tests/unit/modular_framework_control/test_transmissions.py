@@ -324,6 +324,7 @@ def test_each_interface_of_a_joint_has_its_command_of_the_actuator() -> None:
     transmissions.propagate_commands()
     assert math.isnan(motor.command_position), "nothing is commanded before it is known where the joints are"
     transmissions.propagate_states()
+    hardware.seed_commands()
     joint = states.get_handle("j")
     assert (joint.position, joint.velocity, joint.effort) == pytest.approx((2.5, 0.5, 10.0))
     hardware.get(VelocityJointInterface).get_handle("j").command = 1.0

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
@@ -23,6 +24,15 @@ KNUCKLE = {"has_velocity_limits": True, "max_velocity": 2.0}
 SHOULDER = {**KNUCKLE, "has_position_limits": True, "min_position": -1.0, "max_position": 1.0}
 
 
+def started_line(folder: Path) -> DynamixelLine:
+    """An open gripper on a pseudo-terminal in `folder`."""
+    folder.mkdir(exist_ok=True)
+    finger = Finger(DynamixelServo(), FingerModel(top_speed=12000.0, time_constant_s=0.015), opening=200.0)
+    line = DynamixelLine([finger], folder / "gripper")
+    line.connect()
+    return line
+
+
 class TestEzGripper(RobotHWConformance):
     """A gripper whose servo is emulated on a pseudo-terminal."""
 
@@ -35,25 +45,36 @@ class TestEzGripper(RobotHWConformance):
     @pytest.fixture(autouse=True, scope="class")
     @classmethod
     def robot_hw_of_all(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-        finger = Finger(DynamixelServo(), FingerModel(top_speed=12000.0, time_constant_s=0.015), opening=200.0)
-        line = DynamixelLine([finger], tmp_path_factory.mktemp("line") / "gripper")
-        line.connect()
-        cls.robot_hw = cls.initialised({"port_name": str(line.link), "start_position": 1.7, "link_timeout": 0.5})
+        line = started_line(tmp_path_factory.mktemp("line"))
+        cls.robot_hw = cls.initialised({"port_name": str(line.link), "start_position": 1.7, "link_timeout": 0.5}, {})
         yield
         cls.robot_hw.close()
         cls.robot_hw.close()
         line.close()
 
+    @pytest.fixture(autouse=True)
+    def lines(self, tmp_path: Path) -> Iterator[None]:
+        self._folder = tmp_path
+        self._lines: list[DynamixelLine] = []
+        yield
+        for line in self._lines:
+            line.close()
+
     @classmethod
-    def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
-        """The hardware, with these parameters of the gripper."""
+    def initialised(cls, gripper: Mapping[str, Any], arm: Mapping[str, float]) -> RobotHW:
+        """The hardware, with these parameters of the gripper and positions of the arm."""
+        del arm
         root = MappingNodeHandle({"hand": gripper, "joint_limits": {JOINT: KNUCKLE}})
         robot_hw = EzGripperRobotHW()
         assert robot_hw.init(root, root.child("hand"))
         return robot_hw
 
-    def make_robot_hw(self) -> RobotHW:
-        return self.robot_hw
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> RobotHW:
+        if positions is None:
+            return self.robot_hw
+        self._lines.append(started_line(self._folder / str(len(self._lines))))
+        settings = {"port_name": str(self._lines[-1].link), "start_position": positions[JOINT], "link_timeout": 0.5}
+        return self.initialised(settings, {name: value for name, value in positions.items() if name != JOINT})
 
     def limits(self) -> Mapping[str, JointLimits]:
         return {JOINT: JointLimits(0.0, 1.94, 2.0)}
@@ -63,11 +84,12 @@ class TestCombination(TestEzGripper):
     """An arm and a gripper of two kinds as one robot: the one fake, the other with its emulated servo."""
 
     @classmethod
-    def initialised(cls, gripper: Mapping[str, Any]) -> RobotHW:
+    def initialised(cls, gripper: Mapping[str, Any], arm: Mapping[str, float]) -> RobotHW:
+        positions = dict(arm or {"shoulder": 0.5})
         root = MappingNodeHandle(
             {
                 "robot_hardware": ["arm", "hand"],
-                "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": {"shoulder": 0.5}},
+                "arm": {"type": "lab/Mock", "joints": ["shoulder", "elbow"], "initial_positions": positions},
                 "hand": {"type": "lab/Hand", **gripper},
                 "joint_limits": {**dict.fromkeys(("shoulder", "elbow"), SHOULDER), JOINT: KNUCKLE},
             }

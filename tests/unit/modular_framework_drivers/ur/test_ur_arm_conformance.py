@@ -37,8 +37,21 @@ class TestUrArm(RobotHWConformance):
         robot_hw.close()
         emulator.close()
 
-    def make_robot_hw(self) -> RobotHW:
-        return self.arm
+    @pytest.fixture(autouse=True)
+    def emulators(self) -> Iterator[None]:
+        self._emulators: list[EmulatedArm] = []
+        yield
+        for emulator in self._emulators:
+            emulator.close()
+
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> RobotHW:
+        if positions is None:
+            return self.arm
+        self._emulators.append(EmulatedArm(positions=[positions[name] for name in JOINT_NAMES]))
+        robot_hw = UrArmHardware()
+        settings = {"robot_ip_address": self._emulators[-1].address, "link_timeout": 0.5}
+        assert robot_hw.init(MappingNodeHandle({}), MappingNodeHandle(settings, "/arm_hw"))
+        return robot_hw
 
     def limits(self) -> Mapping[str, JointLimits]:
         return dict.fromkeys(JOINT_NAMES, JointLimits(-6.4, 6.4, 3.2))

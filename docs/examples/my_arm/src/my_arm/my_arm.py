@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import math
 
 from modular_framework_control.hardware_interface import (
     JointHandle,
@@ -13,7 +14,7 @@ from modular_framework_control.hardware_interface import (
     RobotHW,
 )
 from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, read_names
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.my_arm")  # below "rosout", so that it reaches ROS's log
 
@@ -21,9 +22,9 @@ LOGGER = logging.getLogger("rosout.my_arm")  # below "rosout", so that it reache
 class Motors:
     """In place of an arm's own library: motors that turn toward their targets, no faster than 3 rad/s."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, positions: list[float]) -> None:
         self.connected = True
-        self.positions, self._targets = [0.0] * count, [0.0] * count
+        self.positions, self._targets = positions, positions
 
     def turn(self, period_s: float) -> None:
         """What the motors do in `period_s` [s]."""
@@ -39,12 +40,16 @@ class Motors:
 
 
 class MyArm(RobotHW):
-    """Joints commanded by position; parameter `joints`: their names."""
+    """Joints commanded by position; parameters `joints`: their names, `start_positions/<joint>` [rad] 0: of the motors.
+
+    A joint has no command until the control loop has read where it stands; then it is commanded to stay there.
+    """
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         """Connects and says what controllers find here; after a False the framework ends, so say why in the log."""
         try:
             names = read_names(robot_hw_nh, "joints")
+            positions = [read_number(robot_hw_nh, f"start_positions/{name}", 0.0, None) for name in names]
             states, commands = JointStateInterface(), PositionJointInterface()
             self._handles = [
                 commands.register_handle(JointHandle(states.register_handle(JointStateHandle(name)))) for name in names
@@ -55,14 +60,15 @@ class MyArm(RobotHW):
         except ParameterError as error:
             LOGGER.error("my_arm: %s", error)
             return False
-        self._motors = Motors(len(names))
+        self._motors = Motors(positions)
         return True
 
     def read(self, time_s: float, period_s: float) -> None:
         """Each cycle, first: what is measured [rad, rad/s, Nm]. Must not wait."""
         self._motors.turn(period_s)
         for handle, position in zip(self._handles, self._motors.positions, strict=True):
-            handle.state.velocity = (position - handle.position) / period_s if period_s > 0.0 else 0.0
+            measured_before = period_s > 0.0 and not math.isnan(handle.position)
+            handle.state.velocity = (position - handle.position) / period_s if measured_before else 0.0
             handle.state.position = position
 
     def write(self, time_s: float, period_s: float) -> None:

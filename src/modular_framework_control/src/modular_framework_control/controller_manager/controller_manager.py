@@ -26,6 +26,7 @@ from modular_framework_control.controller_manager.controller_switch import (
 from modular_framework_control.controller_manager.controller_types import BASE_CLASS, ControllerTypes
 from modular_framework_control.controller_manager.fault_watch import FaultWatch
 from modular_framework_control.hardware_interface.interfaces import ControllerInfo, InterfaceResources
+from modular_framework_control.hardware_interface.joint_limits import missing_limits
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import NodeHandle, join_names
 
@@ -91,6 +92,11 @@ class ControllerManager:
         self._detach: dict[str, Detach] = {}
         self._last_time_s = float("-inf")
         self._watch = FaultWatch(robot_hw)
+        unlimited = missing_limits(robot_hw)
+        if unlimited:
+            LOGGER.warning(
+                "no limits in robot_description or joint_limits: %s; commands of any size are passed on", unlimited
+            )
 
     @property
     def fault(self) -> str:
@@ -120,6 +126,7 @@ class ControllerManager:
                 that of the last cycle does the same.
             reset_reason: why, for the results of the goals that end with it.
         """
+        self._robot_hw.seed_commands()
         reset = reset_controllers or time_s < self._last_time_s
         self._last_time_s = time_s
         faults = self._watch.faults()

@@ -19,7 +19,7 @@ class JointStateHandle:
 
     Attributes:
         name: joint name as in the robot description.
-        position: [rad] or [m].
+        position: [rad] or [m]; not a number until it is measured.
         velocity: [rad/s] or [m/s].
         effort: [Nm] or [N].
         stale: whether these values are older than a few cycles of the device; controllers judge no goal by them.
@@ -27,7 +27,7 @@ class JointStateHandle:
 
     __slots__ = ("name", "position", "velocity", "effort", "stale")
 
-    def __init__(self, name: str, position: float = 0.0, velocity: float = 0.0, effort: float = 0.0) -> None:
+    def __init__(self, name: str, position: float = math.nan, velocity: float = 0.0, effort: float = 0.0) -> None:
         self.name = name
         self.position = position
         self.velocity = velocity
@@ -43,7 +43,8 @@ class JointHandle:
 
     Attributes:
         state: the handle registered with the JointStateInterface (shared, not copied).
-        command: in the unit of the interface: position [rad|m], velocity [rad/s|m/s] or effort [Nm|N].
+        command: in the unit of the interface: position [rad|m], velocity [rad/s|m/s] or effort [Nm|N]; not a number
+            until the control loop or a controller commands something (`RobotHW.seed_commands`).
         max_effort: upper bound of the effort used to follow the command [Nm|N]; 0 means the hardware's default.
             Only hardware with `supports_max_effort` uses it.
         supports_max_effort: set by the RobotHW when it can bound the effort of this joint.
@@ -53,7 +54,7 @@ class JointHandle:
 
     __slots__ = ("state", "command", "max_effort", "supports_max_effort", "limits", "held")
 
-    def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
+    def __init__(self, state: JointStateHandle, command: float = math.nan, supports_max_effort: bool = False) -> None:
         self.state = state
         self.command = command
         self.max_effort = 0.0
@@ -111,7 +112,7 @@ class PosVelJointHandle(JointHandle):
 
     __slots__ = ("command_velocity",)
 
-    def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
+    def __init__(self, state: JointStateHandle, command: float = math.nan, supports_max_effort: bool = False) -> None:
         super().__init__(state, command, supports_max_effort)
         self.command_velocity = 0.0
 
@@ -125,7 +126,7 @@ class PosVelAccJointHandle(PosVelJointHandle):
 
     __slots__ = ("command_acceleration",)
 
-    def __init__(self, state: JointStateHandle, command: float = 0.0, supports_max_effort: bool = False) -> None:
+    def __init__(self, state: JointStateHandle, command: float = math.nan, supports_max_effort: bool = False) -> None:
         super().__init__(state, command, supports_max_effort)
         self.command_acceleration = 0.0
 

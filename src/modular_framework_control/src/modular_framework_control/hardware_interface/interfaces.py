@@ -99,6 +99,9 @@ class HardwareInterface(Generic[HandleT]):
         self._claims.clear()
         return claims
 
+    def seed_commands(self) -> None:
+        """Gives every joint without a command one that keeps it at rest."""
+
 
 class JointStateInterface(HardwareInterface[JointStateHandle]):
     """Read access to joint states; any number of controllers may share it."""
@@ -111,10 +114,17 @@ class _JointCommandInterface(HardwareInterface[JointHandle]):
 
     Attributes:
         handle_class: class of its handles.
+        commands_positions: whether commands are positions; velocities and efforts are 0 at rest.
     """
 
     claims_resources = True
     handle_class: ClassVar[type[JointHandle]] = JointHandle
+    commands_positions: ClassVar[bool] = True
+
+    def seed_commands(self) -> None:
+        for handle in self._handles.values():
+            if handle.command != handle.command:
+                handle.command = handle.position if self.commands_positions else 0.0
 
 
 class PositionJointInterface(_JointCommandInterface):
@@ -127,12 +137,14 @@ class VelocityJointInterface(_JointCommandInterface):
     """Joints commanded by velocity [rad/s|m/s]."""
 
     type_name = "hardware_interface/VelocityJointInterface"
+    commands_positions = False
 
 
 class EffortJointInterface(_JointCommandInterface):
     """Joints commanded by effort [Nm|N]."""
 
     type_name = "hardware_interface/EffortJointInterface"
+    commands_positions = False
 
 
 class PosVelJointInterface(_JointCommandInterface):

@@ -20,6 +20,8 @@ from modular_framework_urdf.robot import Joint, SafetyController
 
 LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
+POINT_MARGIN = 1e-3
+"""How far a goal may lie beyond a position limit [rad|m]: rounding of angles."""
 SOFT_LIMIT_KEYS = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
 
 
@@ -42,6 +44,14 @@ class JointLimits:
     max_effort: float = INFINITY
     continuous: bool = False
     max_acceleration: float = INFINITY
+
+    def range_from(self, position: float) -> tuple[float, float]:
+        """Smallest and largest position [rad|m] for a joint at `position`, which may stay outside or come back."""
+        return min(self.min_position, position), max(self.max_position, position)
+
+    def is_beyond(self, position: float) -> bool:
+        """Whether `position` [rad|m] lies outside the range by more than POINT_MARGIN."""
+        return position < self.min_position - POINT_MARGIN or position > self.max_position + POINT_MARGIN
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,8 +49,8 @@ class PositionJointSaturation:
 
     With soft limits the speed towards an end of the soft range is also at most `k_position` times the distance to it.
     It limits the change from the last command, not from the measured position, which lags behind. Only the command of
-    `JointHandle.hold` is passed on at once, because it is the measured position. A joint outside its range returns no
-    faster than the velocity limit.
+    `JointHandle.hold` is passed on at once, because it is the measured position. A joint outside its range stays where
+    it is, and a command brings it back, no faster than the velocity limit.
 
     Args:
         handle: the joint.
@@ -94,10 +94,11 @@ class PositionJointSaturation:
         else:
             slowest, fastest = soft_velocities(last, limits, self.soft)
             lowest, highest = last + slowest * period_s, last + fastest * period_s
-        if command > limits.max_position:
-            command = limits.max_position
-        elif command < limits.min_position:
-            command = limits.min_position
+        smallest, largest = limits.range_from(last)
+        if command > largest:
+            command = largest
+        elif command < smallest:
+            command = smallest
         if command > highest:
             command = highest
         elif command < lowest:
@@ -221,13 +222,16 @@ def _clamped(value: float, bound: float) -> float:
 
 
 def soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits) -> tuple[float, float]:
-    """Smallest and largest velocity allowed at `position`: none while that is not a number."""
+    """Smallest and largest velocity allowed at `position`: none while that is not a number.
+
+    Rest is always allowed, so that a joint beyond a soft limit is not moved by it.
+    """
     if position != position:
         return 0.0, 0.0
     largest = limits.max_velocity
     lowest = -largest if soft.min_position == -math.inf else soft.k_position * (soft.min_position - position)
     highest = largest if soft.max_position == math.inf else soft.k_position * (soft.max_position - position)
-    return max(-largest, min(largest, lowest)), max(-largest, min(largest, highest))
+    return max(-largest, min(0.0, lowest)), min(largest, max(0.0, highest))
 
 
 def limit_handle(
@@ -277,6 +281,32 @@ def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[Joint
     ]
 
 
+def missing_limits(robot_hw: RobotHW) -> str:
+    """Names the joints whose hardware does not limit what is commanded, and the limits they lack; "" if none does."""
+    missing = []
+    for interface, handle in robot_hw.command_handles:
+        limits = handle.limits if handle.limits is not None else JointLimits()
+        if isinstance(interface, EffortJointInterface):
+            lacks = ["effort"] if limits.max_effort == math.inf else []
+        else:
+            lacks = ["velocity"] if limits.max_velocity == math.inf else []
+            if not limits.continuous and math.inf in (-limits.min_position, limits.max_position):
+                lacks.append("position")
+        if lacks:
+            missing.append(f"{' and '.join(lacks)} of joint '{handle.name}' ({interface.type_name})")
+    return ", ".join(missing)
+
+
+def outside_limits(robot_hw: RobotHW) -> dict[str, str]:
+    """Returns the joints that are held outside their range, and a description of each."""
+    return {
+        handle.name: f"joint '{handle.name}' is held at {handle.position:.6g}, outside its range "
+        f"{handle.limits.min_position:.6g} to {handle.limits.max_position:.6g}, until a goal brings it back"
+        for _, handle in robot_hw.command_handles
+        if handle.limits is not None and handle.limits.is_beyond(handle.position)
+    }
+
+
 class JointLimitGuard:
     """Keeps all commands of a hardware within the limits of `robot_description` and of `joint_limits/<joint>/...`.
 
@@ -297,18 +327,11 @@ class JointLimitGuard:
         soft = soft_limits_from_urdf(description) if isinstance(description, str) else {}
         self.limits: dict[str, JointLimits] = {}
         self._limiters: list[JointLimiter] = []
-        for interface in robot_hw.interfaces:
-            for handle in interface.handles if interface.claims_resources else ():
-                name = handle.name
-                self.limits[name] = limits_with_parameters(name, known.get(name, JointLimits()), root_nh)
-                self._limiters.append(
-                    limit_handle(
-                        type(interface),
-                        handle,
-                        self.limits[name],
-                        soft_limits_with_parameters(name, soft.get(name), root_nh),
-                    )
-                )
+        for interface, handle in robot_hw.command_handles:
+            name = handle.name
+            self.limits[name] = limits_with_parameters(name, known.get(name, JointLimits()), root_nh)
+            soft_limits = soft_limits_with_parameters(name, soft.get(name), root_nh)
+            self._limiters.append(limit_handle(type(interface), handle, self.limits[name], soft_limits))
 
     def enforce(self, period_s: float) -> None:
         """Replaces every command by the nearest allowed one; `period_s` [s] is the time since the last call."""

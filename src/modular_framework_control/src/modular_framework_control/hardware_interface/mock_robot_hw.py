@@ -25,7 +25,8 @@ class MockRobotHW(RobotHW):
     """Joints that do, one cycle later, exactly what they were commanded to do.
 
     A position command is reached; a velocity command is integrated once, an effort command twice, as of joints
-    with inertia 1 and without friction or gravity. Joints stop at once at the ends of their range.
+    with inertia 1 and without friction or gravity. Joints stop at once at the ends of their range, those that begin
+    outside at their initial position.
 
     Parameters: `joints`, a list of names; `initial_positions/<joint>` [rad|m] 0; `command_interface`
     PositionJointInterface, or VelocityJointInterface, EffortJointInterface, PosVelJointInterface,
@@ -53,16 +54,14 @@ class MockRobotHW(RobotHW):
             LOGGER.error("%s in %s: %s", type(self).__name__, join_names(robot_hw_nh.namespace, ""), error)
             return False
         self._limits = [self._guard.limits[name] for name in names]
-        self._sent = [handle.command for handle in self._handles]
+        self._sent = [0.0] * len(names) if self._by_velocity or self._by_effort else positions
         return True
 
     def _register(self, interface_class: type[CommandInterface], names: list[str], positions: list[float]) -> None:
         states, commands = JointStateInterface(), interface_class()
-        rates = self._by_velocity or self._by_effort
         for name, position in zip(names, positions, strict=True):
             state = states.register_handle(JointStateHandle(name, position))
-            handle = interface_class.handle_class(state, 0.0 if rates else position)
-            self._handles.append(commands.register_handle(handle))
+            self._handles.append(commands.register_handle(interface_class.handle_class(state)))
         self.register_interface(states)
         self.register_interface(commands)
 
@@ -83,7 +82,8 @@ class MockRobotHW(RobotHW):
             if self._by_effort:
                 state.effort = sent
                 velocity = state.velocity + sent * period_s
-            position = min(max(state.position + velocity * period_s, limit.min_position), limit.max_position)
+            lowest, highest = limit.range_from(state.position)
+            position = min(max(state.position + velocity * period_s, lowest), highest)
             if period_s > 0.0:
                 state.velocity = (position - state.position) / period_s
             state.position = position

@@ -3,7 +3,8 @@
 
 Hardware is one subclass: a constructor without parameters, `init` that registers its interfaces, `read`
 that fills the joint states and `write` that sends the commands. The owner of the loop calls once per cycle:
-`hw.read(t, dt)`, `controller_manager.update(t, dt)`, `hw.write(t, dt)`.
+`hw.read(t, dt)`, `controller_manager.update(t, dt)`, `hw.write(t, dt)`. A joint that no controller has commanded yet is
+commanded to stay where it was measured first.
 """
 
 from __future__ import annotations
@@ -116,6 +117,11 @@ class RobotHW:
     def read(self, time_s: float, period_s: float) -> None:
         """Fills the joint states with what is measured at `time_s` [s], `period_s` [s] after the last call."""
 
+    def seed_commands(self) -> None:
+        """Commands joints without a command to rest, where they are measured; the owner of the loop calls it."""
+        for interface in self._interfaces.values():
+            interface.seed_commands()
+
     def write(self, time_s: float, period_s: float) -> None:
         """Sends the commands of the joint handles; `period_s` [s] is the time since the last call."""
 
@@ -136,11 +142,19 @@ class RobotHW:
         return (HardwareFault(reason, self.commanded_joints),) if reason else ()
 
     @property
+    def command_handles(self) -> list[tuple[HardwareInterface[Any], Any]]:
+        """The handles that controllers command, each with its interface."""
+        return [
+            (interface, handle)
+            for interface in self._interfaces.values()
+            if interface.claims_resources
+            for handle in interface.handles
+        ]
+
+    @property
     def commanded_joints(self) -> frozenset[str]:
         """Names of the joints that controllers can command."""
-        return frozenset(
-            name for interface in self._interfaces.values() if interface.claims_resources for name in interface.names
-        )
+        return frozenset(handle.name for _, handle in self.command_handles)
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
         """Returns why these controllers may not run together; "" when they may.

@@ -2,8 +2,9 @@
 """Conformance suite of `RobotHW`: what controllers rely on, for every hardware.
 
 Subclass `RobotHWConformance` in a test module under a name that begins with Test and say how the hardware is made;
-pytest finds the rest. Hardware that takes long to make may be handed out again by `make_robot_hw`, unless
-`close_after_test` is True.
+pytest finds the rest. Each test applies to the joints that take commands of its kind: positions (also with velocities
+and accelerations), velocities, efforts. Hardware that takes long to make may be handed out again by `make_robot_hw`,
+unless `close_after_test` is True.
 
 What belongs to the control loop is called from a thread of its own, as the loop does.
 """
@@ -13,21 +14,35 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from modular_framework_control.hardware_interface.handles import JointHandle
 from modular_framework_control.hardware_interface.interfaces import (
+    COMMAND_INTERFACES,
+    CommandInterface,
     ControllerInfo,
+    EffortJointInterface,
     InterfaceResources,
     JointStateInterface,
-    PositionJointInterface,
+    VelocityJointInterface,
 )
 from modular_framework_control.hardware_interface.joint_limits import JointLimits
 from modular_framework_control.hardware_interface.robot_hw import RobotHW, SwitchState
 
 ResultT = TypeVar("ResultT")
+POSITIONS = tuple(interface for interface in COMMAND_INTERFACES if interface.commands_positions)
+SHARES_OF_RANGE = (0.15, 0.5, 0.8)
+"""Where joints stand at the start, as shares of their range; joint by joint another one."""
+START_REACH = 1.0
+"""Largest distance of such a position from the middle of the range, or from 0 without a range [rad|m]."""
+HOSTILE_COMMANDS = (1e9, -1e9, math.inf, -math.inf, math.nan)
+OVERSPEED = 1.5
+"""Largest mean speed as a multiple of the limit: an effort takes time to brake."""
+TIMED_CYCLES = 50
+SLOW_CYCLES_SHARE = 0.2
+"""Share of cycles that may take longer than the period: the machine may have been busy."""
 TIMELY_SHARE = 0.7
 """Share of the time that a jump takes at the velocity limit; a joint that needs less exceeded the limit."""
 
@@ -57,8 +72,13 @@ class RobotHWConformance(ABC):
     close_after_test = True
 
     @abstractmethod
-    def make_robot_hw(self) -> RobotHW:
-        """Initialised hardware, at rest, with room to move in every joint."""
+    def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> RobotHW:
+        """Initialised hardware, at rest, with room to move in every joint.
+
+        Args:
+            positions: where the joints stand before the hardware is initialised [rad|m], by name, within the limits;
+                the hardware must then be new. None for positions of its choice.
+        """
 
     @abstractmethod
     def limits(self) -> Mapping[str, JointLimits]:
@@ -90,38 +110,83 @@ class RobotHWConformance(ABC):
     def _read(self, robot_hw: RobotHW) -> None:
         self._in_loop(robot_hw.read, self._time_s, self.period_s)
 
-    def _cycle(self, robot_hw: RobotHW, goals: Mapping[str, float] | None = None) -> None:
-        """Reads, commands as controllers do (the present positions, without `goals`), writes; then time passes."""
-        self._in_loop(self._cycle_in_loop, robot_hw, goals)
+    def _cycle(self, robot_hw: RobotHW, commands: Mapping[JointHandle, float]) -> None:
+        """Reads, commands as the loop and controllers do, writes; then time passes."""
+        self._in_loop(self._cycle_in_loop, robot_hw, commands)
         self._time_s += self.period_s
         self.advance(self.period_s)
 
-    def _cycle_in_loop(self, robot_hw: RobotHW, goals: Mapping[str, float] | None) -> None:
+    def _cycle_in_loop(self, robot_hw: RobotHW, commands: Mapping[JointHandle, float]) -> None:
         robot_hw.read(self._time_s, self.period_s)
         self._read_s = time.monotonic() if self.real_time else self._time_s
-        for handle in robot_hw.get(PositionJointInterface).handles:
-            handle.command = handle.position if goals is None else goals[handle.name]
+        robot_hw.seed_commands()
+        for handle, command in commands.items():
+            handle.command = command
         robot_hw.write(self._time_s, self.period_s)
 
-    def _run(self, robot_hw: RobotHW, goals: Mapping[str, float], duration_s: float) -> None:
+    def _run(self, robot_hw: RobotHW, commands: Mapping[JointHandle, float], duration_s: float) -> None:
         for _ in range(round(duration_s / self.period_s)):
-            self._cycle(robot_hw, goals)
+            self._cycle(robot_hw, commands)
         self._read(robot_hw)
 
-    def _ready(self) -> tuple[RobotHW, list[JointHandle]]:
-        """Returns hardware without a fault whose joints are commanded to their present positions."""
-        robot_hw = self.make_robot_hw()
+    def _ready(self, positions: Mapping[str, float] | None = None) -> RobotHW:
+        """Returns hardware without a fault."""
+        robot_hw = self.make_robot_hw(positions)
         self._made.append(robot_hw)
+        if positions is None and not self.close_after_test:
+            self._in_loop(self._hold, robot_hw)
         self._read(robot_hw)
         cycles = 0
         while self._in_loop(robot_hw.faults):
             assert cycles * self.period_s < self.ready_s, list(robot_hw.faults())
-            self._cycle(robot_hw)
+            self._cycle(robot_hw, {})
             cycles += 1
-        handles = robot_hw.get(PositionJointInterface).handles
-        for handle in handles:
-            handle.command = handle.position
-        return robot_hw, handles
+        return robot_hw
+
+    def _hold(self, robot_hw: RobotHW) -> None:
+        """Holds the joints, as a controller that starts does: the test before may have commanded anything."""
+        robot_hw.read(self._time_s, self.period_s)
+        for _, handles in self._commanded(robot_hw, POSITIONS):
+            for handle in handles:
+                handle.hold(handle.position)
+        robot_hw.write(self._time_s, self.period_s)
+
+    @staticmethod
+    def _commanded(
+        robot_hw: RobotHW, interfaces: Sequence[type[CommandInterface]] = COMMAND_INTERFACES
+    ) -> Iterator[tuple[CommandInterface, list[JointHandle]]]:
+        """The interfaces of the hardware among `interfaces`, with their handles."""
+        for interface_class in interfaces:
+            interface = robot_hw.find(interface_class)
+            if interface is not None and interface.handles:
+                yield interface, interface.handles
+
+    def _claimed(
+        self, *interfaces: type[CommandInterface]
+    ) -> Iterator[tuple[RobotHW, list[JointHandle], dict[JointHandle, float]]]:
+        """Hardware that is ready, the joints of each interface it has among `interfaces`, and commands of rest."""
+        robot_hw = self._ready()
+        for interface, handles in self._commanded(robot_hw, interfaces):
+            claim = InterfaceResources(interface.type_name, tuple(handle.name for handle in handles))
+            info = ControllerInfo("one", "some/Type", (claim,))
+            assert robot_hw.prepare_switch([info], []) is True
+            self._in_loop(robot_hw.do_switch, [info], [])
+            yield (
+                robot_hw,
+                handles,
+                {handle: handle.position if interface.commands_positions else 0.0 for handle in handles},
+            )
+
+    def _start_positions(self, offset: int) -> dict[str, float]:
+        """Positions within the limits, of each joint at another share of its range."""
+        positions = {}
+        for index, (name, limit) in enumerate(self.limits().items()):
+            bounded = math.isfinite(limit.min_position + limit.max_position)
+            middle = 0.5 * (limit.min_position + limit.max_position) if bounded else 0.0
+            reach = min(START_REACH, limit.max_position - middle)
+            share = SHARES_OF_RANGE[(index + offset) % len(SHARES_OF_RANGE)]
+            positions[name] = middle + reach * (2.0 * share - 1.0)
+        return positions
 
     def _target(self, handle: JointHandle, distance: float) -> float:
         """A position that far away, upward where there is room; else the range's farther end."""
@@ -132,124 +197,206 @@ class RobotHWConformance(ABC):
         return handle.position - min(distance, down)
 
     def test_the_constructor_needs_no_arguments(self) -> None:
-        assert isinstance(type(self._ready()[0])(), RobotHW)
+        assert isinstance(type(self._ready())(), RobotHW)
 
     def test_commanded_joints_share_their_state_with_the_state_interface(self) -> None:
-        robot_hw, handles = self._ready()
+        robot_hw = self._ready()
         states = robot_hw.get(JointStateInterface)
-        assert handles
-        assert all(states.get_handle(handle.name) is handle.state for handle in handles)
+        assert robot_hw.command_handles
+        assert all(states.get_handle(handle.name) is handle.state for _, handle in robot_hw.command_handles)
 
     def test_states_are_finite_and_within_the_limits(self) -> None:
-        robot_hw, handles = self._ready()
-        limits = self.limits()
+        robot_hw = self._ready()
         for state in robot_hw.get(JointStateInterface).handles:
             assert all(map(math.isfinite, (state.position, state.velocity, state.effort)))
+        self._assert_within_limits(handle for _, handle in robot_hw.command_handles)
+
+    def _assert_within_limits(self, handles: Iterable[JointHandle]) -> None:
         for handle in handles:
-            limit = limits[handle.name]
-            assert limit.min_position - self.tolerance <= handle.position <= limit.max_position + self.tolerance
+            limit = self.limits()[handle.name]
+            assert math.isfinite(handle.position)
+            assert limit.min_position - self.tolerance <= handle.position <= limit.max_position + self.tolerance, handle
+
+    def test_wherever_it_stands_at_the_start_it_stays_until_it_is_commanded(self) -> None:
+        for offset in range(len(SHARES_OF_RANGE)):
+            wanted = self._start_positions(offset)
+            robot_hw = self._ready(wanted)
+            states = [robot_hw.get(JointStateInterface).get_handle(name) for name in wanted]
+            still = {handle.name for _, handles in self._commanded_at_rest(robot_hw) for handle in handles}
+            for _ in range(round(0.5 / self.period_s)):
+                for state in states:
+                    away = abs(state.position - wanted[state.name])
+                    assert state.name not in still or away <= self.tolerance, f"{state} moved from {wanted[state.name]}"
+                self._cycle(robot_hw, {})
+            rates = self._commanded(robot_hw, (VelocityJointInterface, EffortJointInterface))
+            assert all(handle.command == 0.0 for _, handles in rates for handle in handles)
+            robot_hw.close()
+
+    def _commanded_at_rest(self, robot_hw: RobotHW) -> Iterator[tuple[CommandInterface, list[JointHandle]]]:
+        """The interfaces whose joints stay where they are without a command; an effort of 0 may let them fall."""
+        return self._commanded(robot_hw, (*POSITIONS, VelocityJointInterface))
 
     def test_at_rest_it_has_no_fault(self) -> None:
-        robot_hw, handles = self._ready()
-        self._run(robot_hw, {handle.name: handle.position for handle in handles}, 0.1)
+        robot_hw = self._ready()
+        self._run(robot_hw, {}, 0.1)
         assert self._in_loop(robot_hw.fault) == "" and not self._in_loop(robot_hw.faults)
 
+    def test_read_and_write_do_not_wait(self) -> None:
+        robot_hw = self._ready()
+        durations_s: dict[str, list[float]] = {"read": [], "write": []}
+        for _ in range(TIMED_CYCLES):
+            for name, taken_s in durations_s.items():
+                begun_s = time.perf_counter()
+                self._in_loop(getattr(robot_hw, name), self._time_s, self.period_s)
+                taken_s.append(time.perf_counter() - begun_s)
+                if name == "read":
+                    self._in_loop(robot_hw.seed_commands)
+            self._time_s += self.period_s
+            self.advance(self.period_s)
+        for name, taken_s in durations_s.items():
+            usual_s = sorted(taken_s)[-1 - round(SLOW_CYCLES_SHARE * TIMED_CYCLES)]
+            assert usual_s <= self.period_s, (
+                f"{name}() takes {usual_s * 1e3:.1f} ms or more in every fifth cycle, the period is "
+                f"{self.period_s * 1e3:g} ms; it must not wait: do that on a thread of its own, started in init()"
+            )
+
     def test_commanded_to_hold_it_stays(self) -> None:
-        robot_hw, handles = self._ready()
-        before = {handle.name: handle.position for handle in handles}
-        self._run(robot_hw, before, 0.5)
-        assert all(abs(handle.position - before[handle.name]) <= self.tolerance for handle in handles)
+        for robot_hw, handles, commands in self._claimed(*POSITIONS):
+            self._run(robot_hw, commands, 0.5)
+            assert all(abs(handle.position - commands[handle]) <= self.tolerance for handle in handles)
 
     def test_each_joint_follows_its_command_and_the_others_stay(self) -> None:
-        robot_hw, handles = self._ready()
-        goals = {handle.name: handle.position for handle in handles}
-        self._run(robot_hw, goals, 0.1)
-        for moved in handles:
-            goals[moved.name] = self._target(moved, self.step)
-            self._run(robot_hw, goals, self.settle_s)
-            for handle in handles:
-                assert abs(handle.position - goals[handle.name]) <= self.tolerance, (moved.name, handle)
+        for robot_hw, handles, goals in self._claimed(*POSITIONS):
+            self._run(robot_hw, goals, 0.1)
+            for moved in handles:
+                goals[moved] = self._target(moved, self.step)
+                self._run(robot_hw, goals, self.settle_s)
+                for handle in handles:
+                    assert abs(handle.position - goals[handle]) <= self.tolerance, (moved.name, handle)
 
     def test_velocity_has_the_sign_of_the_motion(self) -> None:
-        robot_hw, handles = self._ready()
-        goals = {handle.name: handle.position for handle in handles}
-        for handle in handles:
-            start, seen = handle.position, 0.0
-            goals[handle.name] = self._target(handle, self.step)
-            for _ in range(round(self.settle_s / self.period_s)):
-                self._cycle(robot_hw, goals)
-                self._read(robot_hw)
-                seen = max(seen, handle.velocity, key=abs)
-            assert seen * (handle.position - start) > 0.0, handle
+        for robot_hw, handles, goals in self._claimed(*POSITIONS):
+            for handle in handles:
+                start, seen = handle.position, 0.0
+                goals[handle] = self._target(handle, self.step)
+                for _ in range(round(self.settle_s / self.period_s)):
+                    self._cycle(robot_hw, goals)
+                    self._read(robot_hw)
+                    seen = max(seen, handle.velocity, key=abs)
+                assert seen * (handle.position - start) > 0.0, handle
 
     def test_a_jump_of_the_command_is_followed_no_faster_than_the_limit_allows(self) -> None:
-        robot_hw, handles = self._ready()
         limits = self.limits()
-        limited = [handle for handle in handles if math.isfinite(limits[handle.name].max_velocity)]
-        assert limited, f"limits() has no finite max_velocity of any of {[handle.name for handle in handles]}"
-        goals = {handle.name: handle.position for handle in handles}
-        for handle in limited:
-            goals[handle.name] = self._target(handle, self.jump)
-            jump = abs(goals[handle.name] - handle.position)
-            least_s = TIMELY_SHARE * (jump - 2.0 * self.tolerance) / limits[handle.name].max_velocity
-            assert least_s >= 5 * self.period_s, (
-                f"a jump of {jump} of {handle.name} takes too few cycles; give a greater one, more room at the start, "
-                "a smaller tolerance or a shorter period"
-            )
-            assert self._duration_of_jump(robot_hw, handle, goals) >= least_s, handle
+        for robot_hw, handles, goals in self._claimed(*POSITIONS):
+            limited = [handle for handle in handles if math.isfinite(limits[handle.name].max_velocity)]
+            assert limited, f"limits() has no finite max_velocity of any of {[handle.name for handle in handles]}"
+            for handle in limited:
+                goals[handle] = self._target(handle, self.jump)
+                jump = abs(goals[handle] - handle.position)
+                least_s = TIMELY_SHARE * (jump - 2.0 * self.tolerance) / limits[handle.name].max_velocity
+                assert least_s >= 5 * self.period_s, (
+                    f"a jump of {jump} of {handle.name} takes too few cycles; give a greater one, more room at the "
+                    "start, a smaller tolerance or a shorter period"
+                )
+                assert self._duration_of_jump(robot_hw, handle, goals) >= least_s, handle
 
-    def _duration_of_jump(self, robot_hw: RobotHW, handle: JointHandle, goals: Mapping[str, float]) -> float:
+    def _duration_of_jump(self, robot_hw: RobotHW, handle: JointHandle, goals: Mapping[JointHandle, float]) -> float:
         """Returns how long the joint takes from its start position to its goal [s]; fails if it does not arrive."""
         start, left_s = handle.position, math.nan
         for _ in range(round((self.settle_s + self.jump / self.limits()[handle.name].max_velocity) / self.period_s)):
             self._cycle(robot_hw, goals)
             if abs(handle.position - start) <= self.tolerance:
                 left_s = self._read_s
-            if abs(handle.position - goals[handle.name]) <= self.tolerance:
+            if abs(handle.position - goals[handle]) <= self.tolerance:
                 return self._read_s - left_s
-        raise AssertionError(
-            f"{handle.name} has not come from {start} to {goals[handle.name]}, but to {handle.position}"
-        )
+        raise AssertionError(f"{handle.name} has not come from {start} to {goals[handle]}, but to {handle.position}")
 
     def test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them(self) -> None:
-        robot_hw, handles = self._ready()
-        for command in (1e9, -1e9, math.inf, math.nan):
-            self._run(robot_hw, {handle.name: command for handle in handles}, 0.1)
+        for robot_hw, handles, _ in self._claimed(*POSITIONS, VelocityJointInterface):
+            for command in HOSTILE_COMMANDS:
+                self._assert_no_faster_than_the_limit(robot_hw, handles, command)
+                self._assert_within_limits(handles)
+
+    def test_a_velocity_is_followed_until_it_is_0(self) -> None:
+        self._assert_that_joints_move(VelocityJointInterface, lambda limit: min(0.5, 0.5 * limit.max_velocity))
+
+    def test_an_effort_moves_its_joint(self) -> None:
+        self._assert_that_joints_move(
+            EffortJointInterface, lambda limit: 0.5 * limit.max_effort if limit.max_effort < math.inf else 1.0
+        )
+
+    def _assert_that_joints_move(self, interface: type[CommandInterface], size: Callable[[JointLimits], float]) -> None:
+        """Commands each joint by `size` of its limits to where there is room, then 0."""
+        for robot_hw, handles, commands in self._claimed(interface):
             for handle in handles:
+                start, target = handle.position, self._target(handle, self.step)
+                direction = math.copysign(1.0, target - start)
+                commands[handle] = direction * size(self.limits()[handle.name])
+                for _ in range(round(self.settle_s / self.period_s)):
+                    self._cycle(robot_hw, commands)
+                    if (handle.position - start) * direction > 0.5 * abs(target - start):
+                        break
+                self._read(robot_hw)
+                assert handle.velocity * direction > 0.0 and (handle.position - start) * direction > 0.0, handle
+                commands[handle] = 0.0
+                self._run(robot_hw, commands, self.settle_s)
+                if interface is VelocityJointInterface:
+                    stopped = handle.position
+                    self._run(robot_hw, commands, 0.1)
+                    assert abs(handle.position - stopped) <= self.tolerance, f"{handle} does not stop"
+
+    def test_no_effort_exceeds_the_limits_or_makes_a_joint_faster_than_its_velocity_limit(self) -> None:
+        for robot_hw, handles, _ in self._claimed(EffortJointInterface):
+            for command in HOSTILE_COMMANDS:
+                self._assert_no_faster_than_the_limit(robot_hw, handles, command)
+
+    def _assert_no_faster_than_the_limit(self, robot_hw: RobotHW, handles: list[JointHandle], command: float) -> None:
+        """Commands all joints so for a while."""
+        self._cycle(robot_hw, dict.fromkeys(handles, command))
+        starts, began_s = [handle.position for handle in handles], self._read_s
+        for _ in range(round(0.1 / self.period_s)):
+            self._cycle(robot_hw, dict.fromkeys(handles, command))
+            for handle, start in zip(handles, starts, strict=True):
                 limit = self.limits()[handle.name]
-                assert math.isfinite(handle.position)
-                assert limit.min_position - self.tolerance <= handle.position <= limit.max_position + self.tolerance
+                allowed = OVERSPEED * limit.max_velocity * (self._read_s - began_s) + 2.0 * self.tolerance
+                assert abs(handle.position - start) <= allowed, f"{handle} is too fast, commanded {command}"
+                assert not abs(handle.effort) > OVERSPEED * limit.max_effort, f"{handle} has effort {handle.effort}"
+        self._read(robot_hw)
 
     def test_a_cycle_without_time_is_survived(self) -> None:
-        robot_hw, handles = self._ready()
+        robot_hw = self._ready()
+        self._cycle(robot_hw, {})
         self._in_loop(robot_hw.write, self._time_s, 0.0)
         self._in_loop(robot_hw.read, self._time_s, 0.0)
-        assert all(math.isfinite(handle.velocity) for handle in handles)
+        assert all(math.isfinite(state.velocity) for state in robot_hw.get(JointStateInterface).handles)
 
     def test_two_controllers_may_not_claim_one_joint(self) -> None:
-        robot_hw, handles = self._ready()
-        name = handles[0].name
-        claim = (InterfaceResources(PositionJointInterface.type_name, (name,)),)
-        one, other = ControllerInfo("one", "some/Type", claim), ControllerInfo("other", "some/Type", claim)
-        assert robot_hw.check_for_conflict([one]) == ""
-        assert name in robot_hw.check_for_conflict([one, other])
-        assert robot_hw.prepare_switch([one], []) is True
+        robot_hw = self._ready()
+        for interface, handles in self._commanded(robot_hw):
+            name = handles[0].name
+            claim = (InterfaceResources(interface.type_name, (name,)),)
+            one, other = ControllerInfo("one", "some/Type", claim), ControllerInfo("other", "some/Type", claim)
+            assert robot_hw.check_for_conflict([one]) == ""
+            assert name in robot_hw.check_for_conflict([one, other])
+            assert robot_hw.prepare_switch([one], []) is True
 
     def test_switches_are_done_and_leave_it_where_it_is(self) -> None:
-        robot_hw, handles = self._ready()
-        before = {handle.name: handle.position for handle in handles}
-        claim = (InterfaceResources(PositionJointInterface.type_name, tuple(before)),)
-        info = ControllerInfo("one", "some/Type", claim)
-        for start, stop in (([info], []), ([], [info])):
-            assert robot_hw.prepare_switch(start, stop) is True
-            self._in_loop(robot_hw.do_switch, start, stop)
-            assert self._in_loop(robot_hw.switch_result) is SwitchState.DONE
-            assert self._in_loop(robot_hw.switch_result, info) is SwitchState.DONE
-            self._run(robot_hw, before, 0.2)
-        assert all(abs(handle.position - before[handle.name]) <= self.tolerance for handle in handles)
+        robot_hw = self._ready()
+        for interface, handles in self._commanded_at_rest(robot_hw):
+            before = {handle: handle.position for handle in handles}
+            info = ControllerInfo(
+                "one", "some/Type", (InterfaceResources(interface.type_name, tuple(interface.names)),)
+            )
+            for start, stop in (([info], []), ([], [info])):
+                assert robot_hw.prepare_switch(start, stop) is True
+                self._in_loop(robot_hw.do_switch, start, stop)
+                assert self._in_loop(robot_hw.switch_result) is SwitchState.DONE
+                assert self._in_loop(robot_hw.switch_result, info) is SwitchState.DONE
+                self._run(robot_hw, {}, 0.2)
+            assert all(abs(handle.position - before[handle]) <= self.tolerance for handle in handles)
 
     def test_it_may_be_closed_twice(self) -> None:
-        robot_hw, _ = self._ready()
+        robot_hw = self._ready()
         if self.close_after_test:
             robot_hw.close()
             robot_hw.close()

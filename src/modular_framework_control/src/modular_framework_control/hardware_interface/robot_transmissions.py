@@ -19,7 +19,6 @@ def write(self, time_s, period_s):
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -84,7 +83,6 @@ class RobotTransmissions:
             name: states.register_handle(JointStateHandle(name)) for info in self._infos for name in info.joints
         }
         self._paths = [path for info in self._infos for path in self._command_paths(robot_hw, info)]
-        self._began = False
 
     def _check_actuators(self) -> None:
         known = {name for info in self._infos for name in info.actuators}
@@ -120,7 +118,7 @@ class RobotTransmissions:
         return paths
 
     def propagate_states(self) -> None:
-        """Computes the joint states from those of the actuators; the first time also commands the joints to stay."""
+        """Computes the joint states from those of the actuators."""
         for info in self._infos:
             actuators = [self.actuators[name] for name in info.actuators]
             joints = [self._states[name] for name in info.joints]
@@ -129,17 +127,11 @@ class RobotTransmissions:
             efforts = info.transmission.joint_efforts([actuator.effort for actuator in actuators])
             for joint, position, velocity, effort in zip(joints, positions, velocities, efforts, strict=True):
                 joint.position, joint.velocity, joint.effort = position, velocity, effort
-        if not self._began:
-            self._began = True
-            for path in self._paths:
-                if path.attribute == "command_position":
-                    for handle in path.joints:
-                        handle.command = handle.position
 
     def propagate_commands(self) -> None:
-        """Computes the commands of the actuators from those of the joints; not a number before the first states."""
+        """Computes the commands of the actuators from those of the joints; not a number while a joint has none."""
         for path in self._paths:
-            commands = path.convert([joint.command if self._began else math.nan for joint in path.joints])
+            commands = path.convert([joint.command for joint in path.joints])
             for actuator, command in zip(path.actuators, commands, strict=True):
                 setattr(actuator, path.attribute, command)
 

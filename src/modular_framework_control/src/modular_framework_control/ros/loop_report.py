@@ -11,6 +11,8 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_srvs.srv import Empty, EmptyResponse
 
+from modular_framework_control.hardware_interface.joint_limits import outside_limits
+from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.realtime.cycle_pacer import LoopFigures, LoopStatistics
 from modular_framework_ros.publishing import publish
 
@@ -23,22 +25,26 @@ class LoopReport:
 
     The service `~reset_statistics` (std_srvs/Empty) resets the statistics.
 
-    The status is a warning when cycles were late since the last message, an error when the hardware has a fault.
+    The status is a warning when cycles were late since the last message or joints stand outside their range, an error
+    when the hardware has a fault.
     Values: `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
     `work_max_us`, `no_processor_us` (total time that the loop was due and had no processor),
-    `no_processor_max_us` (the longest such time), `fault`.
+    `no_processor_max_us` (the longest such time), `fault`, `outside_limits`.
 
     Args:
         statistics: figures that the loop writes.
         period_s: period of the loop [s].
-        hardware: what the loop drives, for `hardware_id`.
+        robot_hw: what the loop drives.
         fault: returns the fault of the hardware, "" for none.
     """
 
-    def __init__(self, statistics: LoopStatistics, period_s: float, hardware: str, fault: Callable[[], str]) -> None:
+    def __init__(
+        self, statistics: LoopStatistics, period_s: float, robot_hw: RobotHW, fault: Callable[[], str]
+    ) -> None:
         self._statistics = statistics
         self._period_s = period_s
-        self._hardware = hardware
+        self._robot_hw = robot_hw
+        self._outside: frozenset[str] = frozenset()
         self._fault = fault
         self._late = 0
         self._ended = threading.Event()
@@ -71,7 +77,7 @@ class LoopReport:
     def _publish(self, figures: LoopFigures) -> None:
         late = figures.missed + figures.overruns
         late_since_last, self._late = late > self._late, late
-        fault = self._fault()
+        fault, outside = self._fault(), self._report_joints_outside()
         text = (
             f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles took too long, "
             f"{figures.missed} were left out"
@@ -85,10 +91,10 @@ class LoopReport:
             )
         status = DiagnosticStatus(
             name=f"{rospy.get_name().lstrip('/')}: control loop",
-            hardware_id=self._hardware,
-            message=f"hardware fault: {fault}; {text}" if fault else text,
+            hardware_id=type(self._robot_hw).__name__,
+            message="; ".join(filter(None, (fault and f"hardware fault: {fault}", outside, text))),
         )
-        level = DiagnosticStatus.WARN if late_since_last else DiagnosticStatus.OK
+        level = DiagnosticStatus.WARN if late_since_last or outside else DiagnosticStatus.OK
         status.level = DiagnosticStatus.ERROR if fault else level
         values = {
             "rate": 1.0 / self._period_s,
@@ -103,7 +109,17 @@ class LoopReport:
             "no_processor_us": figures.no_processor_s * 1e6,
             "no_processor_max_us": figures.no_processor_max_s * 1e6,
         }
-        status.values = [KeyValue(key, f"{value:.10g}") for key, value in values.items()] + [KeyValue("fault", fault)]
+        status.values = [KeyValue(key, f"{value:.10g}") for key, value in values.items()]
+        status.values += [KeyValue("fault", fault), KeyValue("outside_limits", outside)]
         message = DiagnosticArray(status=[status])
         message.header.stamp = rospy.Time.now()
         publish(self._publisher, message)
+
+    def _report_joints_outside(self) -> str:
+        """Describes the joints outside their range; logs those that were inside before."""
+        outside = outside_limits(self._robot_hw)
+        new = [text for name, text in outside.items() if name not in self._outside]
+        if new:
+            rospy.logwarn("%s", "; ".join(new))
+        self._outside = frozenset(outside)
+        return "; ".join(outside.values())

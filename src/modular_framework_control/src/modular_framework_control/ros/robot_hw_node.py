@@ -102,7 +102,7 @@ class RobotHwNode:
         self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
         self._readiness.connect()
         self._manager = RosControllerManager(self._robot_hw, rospy.get_namespace(), loop_time=self._loop_time)
-        self._report = LoopReport(self._statistics, self._period_s, type(self._robot_hw).__name__, self._fault)
+        self._report = LoopReport(self._statistics, self._period_s, self._robot_hw, self._fault)
         self._report.connect()
 
     def _warn_of_a_description_elsewhere(self) -> None:
@@ -177,6 +177,8 @@ class RobotHwNode:
         self._robot_hw.read(time_s, period_s)
         if self._connected.is_set():
             manager.update(time_s, period_s)
+        else:
+            self._robot_hw.seed_commands()
         self._robot_hw.write(time_s, period_s)
         self._statistics.add(late_s, missed, time.perf_counter() - begun_s, woken_late_s)
         return self._goes_on()
@@ -213,7 +215,9 @@ class RobotHwNode:
         Hardware and limits brake cycle by cycle. It uses real time, because a simulated clock may be paused.
         """
         begun_s = due_s = time.monotonic()
-        going = self._attempt_last("write")
+        self._robot_hw.seed_commands()
+        measured = all(handle.command == handle.command for _, handle in self._robot_hw.command_handles)
+        going = measured and self._attempt_last("write")
         while going and time.monotonic() - begun_s < LONGEST_END_S:
             if not moves(self._robot_hw, 0.0 if time.monotonic() - begun_s < RESTLESS_S else REST_VELOCITY):
                 break
@@ -246,13 +250,11 @@ class RobotHwNode:
 
 def moves(robot_hw: RobotHW, slow: float) -> bool:
     """Whether a joint that can be commanded is faster than `slow` [rad/s|m/s], or commanded a velocity or effort."""
-    for interface in robot_hw.interfaces:
-        if interface.claims_resources:
-            rates = isinstance(interface, (VelocityJointInterface, EffortJointInterface))
-            for handle in interface.handles:
-                if abs(getattr(handle, "velocity", 0.0)) > slow or (rates and handle.command != 0.0):
-                    return True
-    return False
+    return any(
+        abs(handle.velocity) > slow
+        or (isinstance(interface, (VelocityJointInterface, EffortJointInterface)) and handle.command != 0.0)
+        for interface, handle in robot_hw.command_handles
+    )
 
 
 def _attempt(what: str, action: Callable[[], None]) -> bool:

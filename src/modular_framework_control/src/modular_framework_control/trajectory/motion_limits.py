@@ -14,13 +14,11 @@ from enum import Enum, auto
 import numpy as np
 from numpy.typing import NDArray
 
-from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits
+from modular_framework_control.hardware_interface.joint_limit_parameters import POINT_MARGIN, JointLimits
 from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track
 
 VELOCITY_SHARE = 1.05
 """Largest velocity as a multiple of the limit: time parameterisations overshoot by that much between their points."""
-POINT_MARGIN = 1e-3
-"""How far a point may lie beyond a position limit [rad|m]: rounding of angles."""
 CURVE_MARGIN = 1e-2
 """How far the curve between points may go beyond a position limit, and how far a joint may lag behind in the first
 segment [rad|m]."""

@@ -67,13 +67,12 @@ class EzGripperRobotHW(RobotHW):
             return False
         self._faults = self._gripper.state().faults
         self.read(0.0, 0.0)
-        self._handle.command = self._handle.position
         return True
 
     def _register(self, joint: str, root_nh: NodeHandle) -> None:
         states, commands = JointStateInterface(), PositionJointInterface()
         state = states.register_handle(JointStateHandle(joint))
-        self._handle = commands.register_handle(JointHandle(state, 0.0, supports_max_effort=True))
+        self._handle = commands.register_handle(JointHandle(state, supports_max_effort=True))
         self.register_interface(states)
         self.register_interface(commands)
         self._guard = JointLimitGuard(self, root_nh)

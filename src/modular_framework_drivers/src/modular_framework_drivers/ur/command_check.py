@@ -39,14 +39,10 @@ class CheckedJoint:
     limits: JointLimits
     soft: SoftJointLimits | None = None
 
-    def range_from(self, position: float) -> tuple[float, float]:
-        """Smallest and largest position [rad] that a joint at `position` [rad] may be sent to."""
-        return min(self.limits.min_position, position), max(self.limits.max_position, position)
-
     def velocity_range(self, position: float, period_s: float) -> tuple[float, float]:
         """Smallest and largest velocity at `position` [rad] in a cycle of `period_s` [s].
 
-        So slow that the joint can stop within its range; where soft limits leave only the way back, also 0.
+        So slow that the joint can stop within its range.
         """
         limits = self.limits
         slowest, fastest = -limits.max_velocity, limits.max_velocity
@@ -54,8 +50,8 @@ class CheckedJoint:
             slowest, fastest = soft_velocities(position, limits, self.soft)
         below, above = max(position - limits.min_position, 0.0), max(limits.max_position - position, 0.0)
         return (
-            max(min(slowest, 0.0), -_closing_speed(below, limits.max_acceleration, period_s)),
-            min(max(fastest, 0.0), _closing_speed(above, limits.max_acceleration, period_s)),
+            max(slowest, -_closing_speed(below, limits.max_acceleration, period_s)),
+            min(fastest, _closing_speed(above, limits.max_acceleration, period_s)),
         )
 
 
@@ -108,7 +104,7 @@ class CommandCheck:
             if reason:
                 self._brake(index, limits.max_acceleration * period_s, period_s)
             else:
-                lowest, highest = joint.range_from(self.sent[index])
+                lowest, highest = limits.range_from(self.sent[index])
                 self._approach(index, min(max(commands[index], lowest), highest), joint, period_s)
         return reason
 
@@ -117,7 +113,7 @@ class CommandCheck:
             limits = joint.limits
             if not math.isfinite(command):
                 return f"joint '{joint.name}': command {command} is no position; the arm holds"
-            lowest, highest = joint.range_from(sent)
+            lowest, highest = limits.range_from(sent)
             if not lowest - CURVE_MARGIN <= command <= highest + CURVE_MARGIN:
                 return (
                     f"joint '{joint.name}': command {command:.6g} rad is outside its range "
