@@ -11,11 +11,23 @@ import pytest
 
 from modular_framework_control.controllers.gripper_action_controller import GripperGoalError, GripperGoalHandle
 from modular_framework_control.hardware_interface.interfaces import PositionJointInterface
+from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.realtime.goal_handle import GoalStatus
 
 URDF = """<robot name="r"><joint name="finger" type="revolute">
-<limit lower="0" upper="0.5" velocity="1.0" effort="1"/></joint></robot>"""
+<limit lower="0" upper="1" velocity="1.0" effort="1"/></joint></robot>"""
+OBJECT = 0.5
+"""Where the finger meets an object [rad]."""
+
+
+class FingerAtAnObject(MockRobotHW):
+    """A finger that an object stops."""
+
+    def read(self, time_s: float, period_s: float) -> None:
+        super().read(time_s, period_s)
+        for joint in self._handles:
+            joint.state.position = min(joint.position, OBJECT)
 
 
 def parameters(**more: Any) -> dict[str, Any]:
@@ -34,7 +46,7 @@ def parameters(**more: Any) -> dict[str, Any]:
 
 @pytest.fixture
 def loop(make_loop: Callable[..., Any]) -> Any:
-    made = make_loop(parameters())
+    made = make_loop(parameters(), FingerAtAnObject())
     made.spawn("gripper")
     return made
 
@@ -170,6 +182,37 @@ def test_a_goal_that_makes_no_sense_is_refused(loop: Any, position: float, effor
         loop.controllers["gripper"].submit(position, effort, GripperGoalHandle())
 
 
+@pytest.mark.parametrize("position", [5.0, -1.0, 1e300, -1e300, 1.002])
+def test_a_goal_beyond_the_limits_is_refused_and_moves_nothing(loop: Any, position: float) -> None:
+    loop.step()
+    with pytest.raises(GripperGoalError, match=r"position of joint 'finger' is .*; its limits are 0 to 1; give a"):
+        send(loop, position)
+    loop.run(0.1)
+    assert handle(loop).command == handle(loop).position == 0.0
+
+
+def test_without_limits_a_goal_beyond_reason_is_refused(make_loop: Callable[..., Any]) -> None:
+    without = {name: value for name, value in parameters().items() if name != "robot_description"}
+    loop = make_loop(without)
+    loop.spawn("gripper")
+    send(loop, 5.0)
+    with pytest.raises(GripperGoalError, match=r"is 1e\+300"):
+        send(loop, 1e300)
+
+
+def test_a_finger_outside_its_range_is_brought_back_by_a_goal(make_loop: Callable[..., Any]) -> None:
+    hardware = {"joints": ["finger"], "initial_positions": {"finger": 1.4}}
+    loop = make_loop({**parameters(), "hw": hardware})
+    loop.spawn("gripper")
+    loop.run(0.5)
+    assert handle(loop).position == 1.4
+    goal_handle = send(loop, 1.2)
+    loop.run(0.5)
+    assert goal_handle.status is GoalStatus.SUCCEEDED
+    with pytest.raises(GripperGoalError, match="its limits are 0 to 1"):
+        send(loop, 1.4)
+
+
 def test_a_stopped_controller_ends_its_goal_and_takes_no_other(loop: Any) -> None:
     goal_handle = send(loop, 0.4)
     loop.step()
@@ -243,7 +286,7 @@ def test_a_gripper_on_its_way_stops_with_its_controller_and_one_that_holds_somet
     assert squeezing.status is GoalStatus.ABORTED and handle(loop).position == 0.5
     assert loop.switch([], ["gripper"]) is None
     loop.manager.update(loop.time_s, 0.01)
-    assert handle(loop).command == 0.5, "the end of the range, as the limits gave it"
+    assert handle(loop).command == 0.8
 
 
 def test_a_canceled_gripper_does_not_push_on_against_what_holds_it_up(loop: Any) -> None:

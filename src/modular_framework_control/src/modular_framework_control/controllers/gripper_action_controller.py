@@ -15,9 +15,12 @@ from typing import Any, ClassVar
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
 from modular_framework_control.hardware_interface.handles import JointHandle, unmeasured
 from modular_framework_control.hardware_interface.interfaces import HardwareInterface, PositionJointInterface
+from modular_framework_control.hardware_interface.joint_limit_parameters import POINT_MARGIN
+from modular_framework_control.hardware_interface.joint_limits import limits_of
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.realtime.mailbox import Mailbox
 from modular_framework_control.realtime.schedule import Schedule
+from modular_framework_control.trajectory.point_checks import LARGEST_VALUE
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 
 
@@ -60,6 +63,8 @@ class GripperActionController(Controller):
     because a contact makes the joint vibrate. The time counts from the start of the goal at the earliest. While the
     measured values are stale the goal is not judged, and this time does not count.
 
+    A goal beyond the limits of the joint, where they are known, is refused, as by the trajectory controller.
+
     While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason. When
     the measured position is not a number the goal is aborted, and the joint is held where it was measured last.
 
@@ -89,6 +94,7 @@ class GripperActionController(Controller):
             where = join_names(controller_nh.namespace, "joint")
             raise ParameterError(f"parameter {where}: got {names!r}; expected the name of one joint")
         self._handle: JointHandle = hw.get_handle(names[0])
+        (self._limits,) = limits_of([self._handle], root_nh)
         self._goal_tolerance = read_number(controller_nh, "goal_tolerance", 0.01)
         self._default_max_effort = abs(read_number(controller_nh, "max_effort", 0.0, None))
         self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
@@ -113,14 +119,23 @@ class GripperActionController(Controller):
             goal_handle: gets the status of the goal.
 
         Raises:
-            GripperGoalError: not a number, or the controller does not run. If it is stopped meanwhile, the goal handle
-                ends as rejected.
+            GripperGoalError: not a number, beyond the limits of the joint, or the controller does not run. If it is
+                stopped meanwhile, the goal handle ends as rejected.
         """
         if not self._running:
             raise GripperGoalError("the controller is not running; start it first")
         if not math.isfinite(position) or not math.isfinite(max_effort):
             raise GripperGoalError(
                 f"got position {position}, max_effort {max_effort}; expected finite numbers (effort 0 = default)"
+            )
+        lowest, highest = self._limits.range_from(self._handle.position)
+        if (
+            position < max(lowest, -LARGEST_VALUE) - POINT_MARGIN
+            or position > min(highest, LARGEST_VALUE) + POINT_MARGIN
+        ):
+            raise GripperGoalError(
+                f"position of joint '{self._handle.name}' is {position:.6g}; its limits are "
+                f"{self._limits.min_position:.6g} to {self._limits.max_position:.6g}; give a position within them"
             )
         self._mailbox.put(_Goal(position, abs(max_effort), goal_handle))
         if not self._running:
