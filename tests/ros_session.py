@@ -18,7 +18,16 @@ import rospkg
 
 from modular_framework_core.launching.launch_session import Launch, LaunchSession, free_port, processes_with
 
-__all__ = ["Launch", "RosSession", "executable", "free_port", "processes_with", "pytest_runtest_makereport", "until"]
+__all__ = [
+    "Launch",
+    "RosSession",
+    "executable",
+    "free_port",
+    "hears",
+    "processes_with",
+    "pytest_runtest_makereport",
+    "until",
+]
 SHOWN_LINES = 150
 
 
@@ -33,6 +42,14 @@ def until(condition: Callable[[], Any], what: str, timeout_s: float = 30.0) -> N
         if time.monotonic() > end:
             raise AssertionError(f"not within {timeout_s:g} s: {what}")
         time.sleep(0.01)
+
+
+def hears(subscriber: Any, node: str) -> bool:
+    """Whether a subscriber of this process receives the next message that a node publishes.
+
+    rospy's get_num_connections() of a subscriber counts connections before they are made.
+    """
+    return any(link.callerid_pub == node for link in subscriber.impl.connections)
 
 
 @functools.cache

@@ -34,7 +34,7 @@ from moveit_msgs.msg import (
     RobotState,
 )
 from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetPositionFK
-from ros_session import until
+from ros_session import hears, until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header, String
@@ -207,18 +207,14 @@ def plan(message: MotionPlanRequest) -> Any:
 
 
 class Reports:
-    """Every planning report of the module's move_group, heard by one subscriber for all tests.
-
-    A subscriber sees its connection before the publisher does: a report that comes at once would pass a new one by.
-    """
+    """Every planning report of the module's move_group, heard by one subscriber for all tests."""
 
     def __init__(self) -> None:
         self.heard: list[dict[str, Any]] = []
         subscriber = rospy.Subscriber(
             "move_group/planning_report", String, lambda message: self.heard.append(json.loads(message.data))
         )
-        until(subscriber.get_num_connections, "the publisher of planning reports")
-        time.sleep(0.5)
+        until(lambda: hears(subscriber, "/move_group"), "the publisher of planning reports")
 
 
 @cache

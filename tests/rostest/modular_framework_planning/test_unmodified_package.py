@@ -83,6 +83,7 @@ def test_a_motion_is_planned_and_executed(arm: MoveGroupCommander) -> None:
     assert worked
     states: list[JointState] = []
     listener = rospy.Subscriber("move_group/fake_controller_joint_states", JointState, states.append)
+    until(lambda: states, "the connection, which brings the latched positions")
     begun = time.monotonic()
     assert arm.execute(trajectory)
     duration_s = trajectory.joint_trajectory.points[-1].time_from_start.to_sec()

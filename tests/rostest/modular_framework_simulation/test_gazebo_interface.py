@@ -7,7 +7,6 @@ variable WRITE_GAZEBO_INTERFACE=1 it writes the page.
 
 from __future__ import annotations
 
-import functools
 import json
 import math
 import os
@@ -26,7 +25,7 @@ from dynamic_reconfigure.msg import Config, ConfigDescription, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure
 from gazebo_msgs import msg, srv
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
-from ros_session import until as wait_until
+from ros_session import hears, until
 from roscpp.srv import GetLoggers, SetLoggerLevel
 from rosgraph_msgs.msg import Clock, Log
 from std_msgs.msg import ColorRGBA
@@ -54,8 +53,6 @@ URDF = """<robot name='ball'><link name='body'><inertial><mass value='0.3'/><ine
 HINGE_INERTIA = 0.01 + 0.5 * 0.4**2
 LAUNCH = """<launch><include file="$(find modular_framework_simulation)/launch/simulation.launch">
   <arg name="world_file" value="{world}"/></include></launch>"""
-
-until = functools.partial(wait_until, timeout_s=15.0)
 
 
 @dataclass(frozen=True)
@@ -182,7 +179,7 @@ def reasons_in_log() -> Iterator[list[str]]:
     """Collects what is logged."""
     reasons: list[str] = []
     listener = rospy.Subscriber("/rosout", Log, lambda item: reasons.append(item.msg))
-    time.sleep(0.3)
+    until(lambda: hears(listener, "/gazebo"), "the connection to the simulation's log")
     try:
         yield reasons
     finally:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import functools
 import signal
 import subprocess
 import sys
@@ -30,8 +29,7 @@ from gazebo_msgs.srv import (
     SpawnModel,
 )
 from geometry_msgs.msg import Point, Pose, Quaternion
-from ros_session import executable
-from ros_session import until as wait_until
+from ros_session import executable, until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -51,8 +49,6 @@ BOMB = (
     + "".join(f"<!ENTITY e{n} '{f'&e{n - 1};' * 30}'>" for n in range(1, 12))
     + "]><sdf version='1.6'>&e11;</sdf>"
 )
-
-until = functools.partial(wait_until, timeout_s=10.0)
 
 
 def call(name: str, kind: Any, *values: Any, **fields: Any) -> Any:
@@ -76,7 +72,7 @@ def test_the_clock_runs_at_a_hundred_hertz_of_simulated_time_and_in_real_time(si
     stamps: list[float] = []
     begin = time.monotonic()
     subscriber = rospy.Subscriber("/clock", Clock, lambda message: stamps.append(message.clock.to_sec()))
-    until(lambda: len(stamps) > 200, "two seconds of clock", timeout_s=15.0)
+    until(lambda: len(stamps) > 200, "two seconds of clock")
     subscriber.unregister()
     assert time.monotonic() - begin < 8.0
     steps = [b - a for a, b in zip(stamps[10:], stamps[11:], strict=False)]
@@ -242,10 +238,13 @@ def test_all_options_of_spawn_model_have_their_effect(simulation: Any, ros_sessi
         assert "-robot_namespace /some counts for sensors only" in text
         assert not call("/gazebo/get_physics_properties", GetPhysicsProperties).pause
         bonded = subprocess.Popen(
-            [*command, "-sdf", "-database", "cube", "-model", "bonded", "-b"], env=ros_session.env
+            [*command, "-sdf", "-database", "cube", "-model", "bonded", "-b"],
+            env=ros_session.env,
+            stdout=subprocess.PIPE,
+            text=True,
         )
-        until(lambda: call("/gazebo/get_model_state", GetModelState, "bonded", "").success, "the bonded model")
-        time.sleep(0.5)
+        assert bonded.stdout and any("'bonded' is deleted when this program ends" in line for line in bonded.stdout)
+        assert call("/gazebo/get_model_state", GetModelState, "bonded", "").success
         bonded.send_signal(signal.SIGINT)
         assert bonded.wait(20) == 0
         assert not call("/gazebo/get_model_state", GetModelState, "bonded", "").success

@@ -113,7 +113,7 @@ class Browser:
         return np.array(self.nodes.get(node, {}).get("position", (math.nan,) * 3))
 
     def follows(self, node: str, position: tuple[float, float, float], tolerance_m: float = 1e-3) -> None:
-        until(lambda: np.allclose(self.position(node), position, atol=tolerance_m), f"{node} is at {position}", 10.0)
+        until(lambda: np.allclose(self.position(node), position, atol=tolerance_m), f"{node} is at {position}")
 
     def uuid(self, label: str) -> str:
         return next(uuid for uuid, control in self.controls.items() if control.get("label") == label)
@@ -192,7 +192,7 @@ def subscribed_topics() -> set[str]:
 
 def published(topic: str, kind: Any) -> Any:
     publisher = rospy.Publisher(topic, kind, queue_size=10, latch=True)
-    until(lambda: publisher.get_num_connections() > 0, f"the viewer subscribes to {topic}", 10.0)
+    until(lambda: publisher.get_num_connections() > 0, f"the viewer subscribes to {topic}")
     return publisher
 
 
@@ -261,10 +261,10 @@ def test_a_read_only_page_shows_the_world_and_refuses_to_act_on_it(launch: Any, 
     until(lambda: "/ in a browser" in watching.log(), "the address in the log")
     browser = Browser(address_in(watching.log()))
     until(lambda: "/robot/upper" in browser.nodes, "the robot is drawn")
-    until(lambda: "Time" in browser.text(), "the time is shown", 10.0)
+    until(lambda: "Time" in browser.text(), "the time is shown")
     browser.set("Pause", True)
     browser.set("Reset poses and time", True)
-    until(lambda: watching.log().count("the viewer is read-only") >= 2, "both are refused", 10.0)
+    until(lambda: watching.log().count("the viewer is read-only") >= 2, "both are refused")
     assert not is_paused()
     browser.close()
     watching.stop()
@@ -276,7 +276,7 @@ def test_the_scene_follows_models_that_come_move_and_go(box: Browser) -> None:
     spawn("second", BOX, (3.0, 0.0, 0.0))
     box.follows("/world/second/link", (3.0, 0.0, 0.0))
     assert call("/gazebo/delete_model", DeleteModel, "second").success
-    until(lambda: "/world/second/link" not in box.nodes and "/world/box/link" in box.nodes, "it is gone", 10.0)
+    until(lambda: "/world/second/link" not in box.nodes and "/world/box/link" in box.nodes, "it is gone")
 
 
 def test_the_robot_follows_joint_states(page: Browser) -> None:
@@ -286,31 +286,31 @@ def test_the_robot_follows_joint_states(page: Browser) -> None:
     def turned() -> bool:
         return np.allclose(np.abs(page.nodes["/robot/upper"].get("wxyz", 0)), (0.5**0.5, 0, 0.5**0.5, 0), atol=1e-3)
 
-    until(turned, "the arm has turned by 90 degrees about y", 10.0)
+    until(turned, "the arm has turned by 90 degrees about y")
     assert page.position("/robot/upper") == pytest.approx((0, 0, 0.2))
 
 
 def test_buttons_pause_step_resume_and_reset(box: Browser) -> None:
     box.set("Pause", True)
-    until(is_paused, "time is paused", 10.0)
-    until(lambda: "paused" in box.text(), "the panel says so", 10.0)
+    until(is_paused, "time is paused")
+    until(lambda: "paused" in box.text(), "the panel says so")
     before_s = now_s()
     move("box", (0.0, 0.0, 4.0))  # is seen also while time stands still
     box.follows("/world/box/link", (0.0, 0.0, 4.0))
     step_s = call("/gazebo/get_physics_properties", GetPhysicsProperties).time_step
     box.set("Step", "1 step")
-    until(lambda: now_s() > before_s, "a step", 10.0)
+    until(lambda: now_s() > before_s, "a step")
     assert now_s() == pytest.approx(before_s + step_s, abs=1e-9)
     box.set("Step", "0.1 s")
-    until(lambda: now_s() > before_s + 0.1, "a tenth of a second", 10.0)
+    until(lambda: now_s() > before_s + 0.1, "a tenth of a second")
     assert now_s() == pytest.approx(before_s + step_s + 0.1, abs=1e-9) and is_paused()
     box.set("Reset poses", True)
     box.follows("/world/box/link", (1.0, 0.0, 0.5))
     assert now_s() > 0.1
     box.set("Reset poses and time", True)
-    until(lambda: now_s() == 0.0, "time is 0", 10.0)
+    until(lambda: now_s() == 0.0, "time is 0")
     box.set("Resume", True)
-    until(lambda: now_s() > 0.2, "time passes again", 10.0)
+    until(lambda: now_s() > 0.2, "time passes again")
 
 
 def test_a_step_needs_a_pause_and_has_bounds(launch: Any) -> None:
@@ -326,7 +326,7 @@ def test_the_speed_is_that_of_the_choice_and_is_shown(box: Browser) -> None:
 
     for choice, expected in (("0.5", 0.5), ("as fast as possible", 0.0), ("1", 1.0)):
         box.set("Speed", choice)
-        until(lambda expected=expected: abs(factor() - expected) < 1e-9, f"speed {choice}", 10.0)  # type: ignore[misc]
+        until(lambda expected=expected: abs(factor() - expected) < 1e-9, f"speed {choice}")  # type: ignore[misc]
     assert "real time factor" in box.text()
 
 
@@ -344,7 +344,7 @@ def test_the_planning_scene_is_subscribed_to_and_drawn_only_while_it_is_shown(bo
     publisher.publish(scene)
     box.follows("/planning scene/wall", (0.0, 2.0, 0.0))
     box.set("Planning scene", False)
-    until(lambda: "/planning scene/wall" not in box.nodes and topic not in subscribed_topics(), "it is hidden", 10.0)
+    until(lambda: "/planning scene/wall" not in box.nodes and topic not in subscribed_topics(), "it is hidden")
 
 
 def test_a_plan_is_drawn_and_replayed_by_a_ghost(box: Browser) -> None:
@@ -355,22 +355,20 @@ def test_a_plan_is_drawn_and_replayed_by_a_ghost(box: Browser) -> None:
         JointTrajectoryPoint(positions=[1.0], time_from_start=rospy.Duration(1)),
     ]
     published("/move_group/display_planned_path", DisplayTrajectory).publish(DisplayTrajectory(trajectory=[part]))
-    until(lambda: "/plan/path" in box.nodes and "/plan/ghost/upper" in box.nodes, "line and ghost", 10.0)
-    until(lambda: "/plan/ghost/upper" not in box.nodes, "the end of the replay", 10.0)
+    until(lambda: "/plan/path" in box.nodes and "/plan/ghost/upper" in box.nodes, "line and ghost")
+    until(lambda: "/plan/ghost/upper" not in box.nodes, "the end of the replay")
     box.set("Position", 1.0)
     expected = (math.cos(0.5), 0, math.sin(0.5), 0)
-    until(
-        lambda: np.allclose(box.nodes.get("/plan/ghost/upper", {}).get("wxyz", 0), expected, atol=1e-3), "its end", 10.0
-    )
+    until(lambda: np.allclose(box.nodes.get("/plan/ghost/upper", {}).get("wxyz", 0), expected, atol=1e-3), "its end")
 
 
 def test_an_image_is_subscribed_to_while_it_is_chosen(box: Browser) -> None:
     publisher = rospy.Publisher("/lab/image", Image, queue_size=1)
     uuid = box.uuid("Image")
-    until(lambda: "/lab/image" in box.controls[uuid]["options"], "the topic is offered", 10.0)
+    until(lambda: "/lab/image" in box.controls[uuid]["options"], "the topic is offered")
     assert publisher.get_num_connections() == 0
     box.set("Image", "/lab/image")
-    until(lambda: publisher.get_num_connections() > 0, "it is subscribed to", 10.0)
+    until(lambda: publisher.get_num_connections() > 0, "it is subscribed to")
     publisher.publish(Image(encoding="nonsense", height=1, width=1, step=1, data=b"1"))
     image = Image(encoding="rgb8", height=2, width=2, step=6, data=bytes(12))
 
@@ -378,9 +376,9 @@ def test_an_image_is_subscribed_to_while_it_is_chosen(box: Browser) -> None:
         publisher.publish(image)
         return any(control.get("visible") and control.get("_format") == "jpeg" for control in box.controls.values())
 
-    until(is_shown, "the image", 10.0)
+    until(is_shown, "the image")
     box.set("Image", "none")
-    until(lambda: publisher.get_num_connections() == 0, "the subscription has ended", 10.0)
+    until(lambda: publisher.get_num_connections() == 0, "the subscription has ended")
 
 
 def test_bad_messages_are_named_and_change_nothing(launch: Any, box: Browser) -> None:
@@ -395,7 +393,7 @@ def test_bad_messages_are_named_and_change_nothing(launch: Any, box: Browser) ->
             publisher.publish(String(next(texts)))  # the simulation publishes too, and the newest message counts
             return fault in launch.log()
 
-        until(is_named, fault, 10.0)
+        until(is_named, fault)
         publisher.unregister()
     joints = published("joint_states", JointState)
     joints.publish(JointState(name=["shoulder", "x"], position=[1.0]))
@@ -403,10 +401,10 @@ def test_bad_messages_are_named_and_change_nothing(launch: Any, box: Browser) ->
     published("/move_group/display_planned_path", DisplayTrajectory).publish(
         DisplayTrajectory(trajectory=[trajectory_without_numbers()])
     )
-    until(lambda: "2 joints have 1 positions" in launch.log(), "the joint state is named", 10.0)
-    until(lambda: "1 joints have 0 positions" in launch.log(), "the plan is named", 10.0)
+    until(lambda: "2 joints have 1 positions" in launch.log(), "the joint state is named")
+    until(lambda: "1 joints have 0 positions" in launch.log(), "the plan is named")
     spawn("after", BALL, (0.0, 0.0, 0.5))
-    until(lambda: "/world/after/link" in box.nodes, "new models are drawn", 10.0)
+    until(lambda: "/world/after/link" in box.nodes, "new models are drawn")
     assert not re.search(r": unexpected \w+: ", launch.log())
 
 
@@ -419,4 +417,4 @@ def trajectory_without_numbers() -> RobotTrajectory:
 
 def test_without_a_page_nothing_is_subscribed_to(page: Browser) -> None:
     page.close()
-    until(lambda: not {name for name in subscribed_topics() if "gazebo" in name or "joint" in name}, "it rests", 10.0)
+    until(lambda: not {name for name in subscribed_topics() if "gazebo" in name or "joint" in name}, "it rests")

@@ -42,8 +42,8 @@ def main() -> int:
         rospy.logerr("spawn_model: %s", error)
         return 1
     if command.bond:
-        rospy.loginfo("spawn_model: '%s' is deleted when this program ends", command.model)
         rospy.core.add_preshutdown_hook(lambda _reason: _delete(command))
+        rospy.loginfo("spawn_model: '%s' is deleted when this program ends", command.model)
         rospy.spin()
     return 0
 
