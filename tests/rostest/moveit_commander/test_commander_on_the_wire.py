@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -448,6 +451,29 @@ def test_a_motion_can_be_stopped_and_not_waited_for(arm: MoveGroupCommander) -> 
 
     until(stands_still, "the arm at rest")  # the controller's ramp to rest takes half a second
     assert places[-1][0] > 0.6
+    assert arm.go("here")
+
+
+STOP = """
+import sys
+import moveit_commander
+moveit_commander.roscpp_initialize(sys.argv)
+moveit_commander.MoveGroupCommander("arm_and_manipulator").stop()
+"""
+
+
+def test_a_script_that_only_stops_is_heard(arm: MoveGroupCommander, session: Any) -> None:
+    arm.set_max_velocity_scaling_factor(0.02)
+    slow = arm.plan([0.5, *NEAR[1:]])[1]
+    arm.set_max_velocity_scaling_factor(1.0)
+    assert slow.joint_trajectory.points[-1].time_from_start.to_sec() > 15.0
+    results: list[bool] = []
+    motion = threading.Thread(target=lambda: results.append(arm.execute(slow)))
+    motion.start()
+    until(lambda: arm.get_current_joint_values()[0] < 1.56, "the motion under way")
+    subprocess.run([sys.executable, "-c", STOP], env=session.env, check=True, timeout=60.0)
+    motion.join(60.0)
+    assert results == [False], "the motion went on to its end"
     assert arm.go("here")
 
 

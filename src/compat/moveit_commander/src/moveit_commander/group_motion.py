@@ -27,7 +27,7 @@ from moveit_commander import conversions
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_connection import EXECUTE_ACTION, MOVE_ACTION, code_text
 from moveit_commander.group_pose_targets import GroupPoseTargets
-from moveit_commander.servers import ACTION_TIMEOUT_S
+from moveit_commander.servers import ACTION_TIMEOUT_S, is_heard
 
 ANSWER_MARGIN_S = 30.0  # beyond the planning time: queueing, smoothing, collision checks
 MOTION_TIMEOUT_S = 600.0
@@ -42,6 +42,7 @@ class GroupMotion(GroupPoseTargets):
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         super().__init__(name, robot_description, ns, wait_for_servers)
         self._events = rospy.Publisher(ns_join(ns, "trajectory_execution_event"), String, queue_size=1)
+        self._events.impl.set_queue_size(None)  # stop() returns when it is sent: a script may end right after it
 
     def plan(self, joints: Any = None) -> tuple[bool, RobotTrajectory, float, MoveItErrorCodes]:
         """Plans to the target.
@@ -108,8 +109,9 @@ class GroupMotion(GroupPoseTargets):
         return self._judge(result.error_code, "execute")
 
     def stop(self) -> None:
-        """Stops the motion that runs, if any."""
-        self._events.publish(String("stop"))
+        """Stops the motion that runs, if any; also right after this commander was made."""
+        if is_heard(self._events):
+            self._events.publish(String("stop"))
 
     def compute_cartesian_path(
         self, waypoints: Sequence[Any], eef_step: float, *options: Any, **named_options: Any

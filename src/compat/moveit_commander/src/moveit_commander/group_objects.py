@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -25,8 +24,8 @@ from rosgraph.names import ns_join
 
 from moveit_commander.exception import MoveItCommanderException, ServerError
 from moveit_commander.group_motion import MOTION_TIMEOUT_S, GroupMotion
+from moveit_commander.servers import is_heard
 
-LISTENER_TIMEOUT_S = 2.0
 PLACE_KINDS = "Pose, PoseStamped, PlaceLocation, list of PoseStamped or list of PlaceLocation"
 
 
@@ -158,16 +157,8 @@ class GroupObjects(GroupMotion):
         return list(answer.grasps)
 
     def _publish(self, messages: Sequence[AttachedCollisionObject]) -> bool:
-        deadline = time.monotonic() + LISTENER_TIMEOUT_S
-        while self._attachments.get_num_connections() == 0 and not rospy.is_shutdown():
-            if time.monotonic() > deadline:
-                rospy.logerr(
-                    "topic %s: nobody has listened for %g s; does move_group run?",
-                    self._attachments.resolved_name,
-                    LISTENER_TIMEOUT_S,
-                )
-                return False
-            time.sleep(0.01)
+        if not is_heard(self._attachments):
+            return False
         for message in messages:
             self._attachments.publish(message)
         return True

@@ -22,7 +22,7 @@ from moveit_commander import allowed_collisions, collision_objects
 from moveit_commander.exception import ServerError
 from moveit_commander.object_region import Region, inside
 from moveit_commander.roscpp_initializer import ensure_node
-from moveit_commander.servers import Servers
+from moveit_commander.servers import Servers, is_heard
 
 acm_set_default = allowed_collisions.set_default
 acm_set_allowed = allowed_collisions.set_allowed
@@ -247,7 +247,9 @@ class PlanningSceneInterface:
     def _submit(self, item: CollisionObject | AttachedCollisionObject) -> None:
         attached = isinstance(item, AttachedCollisionObject)
         if not self._synchronous:
-            (self._pub_aco if attached else self._pub_co).publish(item)
+            publisher = self._pub_aco if attached else self._pub_co
+            if is_heard(publisher):
+                publisher.publish(item)
             return
         scene = PlanningScene(is_diff=True)
         scene.robot_state.is_diff = True

@@ -12,13 +12,25 @@ from actionlib import CommState
 from rosgraph.names import ns_join
 
 from modular_framework_ros.action_client import SteadyActionClient, is_connected
+from modular_framework_ros.calls import wait_until
 from moveit_commander.exception import ServerError
 
 SERVICE_TIMEOUT_S = 5.0
 ACTION_TIMEOUT_S = 5.0
 POLL_PERIOD_S = 0.02
+LISTENER_TIMEOUT_S = 5.0
 SETTLE_S = 0.1  # the server's end of a new connection is ready a little later than ours
 SERVER_LOST_S = 5.0  # an action server that is not advertised for so long has ended
+
+
+def is_heard(publisher: rospy.Publisher) -> bool:
+    """Waits until a publisher has a subscriber: a message sent before that is lost. Without one, logs an error."""
+    if wait_until(lambda: publisher.get_num_connections() > 0, LISTENER_TIMEOUT_S):
+        return True
+    rospy.logerr(
+        "topic %s: nobody has listened for %g s; does move_group run?", publisher.resolved_name, LISTENER_TIMEOUT_S
+    )
+    return False
 
 
 class Servers:
