@@ -95,24 +95,69 @@ check_system() {
 as_root() {
   if [ "$(id -u)" = 0 ]; then
     "$@"
-  elif command -v sudo >/dev/null; then
-    sudo "$@"
   else
-    fail "installing Debian packages needs root, and sudo is missing" "run this script as root once, or install sudo"
+    sudo -n "$@"
   fi
+}
+
+# Asks for the password of sudo before a progress line can hide the prompt. Without root rights, ends with the command
+# that an administrator has to run.
+get_root_rights() {  # purpose, command for an administrator
+  local reason="" remedy="ask an administrator to run, as root:
+
+    $2
+
+  then run this script again; it goes on from there"
+  if [ "$(id -u)" = 0 ]; then
+    return
+  elif ! command -v sudo >/dev/null; then
+    reason="sudo is missing"
+  elif sudo -n true 2>/dev/null; then
+    return
+  elif ! { : </dev/tty; } 2>/dev/null; then
+    reason="sudo asks for a password, and there is no terminal to ask on"
+  else
+    say "$1 needs root rights. sudo asks for your password now, and not again."
+    if ! sudo -v; then
+      reason="sudo refused you"
+    elif ! sudo -n true 2>/dev/null; then
+      reason="sudo asks for a password each time"
+    fi
+  fi
+  [ -z "$reason" ] || fail "$1 needs root rights, and $reason" "$remedy"
+}
+
+# An earlier run as root leaves files behind that this user may not write to.
+check_owner() {
+  local path
+  if [ -e "$ROOT/logs" ] && [ ! -w "$ROOT/logs" ]; then
+    path="logs_of_$(stat -c %U "$ROOT/logs")_$(date +%s)"
+    mv "$ROOT/logs" "$ROOT/$path" || fail "you may not write to $ROOT/logs" "sudo chown -R $(id -un) $ROOT"
+    say "You may not write to the folder logs. It is now $path, and new output goes into a new folder logs."
+  fi
+  for path in "$ROOT" "$VENV" "$ROOT/build" "$ROOT/devel"; do
+    [ ! -e "$path" ] || [ -w "$path" ] ||
+      fail "$path belongs to $(stat -c %U "$path"), and you may not write to it" "sudo chown -R $(id -un) $ROOT"
+  done
 }
 
 # A bare root (a chroot, say) may lack what every running system has and the build, roslaunch and shells need.
 mount_what_a_bare_root_lacks() {
   if [ ! -e /proc/self/stat ]; then
+    get_root_rights "Mounting /proc" "mount -t proc proc /proc"
     as_root mount -t proc proc /proc || fail "/proc is not mounted" "mount -t proc proc /proc"
   fi
   if [ ! -e /dev/pts/ptmx ]; then
+    get_root_rights "Mounting /dev/pts" "mkdir -p /dev/pts && mount -t devpts devpts /dev/pts"
     as_root mkdir -p /dev/pts
     as_root mount -t devpts devpts /dev/pts || fail "there are no pseudo-terminals" "mount -t devpts devpts /dev/pts"
   fi
-  [ -e /dev/fd ] || as_root ln -s /proc/self/fd /dev/fd
+  if [ ! -e /dev/fd ]; then
+    get_root_rights "Making /dev/fd" "ln -s /proc/self/fd /dev/fd"
+    as_root ln -s /proc/self/fd /dev/fd
+  fi
   if ! getent hosts localhost >/dev/null; then
+    get_root_rights "Naming localhost in /etc/hosts" "echo 127.0.0.1 localhost >>/etc/hosts"
     printf '127.0.0.1\tlocalhost\n' | as_root tee -a /etc/hosts >/dev/null
   fi
 }
@@ -132,6 +177,8 @@ install_debian_packages() {
     say "[1/3] Debian packages: all installed"
     return
   fi
+  get_root_rights "Installing ${#missing[@]} Debian packages" \
+    "apt-get update && apt-get install -y --no-install-recommends ${missing[*]}"
   step "[1/3] Debian packages: updating the package lists" "check the network and /etc/apt/sources.list" \
     as_root env DEBIAN_FRONTEND=noninteractive apt-get update
   step "[1/3] Debian packages: installing ${#missing[@]} (some minutes on a bare system)" \
@@ -255,6 +302,7 @@ find_underlay() {
 set_up_packages() {
   check_path
   check_system
+  check_owner
   mkdir -p "$ROOT/logs"
   : >"$LOG"
   mount_what_a_bare_root_lacks

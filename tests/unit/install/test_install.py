@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The checks of the set-up script before it changes anything."""
+
 from __future__ import annotations
 
 import contextlib

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a user's scripts and RViz expect to find in the workspace."""
+
 from __future__ import annotations
 
 import subprocess
@@ -41,6 +42,7 @@ def test_a_package_that_launch_files_and_rviz_look_for_is_there(package: str) ->
 
 
 def test_rospack_lists_the_media_folders_rviz_asks_for() -> None:
-    answer = subprocess.run(["rospack", "plugins", "--attrib=ogre_media_path", "media_export"], capture_output=True,
-                            text=True, check=False)
+    answer = subprocess.run(
+        ["rospack", "plugins", "--attrib=ogre_media_path", "media_export"], capture_output=True, text=True, check=False
+    )
     assert (answer.returncode, answer.stderr) == (0, "")
