@@ -11,6 +11,7 @@ OPTIONS="container_name nvidia image workspace device usb real_time headless rei
 KEPT_OPTIONS="nvidia image workspace device usb real_time headless" # of a container as long as it lives
 GRAPHICS_DEVICE=${GRAPHICS_DEVICE:-/dev/dri}
 LATENCY_DEVICE=${LATENCY_DEVICE:-/dev/cpu_dma_latency}
+NVIDIA_DRIVER=${NVIDIA_DRIVER:-/proc/driver/nvidia/version}
 USB_FOLDER=${USB_FOLDER:-/dev/bus/usb}
 USER_ID=${SUDO_UID:-$(id -u)} # whom the files in a workspace belong to
 [ "$USER_ID" != 0 ] || USER_ID=1000
@@ -82,10 +83,16 @@ read_arguments() {
   done
 }
 
+launch_argument_names() { sed -n 's/^  <arg name="\([a-z_]*\)".*/\1/p' "$ROOT/$LAUNCH_FILE"; }
+
 read_option() {  # name, value
   case " $OPTIONS " in
     *" $1 "*) ;;
-    *) fail "unknown option '$1'; allowed: ${OPTIONS// /, }" "did you mean '$(tr ' ' '\n' <<<"$OPTIONS" | nearest "$1")'?" ;;
+    *)
+      ! launch_argument_names | grep -qxF "$1" ||
+        fail "'$1' is an argument of start_framework.launch, and these are given with ':='" "give $1:=$2"
+      fail "unknown option '$1'; allowed: ${OPTIONS// /, }" "did you mean '$(tr ' ' '\n' <<<"$OPTIONS" | nearest "$1")'?"
+      ;;
   esac
   if [ "$1" = device ]; then
     check_device "$2"
@@ -120,13 +127,17 @@ check_choice() {  # option, its value, allowed values...
 }
 
 check_values() {
+  local name
+  for name in container_name nvidia; do
+    is_given "$name" || fail "$name= is missing" \
+      "give both that are always needed, such as: docker/deploy.sh container_name=mbf nvidia=false ('--help' lists all options)"
+  done
   [[ $container_name =~ ^[a-zA-Z0-9][a-zA-Z0-9_.-]*$ ]] ||
     fail "container_name is '$container_name'; allowed: letters, digits, '_', '.' and '-'" "e.g. container_name=mbf"
   case $nvidia in
     true | false) ;;
     *) fail "nvidia is '$nvidia'; allowed: true, false" "give nvidia=false unless the Nvidia drivers are in use" ;;
   esac
-  local name
   for name in usb real_time reinstall; do check_choice "$name" "${!name}" true false; done
   check_choice install_engine "$install_engine" ask yes no
   if is_given headless; then check_choice headless "$headless" true false; fi
@@ -153,7 +164,7 @@ check_workspace() {
 # Of this checkout's launch file; an image from elsewhere checks its own.
 check_launch_arguments() {
   local argument name names
-  names=$(sed -n 's/^  <arg name="\([a-z_]*\)".*/\1/p' "$ROOT/$LAUNCH_FILE")
+  names=$(launch_argument_names)
   for argument in ${launch_arguments[@]+"${launch_arguments[@]}"}; do
     name=${argument%%:=*}
     grep -qxF "$name" <<<"$names" ||
@@ -196,6 +207,16 @@ check_engine() {  # arguments of this script...
   docker info >/dev/null 2>&1 || fail "the Docker engine does not answer" \
     "start it (sudo systemctl start docker; where there is only its client: sudo apt-get install docker.io), or add this \
 user to the group docker (sudo usermod -aG docker $(id -un)) and log in again"
+}
+
+# Docker itself says only "could not select device driver" if the toolkit is missing.
+check_nvidia() {
+  [ "$nvidia" = true ] || return 0
+  [ -e "$NVIDIA_DRIVER" ] || fail "nvidia is true, but no Nvidia driver is loaded on this computer (no $NVIDIA_DRIVER)" \
+    "install the driver of the graphics card, or give nvidia=false"
+  command -v nvidia-container-runtime-hook >/dev/null || command -v nvidia-ctk >/dev/null ||
+    fail "nvidia is true, but the Nvidia container toolkit is missing" "install the package nvidia-container-toolkit as its \
+manual says, run 'sudo nvidia-ctk runtime configure --runtime=docker && sudo systemctl restart docker', or give nvidia=false"
 }
 
 # ---- image
@@ -338,6 +359,7 @@ set_launch_arguments() {
 main() {
   read_arguments "$@"
   check_values
+  check_nvidia
   check_engine "$@"
   if [ "$reinstall" = false ] && container_exists; then
     check_same_options

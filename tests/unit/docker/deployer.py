@@ -37,7 +37,14 @@ class Deployer:
     def environment(self) -> dict[str, str]:
         env = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "XAUTHORITY")}
         own = {"PATH": f"{self.folder}/bin:{self.path}", "STAND_IN": str(self.folder), "HOME": str(self.folder)}
-        return {**env, **own, "GRAPHICS_DEVICE": "/no/graphics", "XDG_CACHE_HOME": f"{self.folder}/cache", **self.env}
+        return {
+            **env,
+            **own,
+            "GRAPHICS_DEVICE": "/no/graphics",
+            "NVIDIA_DRIVER": "/dev/null",
+            "XDG_CACHE_HOME": f"{self.folder}/cache",
+            **self.env,
+        }
 
     def deploy(self, *arguments: str) -> str:
         """Runs it with the two arguments that are always needed; it must succeed. Returns what it printed."""

@@ -40,6 +40,23 @@ def test_hands_over_the_gpu_only_when_asked(docker: Deployer) -> None:
     assert "--gpus all" in docker.calls("create")[0]
 
 
+@pytest.mark.parametrize(
+    ("driver", "missing"), [("/no/driver", "no Nvidia driver is loaded"), ("/dev/null", "container toolkit is missing")]
+)
+def test_a_gpu_that_docker_cannot_hand_over_is_refused_before_the_build(
+    docker: Deployer, driver: str, missing: str
+) -> None:
+    docker.env = {"NVIDIA_DRIVER": driver}
+    (docker.folder / "bin" / "nvidia-ctk").unlink()
+    answer = docker.run("container_name=mbf", "nvidia=true")
+    assert answer.returncode == 1 and missing in answer.stderr and "give nvidia=false" in answer.stderr
+    assert not docker.calls("build") and not docker.calls("create")
+
+
+def test_an_argument_of_the_launch_file_with_one_sign_is_named_as_such(docker: Deployer) -> None:
+    assert "give gui:=true" in docker.refusal("gui=true")
+
+
 def test_hands_over_the_screen_and_a_copy_of_its_key(docker: Deployer, tmp_path: Path) -> None:
     key = tmp_path / "key"
     key.write_text("first login")
@@ -212,8 +229,9 @@ REFUSED = {
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        ((), "container_name is ''"),
-        (("container_name=mbf",), "nvidia is ''"),
+        ((), "container_name= is missing"),
+        (("container_name=mbf",), "nvidia= is missing"),
+        (("container_name=", "nvidia=true"), "container_name is ''"),
         (("container_name=mbf", "nvidia=yes"), "nvidia is 'yes'; allowed: true, false"),
         (("container_name=a b", "nvidia=true"), "container_name is 'a b'"),
         *((("container_name=mbf", "nvidia=true", argument), named) for argument, named in REFUSED.items()),
