@@ -58,5 +58,5 @@ def test_a_palm_may_have_no_shape(palm: str) -> None:
 
 
 def test_a_finger_without_a_shape_is_named() -> None:
-    with pytest.raises(GripperGeometryError, match=r"last finger links \['left', 'right'\]"):
+    with pytest.raises(GripperGeometryError, match=r"finger links \['left', 'right'\]"):
         measure_gripper(slides("", ""), "tip", "f")

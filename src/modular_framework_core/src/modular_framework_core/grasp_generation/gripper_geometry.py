@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Computes from the robot description how wide a two-finger gripper opens, and where its parts are then."""
+"""Computes the opening of a two-finger gripper, and where its parts are, from the robot description.
+
+The pads are found by their motion, not by their names or their place in the tree of links: of all pairs of moving parts
+that face each other, those whose gap changes most over the stroke, and of these the pair nearest to the middle. A
+four-bar finger has parts nearer to the middle (the inner knuckle of a Robotiq 2F-85), but their gap hardly changes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +28,7 @@ from modular_framework_urdf.xml_text import XmlError
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 200
+FULL_STROKE = 0.9  # fraction of the longest stroke from which on a pair of parts can be the pads
 
 
 class GripperGeometryError(ValueError):
@@ -155,60 +161,89 @@ def measure_gripper(urdf: str, grasp_link: str, joint: str) -> GripperGeometry:
             f"'{grasp_link}'; name the gripper's actuated joint and the grasp frame"
         )
     positions = np.linspace(limit.lower, limit.upper, SAMPLES)
+    moving = model.moving_links(joint)
     parts = list(_parts(model, grasp_link, joint, positions))
-    fingers = model.finger_links(joint)
-    axes = _hand_axes(parts, fingers, set(model.moving_links(joint)), model.origin_of_fingers(grasp_link, joint))
+    axes = _hand_axes(parts, moving, model.origin_of_fingers(grasp_link, joint))
     parts = [part.turned(axes) for part in parts]
-    measured = [_measure(parts, fingers, grasp_link, sample) for sample in range(SAMPLES)]
-    openings = np.array([each.opening for each in measured])
-    middle = measured[int(np.argmin(np.abs(openings - openings.max() / 2)))]
-    marked = tuple(
-        HandPart(part.link, part.corners, part.planes, any(part is pad for pad in middle.pads)) for part in parts
-    )
+    fingers = [part for part in parts if part.link in moving]
+    right, left = _pads(fingers)
+    openings = np.maximum(right.corners[:, :, 0].min(axis=1) - left.corners[:, :, 0].max(axis=1), 0.0)
+    low, high = right.corners.min(axis=1), right.corners.max(axis=1)
+    half = (high - low)[int(np.argmin(np.abs(openings - openings.max() / 2)))] / 2
     return GripperGeometry(
-        joint,
-        axes,
-        positions,
-        openings,
-        np.array([each.pad_centre for each in measured]),
-        np.array([each.tip for each in measured]),
-        middle.pad_half_width,
-        middle.pad_half_height,
-        marked,
+        joint=joint,
+        axes=axes,
+        positions=positions,
+        openings=openings,
+        pad_centres=(low[:, 2] + high[:, 2]) / 2,
+        tips=np.max([part.corners[:, :, 2].max(axis=1) for part in fingers], axis=0),
+        pad_half_width=float(half[1]),
+        pad_half_height=float(half[2]),
+        parts=tuple(replace(part, is_pad=part is right or part is left) for part in parts),
     )
 
 
-def _hand_axes(parts: list[HandPart], fingers: list[str], moving: set[str], origin: Array) -> Array:
-    """Finds the hand's axes (3, 3) in the grasp frame, with the fingers where they are farthest from each other.
+def _hand_axes(parts: list[HandPart], moving: list[str], origin: Array) -> Array:
+    """Returns the hand's axes (3, 3) in the grasp frame, from the two moving parts that approach each other most.
 
     The palm is where its collision shapes are, or else at the origin (3,) of the link that the fingers hang on.
     """
-    centres = {
-        link: np.concatenate([part.corners for part in parts if part.link == link], axis=1).mean(axis=1)
-        for link in {part.link for part in parts}
-    }  # link -> (samples, 3)
-    ends = np.array([centres[link] for link in fingers if link in centres])
+    centres = np.array([part.corners.mean(axis=1) for part in parts if part.link in moving])  # (parts, samples, 3)
     palm = [part.corners for part in parts if part.link not in moving]
-    if len(ends) < 2:
+    if len(centres) < 2:
         raise GripperGeometryError(
-            f"fewer than two of the last finger links {fingers} have collision shapes; give each a collision element"
+            f"fewer than two of the finger links {moving} have collision shapes; give each a collision element"
         )
-    spread = np.linalg.norm(ends[:, None] - ends[None, :], axis=3).max(axis=(0, 1))
-    sample = int(np.argmax(spread))
+    distances = np.linalg.norm(centres[:, None] - centres[None, :], axis=3)
+    first, second = np.unravel_index(np.argmax(np.ptp(distances, axis=2)), distances.shape[:2])
+    sample = int(np.argmax(distances[first, second]))
     try:
         centre = np.concatenate([each[sample] for each in palm]).mean(axis=0) if palm else origin
-        return hand_axes(ends[:, sample], centre)
+        return hand_axes(centres[[first, second], sample], centre)
     except ValueError as error:
         raise GripperGeometryError(f"the hand has no closing direction: {error}") from error
 
 
+def _pads(fingers: list[HandPart]) -> tuple[HandPart, HandPart]:
+    """Returns the pads on the positive and on the negative side of the closing direction, x."""
+    spread = max(range(SAMPLES), key=lambda sample: np.ptp([part.corners[sample, :, 0].mean() for part in fingers]))
+    right = [part for part in fingers if part.corners[spread, :, 0].mean() > 0]
+    left = [part for part in fingers if part.corners[spread, :, 0].mean() <= 0]
+    gaps = {
+        (one, other): fingers_gap
+        for one, part in enumerate(right)
+        for other, partner in enumerate(left)
+        if _face_each_other(part.corners[spread], partner.corners[spread])
+        for fingers_gap in (part.corners[:, :, 0].min(axis=1) - partner.corners[:, :, 0].max(axis=1),)
+    }
+    if not gaps:
+        raise GripperGeometryError(
+            f"no two of the finger links {sorted({part.link for part in fingers})} face each other across the closing "
+            "direction; give each finger a collision element"
+        )
+    longest = max(np.ptp(gap) for gap in gaps.values())
+    chosen = min(
+        (pair for pair, gap in gaps.items() if np.ptp(gap) >= FULL_STROKE * longest),
+        key=lambda pair: float(np.mean(gaps[pair])),
+    )
+    return right[chosen[0]], left[chosen[1]]
+
+
+def _face_each_other(corners: Array, others: Array) -> bool:
+    """Checks that two parts (k, 3) overlap when they are seen along the closing direction."""
+    low = np.maximum(corners.min(axis=0), others.min(axis=0))
+    high = np.minimum(corners.max(axis=0), others.max(axis=0))
+    return bool((low[1:] < high[1:]).all())
+
+
 def _parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iterator[HandPart]:
     """Places the collision shapes of the hand in the grasp frame, at every joint position."""
+    driven = model.driven_joints(joint)
     for link in model.hand_links(joint):
         transforms = np.array(
             [
-                np.linalg.inv(model.pose(grasp_link, {joint: position})) @ model.pose(link, {joint: position})
-                for position in positions.tolist()
+                np.linalg.inv(model.pose(grasp_link, state)) @ model.pose(link, state)
+                for state in (dict.fromkeys(driven, position) for position in positions.tolist())
             ]
         )
         for body in model.bodies_of(link):
@@ -216,42 +251,6 @@ def _parts(model: _Model, grasp_link: str, joint: str, positions: Array) -> Iter
             normals = np.einsum("nij,kj->nki", transforms[:, :3, :3], body.planes[:, :3])
             offsets = body.planes[:, 3] - np.einsum("nki,ni->nk", normals, transforms[:, :3, 3])
             yield HandPart(link, corners, np.concatenate([normals, offsets[:, :, None]], axis=2))
-
-
-@dataclass(frozen=True, slots=True)
-class _Measure:
-    """The fingers at one joint position: see GripperGeometry."""
-
-    opening: float
-    pad_centre: float
-    tip: float
-    pad_half_width: float
-    pad_half_height: float
-    pads: tuple[HandPart, HandPart]
-
-
-def _measure(parts: list[HandPart], fingers: list[str], grasp_link: str, sample: int) -> _Measure:
-    tips = [part for part in parts if part.link in fingers]
-    right = [part for part in tips if part.corners[sample, :, 0].mean() > 0]
-    left = [part for part in tips if part.corners[sample, :, 0].mean() <= 0]
-    if not right or not left:
-        raise GripperGeometryError(
-            f"the last finger links {fingers} have no collision shapes on both sides of "
-            f"'{grasp_link}'; give each a collision element"
-        )
-    right_pad = min(right, key=lambda part: float(part.corners[sample, :, 0].min()))
-    left_pad = max(left, key=lambda part: float(part.corners[sample, :, 0].max()))
-    pad = right_pad.corners[sample]
-    opening = max(0.0, float(pad[:, 0].min() - left_pad.corners[sample, :, 0].max()))
-    low, high = pad.min(axis=0), pad.max(axis=0)
-    return _Measure(
-        opening,
-        float(low[2] + high[2]) / 2,
-        max(float(part.corners[sample, :, 2].max()) for part in tips),
-        float(high[1] - low[1]) / 2,
-        float(high[2] - low[2]) / 2,
-        (right_pad, left_pad),
-    )
 
 
 class _Model:
@@ -267,24 +266,30 @@ class _Model:
         self.parent_joint = {joint.child: name for name, joint in self.joints.items()}
         self._origins = {name: joint.origin.matrix() for name, joint in self.joints.items()}
 
+    def driven_joints(self, joint: str) -> set[str]:
+        """Returns a joint and its mirror image: two jaws that one motor drives often have no mimic tag (Fetch)."""
+        return {joint} | {name for name in self.joints if self._is_mirrored(self.joints[joint], self.joints[name])}
+
+    def _is_mirrored(self, joint: Joint, other: Joint) -> bool:
+        axes = [self._origins[each.name][:3, :3] @ np.array(each.axis) for each in (joint, other)]
+        return (
+            (joint.parent, joint.kind, joint.limit) == (other.parent, other.kind, other.limit)
+            and joint.mimic is other.mimic is None
+            and bool(np.allclose(axes[0], -axes[1], atol=1e-6))
+        )
+
     def moving_links(self, joint: str) -> list[str]:
-        """Links that move with a joint or with a joint that mimics it."""
-        moving: list[str] = []
+        """Links that move with a joint, with its mirror image, or with a joint that mimics one of these."""
+        driven, moving = self.driven_joints(joint), []
         for link in self.links:
             name = self.parent_joint.get(link)
             while name is not None:
                 mimic = self.joints[name].mimic
-                if name == joint or (mimic is not None and mimic.leader == joint):
+                if name in driven or (mimic is not None and mimic.leader in driven):
                     moving.append(link)
                     break
                 name = self.parent_joint.get(self.joints[name].parent)
         return moving
-
-    def finger_links(self, joint: str) -> list[str]:
-        """Moving links that carry no other moving link."""
-        moving = self.moving_links(joint)
-        parents = {self.joints[self.parent_joint[link]].parent for link in moving}
-        return [link for link in moving if link not in parents]
 
     def hand_links(self, joint: str) -> list[str]:
         """Moving links, the link they hang on, and every link that is fixed to that."""

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pads of a gripper are the parts that bound the gap over the whole stroke, whatever the fingers are made of.
+
+The hands are made of boxes. Their true openings are Coal's distances between the pads, placed by Pinocchio.
+"""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio
+import pytest
+
+from modular_framework_core.grasp_generation.gripper_geometry import (
+    GripperGeometry,
+    GripperGeometryError,
+    measure_gripper,
+)
+
+TOLERANCE_M = 1.0e-3
+
+
+def link(name: str, *box: float, z: float = 0.0) -> str:
+    size = " ".join(map(str, box))
+    shape = f'<collision><origin xyz="0 0 {z}"/><geometry><box size="{size}"/></geometry></collision>' if box else ""
+    return f'<link name="{name}">{shape}</link>'
+
+
+def joint(name: str, kind: str, parent: str, child: str, xyz: str, axis: str = "1 0 0", rest: str = "") -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}"/><axis xyz="{axis}"/>{rest}</joint>'
+    )
+
+
+def limit(upper: float) -> str:
+    return f'<limit lower="0" upper="{upper}" effort="10" velocity="1"/>'
+
+
+def mimic(of: str, multiplier: float, upper: float = 0.8) -> str:
+    tag = f'<mimic joint="{of}" multiplier="{multiplier}"/>'
+    return f'<limit lower="{-upper}" upper="{upper}" effort="10" velocity="1"/>{tag}'
+
+
+def four_bar_hand() -> str:
+    """A hand with the joints of a Robotiq 2F-85: knuckles that turn, and fingers that stay upright."""
+    parts = [link("palm", 0.08, 0.08, 0.09, z=0.045)]
+    for side, name in ((1, "left"), (-1, "right")):
+        drive = limit(0.8) if side > 0 else mimic("drive", 1.0)
+        lead = "drive" if side > 0 else "right_drive"
+        parts += [
+            link(f"{name}_knuckle", 0.02, 0.01, 0.01),
+            joint(lead, "revolute", "palm", f"{name}_knuckle", f"0 {side * 0.0306} 0.0549", f"{side} 0 0", drive),
+            link(f"{name}_finger", 0.02, 0.01, 0.04, z=0.02),
+            joint(f"{name}_f", "fixed", f"{name}_knuckle", f"{name}_finger", f"0 {side * 0.0315} -0.0041"),
+            link(f"{name}_inner_finger", 0.02, 0.01, 0.04, z=0.02),
+            joint(f"{name}_i", "revolute", f"{name}_finger", f"{name}_inner_finger", f"0 {side * 0.0061} 0.0471",
+                  f"{side} 0 0", mimic("drive", -1.0)),
+            link(f"{name}_pad", 0.022, 0.00635, 0.0375),
+            joint(f"{name}_p", "fixed", f"{name}_inner_finger", f"{name}_pad", f"0 {side * -0.0220} 0.0324"),
+            link(f"{name}_inner_knuckle", 0.02, 0.01, 0.04, z=0.02),
+            joint(f"{name}_k", "revolute", "palm", f"{name}_inner_knuckle", f"0 {side * 0.0127} 0.0614",
+                  f"{side} 0 0", mimic("drive", 1.0)),
+        ]  # fmt: skip
+    return f'<robot name="four_bar">{"".join(parts)}</robot>'
+
+
+def jaws(second: str, axis: str = "0 -1 0") -> str:
+    """A hand of two jaws on a rail; the second joint has a mimic tag, limits of its own, or the limits of the first."""
+    return f"""<robot name="jaws">{link("palm", 0.06, 0.14, 0.04)}
+{link("left_pad", 0.02, 0.012, 0.05, z=0.05)}{link("right_pad", 0.02, 0.012, 0.05, z=0.05)}
+{joint("drive", "prismatic", "palm", "left_pad", "0 0.006 0", "0 1 0", limit(0.05))}
+{joint("other", "prismatic", "palm", "right_pad", "0 -0.006 0", axis, second)}</robot>"""
+
+
+def turning_hand() -> str:
+    """A hand of two turning fingers with tips that stay upright, one of which carries a frame without a shape (PR2)."""
+    parts = [link("palm", 0.06, 0.1, 0.05)]
+    for side, name in ((1, "left"), (-1, "right")):
+        drive = limit(0.5) if side > 0 else mimic("drive", -1.0)
+        parts += [
+            link(f"{name}_finger", 0.02, 0.012, 0.09, z=0.045),
+            joint("drive" if side > 0 else "other", "revolute", "palm", f"{name}_finger", f"0 {side * 0.012} 0.03",
+                  "-1 0 0", drive),
+            link(f"{name}_pad", 0.02, 0.012, 0.04, z=0.02),
+            joint(f"{name}_tip", "revolute", f"{name}_finger", f"{name}_pad", f"0 {side * -0.006} 0.09", "1 0 0",
+                  mimic("drive", side)),
+        ]  # fmt: skip
+    parts += [link("tip_frame"), joint("tip", "fixed", "left_pad", "tip_frame", "0 0 0.04")]
+    return f'<robot name="turning">{"".join(parts)}</robot>'
+
+
+def true_openings(urdf: str, gripper: GripperGeometry) -> np.ndarray:
+    """Distances between the pads by Pinocchio and Coal, at the sampled positions."""
+    model = pinocchio.buildModelFromXML(urdf, mimic=True)
+    shapes = pinocchio.buildGeomFromUrdfString(model, urdf, pinocchio.GeometryType.COLLISION)
+    data, placed = model.createData(), shapes.createData()
+    numbers = [
+        next(index for index, shape in enumerate(shapes.geometryObjects) if shape.name.startswith(name))
+        for name in ("left_pad", "right_pad")
+    ]
+    distances = []
+    for position in gripper.positions:
+        values = np.full(model.nq, position)  # jaws without a mimic tag move together
+        pinocchio.updateGeometryPlacements(model, data, shapes, placed, values)
+        ends = []
+        for number in numbers:
+            pose = placed.oMg[number]
+            ends += [shapes.geometryObjects[number].geometry, coal.Transform3s(pose.rotation, pose.translation)]
+        distances.append(coal.distance(*ends, coal.DistanceRequest(), coal.DistanceResult()))
+    return np.maximum(np.array(distances), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("urdf", "opening"),
+    [
+        (four_bar_hand(), 0.0859),
+        (jaws(mimic("drive", 1.0)), 0.1),
+        (jaws(limit(0.05)), 0.1),
+        (turning_hand(), None),
+    ],
+    ids=["four-bar fingers", "jaws with a mimic tag", "jaws without one", "turning fingers"],
+)
+def test_the_opening_is_the_distance_of_the_pads_over_the_whole_stroke(urdf: str, opening: float | None) -> None:
+    gripper = measure_gripper(urdf, "palm", "drive")
+    assert {part.link for part in gripper.parts if part.is_pad} == {"left_pad", "right_pad"}
+    assert gripper.openings == pytest.approx(true_openings(urdf, gripper), abs=TOLERANCE_M)
+    assert opening is None or gripper.max_opening == pytest.approx(opening, abs=TOLERANCE_M)
+    assert abs(gripper.axes[:, 0]) == pytest.approx([0.0, 1.0, 0.0]) and gripper.axes[:, 2] == pytest.approx([0, 0, 1])
+
+
+def test_the_fingertips_of_a_four_bar_hand_are_in_front_of_the_pads() -> None:
+    gripper = measure_gripper(four_bar_hand(), "palm", "drive")
+    assert (gripper.tips >= gripper.pad_centres + gripper.pad_half_height - TOLERANCE_M).all()
+    assert gripper.pad_half_width == pytest.approx(0.011) and gripper.pad_half_height == pytest.approx(
+        0.01875, abs=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("second", "axis"), [(limit(0.04), "0 -1 0"), (limit(0.05), "0 1 0")], ids=["other limits", "the same direction"]
+)
+def test_a_joint_that_is_no_mirror_image_does_not_move_with_the_gripper(second: str, axis: str) -> None:
+    with pytest.raises(GripperGeometryError, match=r"fewer than two of the finger links \['left_pad'\]"):
+        measure_gripper(jaws(second, axis), "palm", "drive")
