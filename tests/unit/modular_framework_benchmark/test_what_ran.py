@@ -13,7 +13,7 @@ import pytest
 from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make_record
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
-from modular_framework_benchmark.episodes.snapshot import machine_load
+from modular_framework_benchmark.episodes.snapshot import MachineLoad
 from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStatus
 
 
@@ -34,7 +34,7 @@ def stack(tmp_path: Path, *plans: dict[str, Any]) -> dict[str, Any]:
 
 
 def record_of(tmp_path: Path, ran: dict[str, Any]) -> Any:
-    end = EpisodeEnd(EpisodeSpec(0, {}, 0, 1, {}), tmp_path, time.time(), time.monotonic(), machine_load())
+    end = EpisodeEnd(EpisodeSpec(0, {}, 0, 1, {}), tmp_path, time.time(), time.monotonic(), MachineLoad.now())
     return make_record(end.ended(EpisodeStatus.SUCCEEDED, "", {"ran": ran, "task_s": 1.0}))
 
 

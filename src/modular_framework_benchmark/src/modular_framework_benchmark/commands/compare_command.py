@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from modular_framework_benchmark.reports.regression import Change, compare_exper
 from modular_framework_benchmark.reports.regression_page import regression_page, regression_text
 from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import open_source
+from modular_framework_benchmark.reports.run_record import differences_of
 
 REGRESSED = 1
 
@@ -46,7 +48,8 @@ def _compare(given: argparse.Namespace) -> int:
         open_source(given.before, given.experiment) as before,
         open_source(given.after or given.before, given.other or given.experiment) as after,
     ):
-        regression = compare_experiments(before.results, after.results)
+        differing = differences_of(before.snapshots, after.snapshots)
+        regression = dataclasses.replace(compare_experiments(before.results, after.results), differing=differing)
         print(regression_text(regression), end="")
         if given.into is not None:
             write_file(given.into, regression_page(regression, before.database.label, after.database.label).encode())

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
-from modular_framework_benchmark.episodes.snapshot import machine, machine_load, versions
+from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
 from modular_framework_benchmark.metrics.recording_files import (
     objects_of,
@@ -40,7 +40,7 @@ class EpisodeEnd:
         folder: Folder with its files.
         begun: When it started [s since 1970].
         begun_monotonic: The same by the machine's monotonic clock [s].
-        load: Load of the machine at its start, see `machine_load`.
+        load: Load of the machine at its start.
         status: How it ended.
         cause: Why it did not succeed.
         answer: What the recorder answered.
@@ -52,7 +52,7 @@ class EpisodeEnd:
     folder: Path
     begun: float
     begun_monotonic: float
-    load: Mapping[str, float]
+    load: MachineLoad
     status: EpisodeStatus = EpisodeStatus.BROKEN
     cause: str = ""
     answer: Mapping[str, Any] = field(default_factory=dict)
@@ -134,14 +134,11 @@ def _hand(folder: Path, joints: JointSamples | None) -> ObjectTrack | None:
 
 
 def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
-    after = machine_load()
     return {
         **versions(),
         "machine": machine(),
-        "load_before": end.load["load_1_min"],
-        "load_after": after["load_1_min"],
-        "stolen_s": round(after["stolen_s"] - end.load["stolen_s"], 2),
-        "busy_s": round(after["busy_s"] - end.load["busy_s"], 2),
+        "reference_s": reference_s(),
+        **MachineLoad.now().since(end.load),
         "seed": end.spec.seed,
         "settings": dict(end.spec.settings),
         "parameters": end.answer.get("parameters_digest", ""),

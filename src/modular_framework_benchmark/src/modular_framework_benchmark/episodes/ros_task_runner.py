@@ -14,7 +14,7 @@ from modular_framework_benchmark.episodes.episode_record import TASK_RECORDS, Ep
 from modular_framework_benchmark.episodes.episode_video import make_video_apart
 from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
-from modular_framework_benchmark.episodes.snapshot import machine_load
+from modular_framework_benchmark.episodes.snapshot import MachineLoad
 from modular_framework_benchmark.episodes.stack import Stack, StackError, StackLaunch
 from modular_framework_benchmark.episodes.task_settings import TaskSettings, read_settings
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
@@ -46,7 +46,7 @@ class TaskEpisodeRunner:
         Returns:
             What it gave; a launch that dies is an episode with its cause.
         """
-        end = EpisodeEnd(spec, folder, time.time(), time.monotonic(), machine_load())
+        end = EpisodeEnd(spec, folder, time.time(), time.monotonic(), MachineLoad.now())
         try:
             settings = read_settings(spec)
             launch = self._launch_of(settings)

@@ -7,7 +7,7 @@ import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from modular_framework_benchmark.episodes.snapshot import machine, versions
+from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
 from modular_framework_benchmark.metrics.measurements import ComponentReport, EpisodeMeasurements
 from modular_framework_benchmark.metrics.registry import MetricError, measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
@@ -20,10 +20,12 @@ class Stopwatch:
     Attributes:
         begun: [s since 1970].
         start: By the monotonic clock [s].
+        load: Load of the machine.
     """
 
     begun: float = field(default_factory=time.time)
     start: float = field(default_factory=time.monotonic)
+    load: MachineLoad = field(default_factory=MachineLoad.now)
 
     def elapsed_s(self) -> float:
         """Returns the time since then [s]."""
@@ -69,6 +71,8 @@ def measured_record(
         snapshot={
             **versions(),
             "machine": machine(),
+            "reference_s": reference_s(),
+            **MachineLoad.now().since(watch.load),
             **asdict(report.ran),
             **({"metric_faults": dict(measured.faults)} if measured.faults else {}),
         },

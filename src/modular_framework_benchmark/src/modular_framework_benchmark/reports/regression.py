@@ -72,6 +72,7 @@ class Regression:
         changes: Each metric of each method that both have.
         confidence: Level over all methods: the chance that no change is shown where nothing changed.
         notes: What could not be compared, and how episodes were paired.
+        differing: What the two ran with that is not the same.
     """
 
     before: ExperimentDescription
@@ -79,6 +80,7 @@ class Regression:
     changes: tuple[MetricChange, ...]
     confidence: float
     notes: tuple[str, ...]
+    differing: tuple[str, ...] = ()
 
     def count(self, change: Change) -> int:
         """Returns how many metrics of methods changed so."""

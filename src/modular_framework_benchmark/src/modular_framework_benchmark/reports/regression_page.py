@@ -17,6 +17,7 @@ from modular_framework_benchmark.reports.report_content import plain_json
 from modular_framework_benchmark.reports.tables import Cell, Table, estimate_text, metric_title
 
 COLORS = {Change.BETTER: "#176639", Change.WORSE: "#b3261e", Change.NOT_SHOWN: "#5f6c7b", Change.NO_DATA: "#5f6c7b"}
+DIFFERING = "The two runs also differ in what they ran with, so a change may come from there"
 MOODS = {Change.BETTER: "better", Change.WORSE: "worse"}
 
 
@@ -66,7 +67,8 @@ def regression_text(regression: Regression) -> str:
     rows = [table.columns, *(tuple(cell.text for cell in row) for row in table.rows)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(table.columns))]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([*summary_sentences(regression), "", *lines, "", *table.notes]) + "\n"
+    marks = [f"{DIFFERING}:", *(f"  {text}" for text in regression.differing), ""] if regression.differing else []
+    return "\n".join([*marks, *summary_sentences(regression), "", *lines, "", *table.notes]) + "\n"
 
 
 def regression_page(regression: Regression, before: str, after: str) -> str:
@@ -82,6 +84,7 @@ def regression_page(regression: Regression, before: str, after: str) -> str:
         "before": regression.before.name,
         "after": regression.after.name,
         "confidence": regression.confidence,
+        "differing": regression.differing,
         "changes": [
             {"method": item.method, "change": item.change.value, **asdict(item.comparison)}
             for item in regression.changes
@@ -92,6 +95,7 @@ def regression_page(regression: Regression, before: str, after: str) -> str:
         plain_json(data),
         figures,
         regression=regression,
+        differing=DIFFERING,
         sentences=summary_sentences(regression),
         table=changes_table(regression),
         figures=figures,

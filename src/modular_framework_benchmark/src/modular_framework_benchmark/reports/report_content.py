@@ -138,7 +138,7 @@ def gather(results: ExperimentResults, source: ReportSource) -> ReportContent:
     )
     return ReportContent(
         description, results.planned, len(results.episodes), _run_facts(results), analysis, metrics, levels, spans,
-        failures, tuple(figures), recorded, warnings_of(results, recorded),
+        failures, tuple(figures), recorded, warnings_of(results, recorded, source.snapshots),
         commands_to_repeat(results, recorded, source.database),
     )  # fmt: skip
 

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_benchmark.episodes.snapshot import OF_ONE_EPISODE
+from modular_framework_benchmark.episodes.snapshot import NOT_SHOWN
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_content import ReportSource
+from modular_framework_benchmark.reports.run_record import SnapshotValues
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 
 
@@ -29,6 +30,11 @@ class OpenedExperiment:
     number: int
     results: ExperimentResults
 
+    @property
+    def snapshots(self) -> SnapshotValues:
+        """Returns what the episodes ran with: the different values of each name, each with its number of episodes."""
+        return self.database.snapshot_values(self.number, NOT_SHOWN)
+
     def source(self, report_folder: Path) -> ReportSource:
         """Returns what a report reads beside the episodes.
 
@@ -39,7 +45,7 @@ class OpenedExperiment:
             self.database.label,
             self.database.folder,
             report_folder,
-            self.database.snapshot_values(self.number, OF_ONE_EPISODE),
+            self.snapshots,
             self.database.span_totals(self.number),
             lambda episodes: self.database.spans(self.number, episodes),
         )

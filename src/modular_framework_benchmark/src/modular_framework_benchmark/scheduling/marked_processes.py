@@ -13,8 +13,9 @@ import signal
 import time
 from pathlib import Path
 
-MARK = "MODULAR_FRAMEWORK_RUN"
-"""Environment variable that has the mark: RUN/WORKER."""
+from modular_framework_benchmark.episodes.snapshot import RUN_MARK as MARK
+
+__all__ = ["MARK", "end_marked_processes", "marked_processes"]
 
 
 def marked_processes(mark: str) -> list[int]:

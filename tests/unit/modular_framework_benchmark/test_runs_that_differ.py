@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`compare` marks what two runs ran with that is not the same; a report warns of load, faults and killed tries."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sample_experiment import sample_description, sample_episodes, sample_record
+
+from modular_framework_benchmark.commands.compare_command import main as compare
+from modular_framework_benchmark.episodes.snapshot import RUN_MARK, MachineLoad, reference_s
+from modular_framework_benchmark.reports.report_source import open_source
+from modular_framework_benchmark.reports.run_record import recorded_values, warnings_of
+from modular_framework_benchmark.results.database import open_database
+from modular_framework_ros.reported_figures import Clock
+
+PLANNERS = {"RRTConnect of ompl": {"range": 0.1, "implementation": "compiled"}}
+SNAPSHOT: dict[str, Any] = {
+    "packages": {"numpy": "2.4"},
+    "planners": PLANNERS,
+    "methods": {"top_down_grasps": {"version": "0.1.0", "sources": "aa"}},
+    "machine": {"host": "lab-1"},
+    "reference_s": 0.1,
+    "load_before": 0.5,
+}
+
+
+def stored(path: Path, **changes: Any) -> str:
+    description = sample_description()
+    metrics = tuple(
+        replace(each, clock=Clock.WALL) if each.name == "planning_time" else each for each in description.metrics
+    )
+    episodes = sample_episodes(2)
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(replace(description, metrics=metrics), episodes)
+        for spec in episodes:
+            database.write(number, sample_record(spec, snapshot={**SNAPSHOT, **changes}))
+    return str(path)
+
+
+def warnings(path: str) -> str:
+    with open_source(path, None) as opened:
+        recorded = recorded_values(opened.snapshots)
+        return " ".join(warnings_of(opened.results, recorded, opened.snapshots))
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"packages": {"numpy": "2.5"}}, "packages.numpy: before 2.4; after 2.5"),
+        (
+            {"planners": {"RRTConnect of ompl": {"range": 0.2, "implementation": "compiled"}}},
+            "planners.RRTConnect of ompl.range: before 0.1; after 0.2",
+        ),
+        (
+            {"planners": {"RRTConnect of ompl": {"range": 0.1, "implementation": "OMPL"}}},
+            "planners.RRTConnect of ompl.implementation: before compiled; after OMPL",
+        ),
+        (
+            {"methods": {"top_down_grasps": {"version": "0.1.0", "sources": "bb"}}},
+            "methods.top_down_grasps.sources: before aa; after bb",
+        ),
+        (
+            {"machine": {"host": "lab-2"}, "reference_s": 0.15},
+            "the reference workload takes 0.100 s before and 0.150 s after (1.50 times)",
+        ),
+    ],
+)
+def test_compare_marks_what_else_differs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: dict[str, Any], text: str
+) -> None:
+    before, after = stored(tmp_path / "before.db"), stored(tmp_path / "after.db", **changes)
+    assert compare([before, after, "--into", str(tmp_path / "page.html")]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("The two runs also differ in what they ran with")
+    assert text in shown and text in (tmp_path / "page.html").read_text()
+
+
+def test_compare_marks_nothing_where_only_measurements_differ(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = stored(tmp_path / "before.db")
+    after = stored(tmp_path / "after.db", reference_s=0.11, load_before=3.0, others_share=0.5, earlier_tries=["x"])
+    assert compare([before, after]) == 0
+    assert "also differ" not in capsys.readouterr().out
+
+
+def test_a_report_warns_of_a_load_of_faults_of_metrics_and_of_killed_tries(tmp_path: Path) -> None:
+    text = warnings(
+        stored(
+            tmp_path / "results.db",
+            others_share=0.35,
+            metric_faults={"my_height": "KeyError: 'can'"},
+            earlier_tries=["begun 2026-11-26 on lab-1: the worker process was killed by signal SIGKILL"],
+        )
+    )
+    assert "8 episodes ran beside other processes that used up to 35 % of the machine" in text
+    assert "is longer there (planning_time)" in text
+    assert "The metric my_height raised an error in 8 episodes: KeyError: 'can'." in text
+    assert "8 attempts ended without a record, and the episodes ran again: begun 2026-11-26 on lab-1" in text
+
+
+def test_a_quiet_machine_gives_no_warning(tmp_path: Path) -> None:
+    assert warnings(stored(tmp_path / "results.db", others_share=0.02)) == ""
+
+
+def test_the_load_counts_other_processes_and_not_those_of_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    def share_of(mark: str) -> float:
+        monkeypatch.setenv(RUN_MARK, mark)
+        command = [sys.executable, "-c", "while True: pass"]
+        with subprocess.Popen(command) as busy:
+            monkeypatch.setenv(RUN_MARK, "mine/worker/")
+            before, spent = MachineLoad.now(), 0.0
+            own = before.others_s.get(busy.pid)
+            end = time.monotonic() + 30.0
+            while spent < 0.2 and time.monotonic() < end and own is not None:
+                spent = MachineLoad.now().others_s.get(busy.pid, 0.0) - own
+            share = MachineLoad.now().since(before)["others_share"] if own is not None else 0.0
+            busy.kill()
+        return share
+
+    assert share_of("another/worker/") > 0.0
+    assert share_of("mine/other/") == 0.0
+
+
+def test_the_reference_workload_takes_the_same_for_all_episodes_of_a_process() -> None:
+    assert 0.001 < reference_s() == reference_s()
