@@ -42,9 +42,12 @@ IN_A_MODEL = {
     "frames in a circle": (
         "\n<link name='a'><pose relative_to='b'>0 0 0 0 0 0</pose></link>"
         "<link name='b'><pose relative_to='a'>0 0 0 0 0 0</pose></link>", 3, "depends on itself"),
+    "frames in a circle that nothing uses": (
+        f"{LINK}\n<frame name='f'><pose relative_to='g'>1 0 0 0 0 0</pose></frame>"
+        "<frame name='g'><pose relative_to='f'>1 0 0 0 0 0</pose></frame>", 3, "depends on itself"),
     "frames attached in a circle": (
         f"{LINK}<frame name='f' attached_to='g'/><frame name='g' attached_to='f'/>"
-        "<joint name='j' type='fixed'><parent>a</parent><child>f</child></joint>", 1, "attached to itself"),
+        "<joint name='j' type='fixed'><parent>a</parent><child>f</child></joint>", 2, "depends on itself"),
     "a mass of 0": ("<link name='a'><inertial>\n<mass>0</mass></inertial></link>", 3, "greater than 0"),
     "a box of length 0": (geometry("<box><size>1 0 1</size></box>"), 3, "greater than 0"),
     "a box as large as the sea": (geometry("<box><size>1 1e9 1</size></box>"), 3, "at most 10000 m"),

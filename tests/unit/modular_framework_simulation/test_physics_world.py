@@ -86,6 +86,21 @@ def test_the_model_frame_is_not_the_centre_of_mass(world: PhysicsWorld) -> None:
     assert link.twist.linear == pytest.approx((0.3 - lever[1], lever[0], 0))
 
 
+def test_a_twist_in_a_reference_frame_is_turned_into_the_axes_of_the_world(world: PhysicsWorld) -> None:
+    """As in gazebo_ros: the motion of the reference is not added, so that a model can be stopped in its own frame."""
+    body = world.spawn(solid("cart", CUBE, Pose((0, 0, 1))))
+    turned = Pose.from_xyz_rpy((1, 0, 1), (0, 0, math.pi / 2))
+    world.set_state("cart", BodyState(turned, Twist((0.5, 0, 0), (0, 0, 2.0))))
+    world.set_state("cart", BodyState(Pose(), Twist((0.3, 0, 0), (0, 0.1, 0))), "cart")
+    assert body.state().pose.distance_to(turned)[0] < 1e-9
+    assert body.state().twist.linear == pytest.approx((0, 0.3, 0), abs=1e-9)
+    assert body.state().twist.angular == pytest.approx((-0.1, 0, 0), abs=1e-9)
+    for _ in range(50):
+        world.set_state("cart", BodyState(Pose(), Twist()), "cart")
+    assert body.state().pose.distance_to(turned)[0] < 1e-9
+    assert body.state().twist.linear == pytest.approx((0, 0, 0), abs=1e-9)
+
+
 def test_a_static_model_carries_all_its_links_and_never_moves(world: PhysicsWorld) -> None:
     text = """<sdf version='1.6'><model name='table'><static>true</static>
         <link name='top'><pose>0 0 0.5 0 0 0</pose><collision name='c'><geometry><box><size>1 1 0.04</size></box>
@@ -192,6 +207,21 @@ def test_an_object_in_urdf_is_read_with_weight_and_friction(world: PhysicsWorld)
     world.spawn(replace(model, pose=Pose((0, 0, 0.052))))
     run(world, 0.3)
     assert world.entity_state("r").pose.position[2] == pytest.approx(0.05, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("inside", "fault"),
+    [
+        ("<joint name='t' type='continuous'><parent link='a'/><child link='b'/><mimic joint='t'/></joint>", "t -> t"),
+        ("<xacro:include filename='x'/>", "this is xacro"),
+    ],
+)
+def test_an_object_in_urdf_that_defines_itself_or_is_not_expanded_is_refused(inside: str, fault: str) -> None:
+    text = (
+        f"<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'><link name='a'/><link name='b'/>{inside}</robot>"
+    )
+    with pytest.raises(DescriptionError, match=fault):
+        read_urdf_model(text, "text", Resources())
 
 
 LONG = "n" * 1024

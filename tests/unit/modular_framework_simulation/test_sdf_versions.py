@@ -155,6 +155,15 @@ def test_a_light_is_no_model_and_stops_nothing(tmp_path: Path) -> None:
         read_model_text("<sdf version='1.5'><light name='sun'/></sdf>", "text", Resources())
 
 
+def test_the_frame_of_an_old_pose_may_name_nothing_and_otherwise_counts() -> None:
+    for name, x in (("nothing_known", 0.3), ("b", 1.3)):
+        links = f"<link name='a'><pose frame='{name}'>0.3 0 0 0 0 0</pose></link>"
+        text = f"{links}<link name='b'><pose>1 0 0 0 0 0</pose></link>"
+        assert model(text, "1.6").links[0].pose.position == pytest.approx((x, 0, 0))
+    with pytest.raises(DescriptionError, match="relative to 'nothing_known'"):
+        model("<link name='a'><pose relative_to='nothing_known'>0.3 0 0 0 0 0</pose></link>")
+
+
 def test_a_saved_world_is_read_as_it_was_saved(tmp_path: Path) -> None:
     text = """<model name='a'><pose>9 9 9 0 0 0</pose><link name='l'/></model>
         <state world_name='w'><model name='a'><pose>1 2 3 0 0 0</pose><scale>1 1 1</scale>

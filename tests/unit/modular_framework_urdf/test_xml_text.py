@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError, parse, refuse_doctype
 
 SOURCES = Path(__file__).parents[3] / "src"
@@ -197,3 +198,10 @@ def test_no_module_parses_xml_past_the_check() -> None:
     found = {path.name for path in SOURCES.rglob("*.py") if parsers.search(path.read_text())}
     checked = {path.name for path in SOURCES.rglob("*.py") if "refuse_doctype(" in path.read_text()}
     assert found <= checked and "xml_text.py" in found
+
+
+@pytest.mark.parametrize("namespace", ["xmlns:xacro='http://www.ros.org/wiki/xacro'", ""])
+def test_xacro_that_is_not_expanded_is_no_robot(namespace: str) -> None:
+    text = f"<robot name='r' {namespace}>\n<xacro:property name='x' value='1'/><link name='base'/></robot>"
+    with pytest.raises(XmlError, match="robot_description:2: this is xacro; allowed: URDF; expand the file with xacro"):
+        read_urdf(text)

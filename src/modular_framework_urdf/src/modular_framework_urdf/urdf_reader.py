@@ -31,7 +31,7 @@ from modular_framework_urdf.robot import (
     UnknownShape,
     Vector,
 )
-from modular_framework_urdf.xml_text import Element, XmlError
+from modular_framework_urdf.xml_text import XACRO_TAGS, Element, XmlError
 
 
 class AttributeFault(XmlError):
@@ -61,9 +61,14 @@ def read_urdf(text: str | bytes, where: str = "robot_description") -> Robot:
 
     Raises:
         AttributeFault: something is no number.
-        XmlError: not well-formed XML, or a DOCTYPE.
+        XmlError: not well-formed XML, a DOCTYPE, or xacro that is not expanded.
     """
     root = xml_text.parse(text, where)
+    for element in root.iter():
+        if element.tag.startswith(XACRO_TAGS):
+            raise XmlError(
+                f"{where}:{element.sourceline}", "this is xacro", "allowed: URDF; expand the file with xacro"
+            )
     return Robot(
         root.get("name", ""),
         tuple(_link(item, where) for item in root.findall("link")),

@@ -13,6 +13,8 @@ from xml.parsers import expat
 
 from lxml import etree
 
+XACRO_TAGS = ("xacro:", "{http://www.ros.org/wiki/xacro", "{http://ros.org/wiki/xacro")
+"""Beginnings of the tags of xacro, which are gone in an expanded file."""
 Element = Any
 """An lxml element; `sourceline` is the line where its start tag begins, from 1."""
 _LAST_LINE = 65_534

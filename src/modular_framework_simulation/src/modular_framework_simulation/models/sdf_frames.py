@@ -84,6 +84,21 @@ class FrameTree:
         self._joints = {child.attributes["name"]: child for child in named if child.tag == "joint"}
         self._nodes = {child.attributes["name"]: child for child in named if child.tag in _FRAME_TAGS}
 
+    def refuse_circles(self) -> None:
+        """Refuses frames that are defined by each other in a circle, also those that nothing uses.
+
+        Raises:
+            DescriptionError: Names the circle.
+        """
+        for name in self._nodes:
+            self.pose_in_model(name)
+
+    def _base_of(self, pose: XmlNode) -> str:
+        """Returns the frame that a pose is relative to; the attribute `frame` of old files may name nothing."""
+        base, outer = base_of(pose), base_of(pose).partition(SCOPE)[0]
+        known = {"", MODEL_FRAME, *self._nodes, *self._joints, *self._inner}
+        return base if "relative_to" in pose.attributes or outer in known else ""
+
     def pose_in_model(self, name: str) -> Pose:
         """Returns the pose of a link, frame, joint or inner model in the frame of the model.
 
@@ -108,13 +123,13 @@ class FrameTree:
         """
         if pose is None:
             return self.pose_in_model(base)
-        return self.pose_in_model(base_of(pose) or base) @ pose_of(pose)
+        return self.pose_in_model(self._base_of(pose) or base) @ pose_of(pose)
 
     def pose_in_link(self, link: str, pose: XmlNode | None) -> Pose:
         """Returns the pose of something in a link, in the frame of the link."""
         if pose is None:
             return Pose()
-        base = base_of(pose)
+        base = self._base_of(pose)
         if base in ("", link):
             return pose_of(pose)
         return self.pose_in_model(link).inverse() @ self.placed(pose)
@@ -184,7 +199,7 @@ class FrameTree:
 
     def _pose_of_node(self, node: XmlNode, visited: tuple[str, ...]) -> Pose:
         pose = node.find("pose")
-        base = base_of(pose) if pose is not None else ""
+        base = self._base_of(pose) if pose is not None else ""
         if not base and node.tag == "joint":
             base = node.require("child").text.strip()
             if base not in self._nodes and base not in self._inner:  # perhaps with the name of the model before it
@@ -199,7 +214,7 @@ class FrameTree:
     def _pose_of_inner(self, model: InnerModel, visited: tuple[str, ...]) -> Pose:
         placed = Pose()
         if model.pose is not None:
-            placed = self._pose(base_of(model.pose), visited) @ pose_of(model.pose)
+            placed = self._pose(self._base_of(model.pose), visited) @ pose_of(model.pose)
         if not model.placement_frame:
             return placed
         return placed @ model.frames.pose_in_model(model.placement_frame).inverse()

@@ -159,6 +159,7 @@ class SdfModels:
         own_links = node.find_all("link")
         canonical = node.attributes.get("canonical_link") or next((link.name() for link in own_links), "")
         frames = FrameTree(node, {name: each.placed for name, each in inner.items()}, canonical)
+        frames.refuse_circles()
         links = [_read_link(link, frames, static, reading) for link in own_links]
         joints = [read_joint(joint, frames, version) for joint in node.find_all("joint")]
         sensors = list(sdf_sensor_elements(node, frames))

@@ -57,6 +57,7 @@ def read_world(path: Path, resources: Resources) -> specs.World:
     world = root.require("world")
     loaded, ignored = _models_of(world, version, resources)
     frames = FrameTree(world, {name: each.placed for name, each in loaded.items()})
+    frames.refuse_circles()
     models = [
         dataclasses.replace(each.spec, name=name, pose=frames.pose_in_model(name)) for name, each in loaded.items()
     ]

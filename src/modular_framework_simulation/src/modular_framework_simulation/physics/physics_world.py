@@ -26,10 +26,10 @@ from modular_framework_simulation.physics.joint_resistance import set_joint_resi
 from modular_framework_simulation.physics.part_names import SCOPE
 from modular_framework_simulation.physics.physics_engine import BASE_INDEX, Log
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
-from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, cross, twist_in_frame
+from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, twist_in_frame
 from modular_framework_simulation.physics.surfaces import surface_of
 from modular_framework_simulation.physics.world_rest import WorldRest
-from modular_framework_urdf.rotations import Vector3, rotate_vector
+from modular_framework_urdf.rotations import Vector3
 
 WORLD_FRAMES = ("", "world", "map", "/map")
 """Names that stand for the frame of the world in requests."""
@@ -393,19 +393,15 @@ class PhysicsWorld:
         self.note_change()
 
     def state_in_world(self, state: BodyState, reference: str) -> BodyState:
-        """Returns a state as seen from a reference as one in the world.
+        """Returns a state given in a reference as one in the world.
+
+        As in gazebo_ros, the twist is turned into the axes of the world; the motion of the reference is not added.
 
         Raises:
             UnknownEntityError: The reference does not exist.
         """
-        frame = self.entity_state(reference)
-        offset = rotate_vector(frame.pose.quaternion, state.pose.position)
-        lever = cross(frame.twist.angular, offset)
-        rotated = twist_in_frame(state.twist, frame.pose.inverse())
-        linear = tuple(a + b + c for a, b, c in zip(rotated.linear, frame.twist.linear, lever, strict=True))
-        angular = tuple(a + b for a, b in zip(rotated.angular, frame.twist.angular, strict=True))
-        twist = Twist((linear[0], linear[1], linear[2]), (angular[0], angular[1], angular[2]))
-        return BodyState(frame.pose @ state.pose, twist)
+        frame = self.entity_state(reference).pose
+        return BodyState(frame @ state.pose, twist_in_frame(state.twist, frame.inverse()))
 
     def pose_in_world(self, pose: Pose, reference: str) -> Pose:
         """Returns a pose given in a reference as a pose in the world."""
