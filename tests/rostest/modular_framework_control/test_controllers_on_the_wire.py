@@ -243,12 +243,16 @@ def test_a_gripper_that_cannot_go_on_is_aborted_as_stalled(gripper: actionlib.Si
     assert time.monotonic() - started >= 0.3
 
 
-def test_a_gripper_goal_that_is_not_a_number_is_rejected(gripper: actionlib.SimpleActionClient) -> None:
+@pytest.mark.parametrize("position", [math.nan, 5.0, -1.0, 1e300])
+def test_a_gripper_goal_that_is_not_a_number_or_beyond_the_limits_is_rejected(
+    gripper: actionlib.SimpleActionClient, position: float
+) -> None:
     command = GripperCommandGoal()
-    command.command.position = math.nan
+    command.command.position = position
     gripper.send_goal(command)
     finish(gripper)
     assert gripper.get_state() == GoalStatus.REJECTED
+    assert "position" in gripper.get_goal_status_text()
 
 
 def test_the_services_follow_the_rules_of_switching(robot: Any) -> None:

@@ -142,8 +142,9 @@ class HeavyRobotHW(WalledRobotHW):
 
     def read(self, time_s: float, period_s: float) -> None:
         for index, joint in enumerate(self.joints):
-            state, pace = joint.state, (joint.command - self._last[index]) / max(period_s, 1e-9)
-            behind, self._last[index] = self._last[index] - state.position, joint.command
+            state, command = joint.state, self._last[index] if math.isnan(joint.command) else joint.command
+            pace = (command - self._last[index]) / max(period_s, 1e-9)
+            behind, self._last[index] = self._last[index] - state.position, command
             wanted = pace + math.copysign(min(FASTEST, 0.8 * math.sqrt(2.0 * self.strength * abs(behind))), behind)
             change = self.strength * period_s
             state.velocity += min(max(wanted - state.velocity, -change), change)
