@@ -13,11 +13,13 @@ import rospkg
 from modular_framework_benchmark.commands.experiment_session import ExperimentSession, SessionOptions
 from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics
 from modular_framework_benchmark.commands.stopping_rules import settings_of
+from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.experiments.design import digest_of, lay_out
 from modular_framework_benchmark.experiments.design_text import design_text
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.modes.ros_run_digests import run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.results.connection import shown_target
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
@@ -28,7 +30,7 @@ from modular_framework_benchmark.scheduling.worker_process import WorkerStartErr
 from modular_framework_core.files.default_folders import API_PACKAGE
 
 EXIT_USER_ERROR, EXIT_FAILED, EXIT_INTERRUPTED = 2, 1, 130
-USER_ERRORS = (ExperimentFault, ResultsError, RunLockError, RunnerError, SchedulerError)
+USER_ERRORS = (ExperimentFault, ResultsError, RunLockError, RunnerError, SchedulerError, SettingsError)
 
 
 class CommandError(Exception):
@@ -108,7 +110,8 @@ def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], option
         WorkerStartError: A worker cannot be started.
     """
     with RunLock(options.target) as lock, open_database(options.target, create=True) as database:
-        number = database.add_experiment(experiment.described(digest_of(experiment, episodes)), episodes)
+        ran_with = run_digests(experiment.description.mode, episodes)
+        number = database.add_experiment(experiment.described(digest_of(experiment, episodes), ran_with), episodes)
         return _session(database, number, lock, options, experiment).run()
 
 

@@ -30,7 +30,7 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         SettingsError: There is no such launch file, or an argument is wrong.
     """
     try:
-        path = roslaunch.rlutil.resolve_launch_arguments([settings.package, settings.launch_file])[0]
+        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (settings.package, settings.launch_file))])[0]
         known = known_arguments(path)
         arguments = {name: value for name, value in DEFAULT_ARGUMENTS.items() if name in known}
         arguments |= settings.arguments

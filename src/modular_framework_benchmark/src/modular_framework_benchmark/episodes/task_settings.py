@@ -51,8 +51,8 @@ class TaskSettings:
     """What an episode of mode `task` runs.
 
     Attributes:
-        package: Package of the launch file.
-        launch_file: Name of the launch file.
+        package: Package of the launch file; empty for a path.
+        launch_file: Name of the launch file, or its path.
         arguments: Launch arguments.
         parameters: ROS parameters by absolute name, set over those of the launch files.
         objects: What is put into the world before the task starts.
@@ -84,7 +84,8 @@ def read_settings(spec: EpisodeSpec) -> TaskSettings:
         SettingsError: One is missing or wrong.
     """
     settings = spec.settings
-    package, _, launch_file = str(settings.get("launch", DEFAULT_LAUNCH)).partition("/")
+    launch = str(settings.get("launch", DEFAULT_LAUNCH))
+    package, _, launch_file = ("", "", launch) if launch.startswith("/") else launch.partition("/")
     if not launch_file:
         raise SettingsError(f"setting 'launch' is {settings['launch']!r}; allowed is PACKAGE/FILE.launch; correct it")
     arguments = {name: _text(value) for name, value in dict(settings.get("arguments") or {}).items()}

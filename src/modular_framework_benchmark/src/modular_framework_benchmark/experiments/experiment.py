@@ -75,10 +75,11 @@ class Experiment:
     record: Mapping[str, bool]
     files: Mapping[str, str]
 
-    def described(self, digest: str) -> ExperimentDescription:
+    def described(self, digest: str, ran_with: Mapping[str, str]) -> ExperimentDescription:
         """Returns what the result database keeps of it.
 
         Args:
             digest: Of what decides its episodes.
+            ran_with: Digests of what they run with, see `run_digests`.
         """
-        return replace(self.description, digest=digest)
+        return replace(self.description, digest=digest, ran_with={**self.files, **ran_with})

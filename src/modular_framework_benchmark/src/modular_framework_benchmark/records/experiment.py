@@ -7,7 +7,8 @@ It is what a result database keeps of an experiment file, so that statistics and
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 
 from modular_framework_ros.reported_figures import Clock, Source
@@ -99,6 +100,7 @@ class ExperimentDescription:
         confidence: Level of the intervals, such as 0.95.
         sequential: Whether a stopping rule looks at the results: its comparisons must then hold at any time.
         source: Path of the experiment file, from whose folder its relative paths count; "" where there is none.
+        ran_with: Digests of all that its episodes run with beside their settings, by what it is; empty: not known.
     """
 
     name: str
@@ -112,3 +114,4 @@ class ExperimentDescription:
     confidence: float = 0.95
     sequential: bool = False
     source: str = ""
+    ran_with: Mapping[str, str] = field(default_factory=dict)

@@ -26,6 +26,7 @@ from modular_framework_benchmark.results.errors import DescriptionError, Experim
 from modular_framework_benchmark.results.json_records import description_from_json, description_to_json, to_json
 from modular_framework_benchmark.results.schema import DESCRIPTIONS, EPISODES, EXPERIMENTS, PLANNER_CONFIGS
 
+MOST_NAMED = 6
 UNKNOWN_VERSION = "0.0.0"
 """What Planner Arena is shown until the first episode says its version."""
 
@@ -49,6 +50,7 @@ def store_experiment(
     else:
         number = stored.id
         old = description_from_json(stored.content)
+        _check_ran_with(old, description)
         new = {} if stored.digest == description.digest else _new_episodes(connection, number, old, description, specs)
     content = {"digest": description.digest, "content": description_to_json(description)}
     connection.execute(update(DESCRIPTIONS).where(DESCRIPTIONS.c.id == number).values(content))
@@ -76,6 +78,21 @@ def _by_key(description: ExperimentDescription, episodes: Sequence[EpisodeSpec])
     if not specs:
         raise DescriptionError(f"experiment {description.name!r} has no episodes; give it at least one")
     return specs
+
+
+def _check_ran_with(old: ExperimentDescription, new: ExperimentDescription) -> None:
+    """Refuses to go on with other files, packages or parameters; further levels may bring further ones."""
+    changed = [name for name, digests in old.ran_with.items() if set(digests.split()) - _digests(new, name)]
+    if changed and new.ran_with:
+        names = ", ".join(sorted(changed)[:MOST_NAMED]) + (" and others" if len(changed) > MOST_NAMED else "")
+        raise ExperimentChangedError(
+            f"the database has episodes of {new.name!r} that ran with another state of {names}; allowed: the same as "
+            "then; restore it, or give the experiment another name, or use another database"
+        )
+
+
+def _digests(description: ExperimentDescription, name: str) -> set[str]:
+    return set(description.ran_with.get(name, "").split())
 
 
 def _new_episodes(

@@ -92,8 +92,8 @@ def run_launch_file(
     """Runs a launch file until its task or one of its nodes ends, and prints last why it ended.
 
     Args:
-        package: ROS package of the launch file.
-        launch_file: Name of the file in the package's folder `launch`.
+        package: ROS package of the launch file; empty for a path.
+        launch_file: Name of the file in the package's folder `launch`, or its path.
         arguments: Launch arguments, `name:=value`; the launch file has `end_with_task`.
         task_name: Name of the node that runs the task; "" if the end of every node ends the launch.
         later_files: Launch files read after it: their parameters replace those of the launch file.
@@ -104,7 +104,7 @@ def run_launch_file(
         argument is wrong.
     """
     try:
-        path = roslaunch.rlutil.resolve_launch_arguments([package, launch_file])[0]
+        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (package, launch_file))])[0]
         check_arguments(path, arguments)
         ends_with_task = argument_values(path, arguments)["end_with_task"]
         watcher = EndWatcher(task_name, bool(roslaunch.loader.convert_value(ends_with_task, "bool")))

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Digests of what the episodes of an experiment will run with, beside their settings: an extension must find it equal.
+
+Of a launch file these are its parameters, the files that its nodes are given, and the packages of its nodes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import roslaunch.config
+import roslaunch.rlutil
+import roslaunch.xmlloader
+
+from modular_framework_benchmark.episodes.ros_package_sources import package_source
+from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
+from modular_framework_benchmark.episodes.snapshot import PACKAGES
+from modular_framework_benchmark.episodes.task_settings import read_settings
+from modular_framework_benchmark.records.episode import EpisodeSpec
+
+LAUNCHED = ("launch", "arguments", "task", "robot", "method")
+"""Settings that decide what is launched or loaded."""
+LIBRARIES = ("modular_framework_benchmark", "modular_framework_core", "modular_framework_planning")
+
+
+def run_digests(mode: str, episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
+    """Returns digests of all that episodes run with, by what it is; several, separated by blanks, where stacks differ.
+
+    Args:
+        mode: Of the experiment.
+        episodes: All its episodes.
+
+    Raises:
+        SettingsError: A launch file cannot be read.
+    """
+    found: dict[str, set[str]] = {f"Python package {name}": {_python_version(name)} for name in PACKAGES}
+    # launch files do not see the parameters that an episode sets over theirs
+    stacks = {json.dumps([spec.settings.get(key) for key in LAUNCHED], sort_keys=True): spec for spec in episodes}
+    for spec in stacks.values():
+        for what, digest in _of_launch(spec) if mode == "task" else _of_packages(_named_packages(spec.settings)):
+            found.setdefault(what, set()).add(digest[:16])
+    return {what: " ".join(sorted(digests)) for what, digests in sorted(found.items())}
+
+
+def _python_version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "none"
+
+
+def _named_packages(settings: Mapping[str, Any]) -> set[str]:
+    robot, method = settings.get("robot", ""), str(settings.get("method") or "")
+    named = {robot if isinstance(robot, str) else "", method.partition(":")[0].partition(".")[0]}
+    return {*LIBRARIES, *named} - {""}
+
+
+def _of_packages(packages: Iterable[str]) -> Iterator[tuple[str, str]]:
+    for package in packages:
+        yield f"package {package}", package_source(package)[1]
+
+
+def _of_launch(spec: EpisodeSpec) -> Iterator[tuple[str, str]]:
+    launch = resolve_launch(read_settings(spec))
+    path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (launch.package, launch.launch_file))])[0]
+    arguments = [f"{name}:={value}" for name, value in launch.arguments.items()]
+    config = roslaunch.config.load_config_default(
+        [(path, arguments)], None, loader=roslaunch.xmlloader.XmlLoader(resolve_anon=False), verbose=False
+    )
+    texts = [str(launch.arguments.get(name, "")) for name in sorted(launch.arguments)]
+    for name, parameter in config.params.items():
+        yield f"parameter {name}", _digest(json.dumps(parameter.value, sort_keys=True, default=str))
+        texts.append(str(parameter.value))
+    words = {word for text in (*texts, *(node.args or "" for node in config.nodes)) for word in text.split()}
+    for file in sorted(Path(word) for word in words if word.startswith("/") and len(word) < 1024):
+        if file.is_file():
+            yield f"file {file.parent.name}/{file.name}", hashlib.sha256(file.read_bytes()).hexdigest()
+    yield from _of_packages({*LIBRARIES, *(node.package for node in config.nodes)})
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
