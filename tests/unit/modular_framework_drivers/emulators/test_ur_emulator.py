@@ -32,12 +32,23 @@ def arm() -> Iterator[EmulatedArm]:
     emulated.close()
 
 
+UNTIL = """
+def until(condition):
+    end = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < end, "the condition did not hold within 20 s"
+        time.sleep(0.01)
+"""
+"""A function for client code: the client sees a change some packages later."""
+
+
 def client(arm: EmulatedArm, code: str) -> Any:
     """Run client code that ends with a value in `answer`; returns the value."""
     head = (
         "import json, math, time\nfrom rtde_control import RTDEControlInterface\n"
         "from rtde_receive import RTDEReceiveInterface\nfrom rtde_io import RTDEIOInterface\n"
         f"from dashboard_client import DashboardClient\naddress = {arm.address!r}\n"
+        f"{UNTIL}"
     )
     tail = "\nprint('answer', json.dumps(answer), flush=True)\n"
     done = subprocess.run(
@@ -88,7 +99,7 @@ def test_the_client_uploads_its_program_streams_and_is_stopped(arm: EmulatedArm,
             target[5] += 0.4 * (1.0 - math.cos(math.pi * step / 99.0)) / 2.0
             assert control.servoJ(target, 0.0, 0.0, 0.008, 0.03, 2000)
             control.waitPeriod(begun)
-        time.sleep(0.3)
+        until(lambda: abs(arm.getActualQ()[5] - start[5] - 0.4) < 1e-3)
         moved = arm.getActualQ()[5] - start[5]
         stopped = control.servoStop(10.0)
         after = arm.getActualQd()
@@ -143,7 +154,7 @@ def test_the_speed_slider_is_set_and_read(arm: EmulatedArm) -> None:
         """
         arm, panel = RTDEReceiveInterface(address), RTDEIOInterface(address)
         panel.setSpeedSlider(0.4)
-        time.sleep(0.3)
+        until(lambda: arm.getTargetSpeedFraction() < 1.0)
         answer = arm.getTargetSpeedFraction()
         panel.setSpeedSlider(1.0)
         """,
@@ -157,13 +168,13 @@ def test_a_protective_stop_ends_the_program_and_is_unlocked(arm: EmulatedArm) ->
         arm, control, dashboard = RTDEReceiveInterface(address), RTDEControlInterface(address), DashboardClient(address)
         dashboard.connect()
         control.triggerProtectiveStop()
-        time.sleep(0.2)
+        until(lambda: arm.isProtectiveStopped() and not control.isProgramRunning())
         stopped = [arm.isProtectiveStopped(), arm.getSafetyMode(), control.isProgramRunning(), dashboard.safetymode()]
         refused = control.servoJ(arm.getActualQ(), 0.0, 0.0, 0.008, 0.03, 2000)
         dashboard.unlockProtectiveStop()
-        time.sleep(0.2)
+        until(lambda: not arm.isProtectiveStopped())
         control.reuploadScript()
-        time.sleep(0.3)
+        until(control.isProgramRunning)
         answer = [stopped, refused, arm.isProtectiveStopped(), control.isProgramRunning()]
         control.stopScript()
         """,
@@ -195,12 +206,12 @@ def test_a_pause_holds_the_arm_where_it_is_until_play(arm: EmulatedArm) -> None:
         control.servoJ(target, 0.0, 0.0, 0.008, 0.1, 300)
         time.sleep(0.05)
         dashboard.pause()
-        time.sleep(0.2)
+        until(lambda: arm.getRuntimeState() == 4 and max(map(abs, arm.getActualQd())) < 1e-6)
         before = arm.getActualQ()[0]
         time.sleep(0.3)
         paused = [arm.getRuntimeState(), arm.getSpeedScaling(), arm.getActualQ()[0] - before]
         dashboard.play()
-        time.sleep(1.5)
+        until(lambda: abs(arm.getActualQ()[0] - start[0] - 0.3) < 1e-3)
         answer = [paused, arm.getActualQ()[0] - start[0]]
         control.moveJ(start, 2.0, 5.0)
         control.stopScript()
