@@ -82,7 +82,7 @@ class CommandCheck:
     def rest_after(self, index: int, position: float, velocity: float) -> float:
         """Returns where a joint at `position` [rad] with `velocity` [rad/s] comes to rest if it brakes now [rad]."""
         joint = self._joints[index]
-        lowest, highest = joint.range_from(position)
+        lowest, highest = joint.limits.range_from(position)
         way = velocity * FOLLOWING_LAG_S + math.copysign(_braking_distance(velocity, joint), velocity)
         return min(max(position + way, lowest), highest)
 
