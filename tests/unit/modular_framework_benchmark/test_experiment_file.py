@@ -6,12 +6,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from experiment_texts import PICK, faults_of, read
+from experiment_texts import PICK, FakeSurroundings, faults_of, read
 
 from modular_framework_benchmark.experiments.experiment import StoppingKind
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
-from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.experiments.metric_choices import read_metrics
+from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading
+from modular_framework_benchmark.metrics.registry import METRICS
 from modular_framework_benchmark.records.experiment import Direction, MetricKind
+from modular_framework_core.files.faults import FaultList
 
 
 def test_every_combination_has_the_settings_of_the_base_and_of_its_levels(tmp_path: Path) -> None:
@@ -137,10 +140,20 @@ def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: 
     assert "must take one argument" in faults_of(PICK.replace("[success, task_time]", "[mine.py:two]"), tmp_path)[0]
 
 
-def test_a_duration_is_limited_by_the_time_of_an_episode_unless_the_file_says_otherwise(tmp_path: Path) -> None:
-    assert [one.limit for one in read(PICK, tmp_path).description.metrics] == [None, 60.0]
+def test_the_time_limit_of_an_episode_limits_no_metric_and_a_limit_of_the_file_does(tmp_path: Path) -> None:
+    assert [one.limit for one in read(PICK, tmp_path).description.metrics] == [None, None]
     text = PICK.replace("task_time]", "{metric: task_time, limit: 12}]")
     assert read(text, tmp_path).description.metrics[1].limit == 12.0
+
+
+def test_the_times_of_a_planner_are_limited_by_its_own_budget(tmp_path: Path) -> None:
+    known = {
+        name: METRICS[name].metric for name in ("planning_time", "motion_duration", "planning_processor_time", "lift")
+    }
+    for budget_s in (5.0, None):
+        metrics, _ = read_metrics(None, known, budget_s, Reading(FaultList(), tmp_path, FakeSurroundings(tmp_path)))
+        limits = {metric.name: metric.limit for metric in metrics}
+        assert limits == dict.fromkeys(known) | {"planning_time": budget_s}
 
 
 def test_a_duration_that_should_be_long_counts_as_0_where_an_episode_fails(tmp_path: Path) -> None:

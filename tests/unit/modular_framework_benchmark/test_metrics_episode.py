@@ -60,14 +60,16 @@ def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasureme
         states=(Span("state", "A", 0.0, 1.0, "fail", True, "because"), Span("state", "B", 1.0, 2.0, "success")),
         task_s=12.5,
         task_wall_s=13.5,
+        generation_s=0.75,
+        method_processor_s=6.5,
         reports=(
             ComponentReport(
                 *("generation", "top_down", True, "", 0.0, 0.5, 0.25),
                 figures={CANDIDATES: 40.0, CHECKED: 20.0, REACHABLE: 5.0},
             ),
-            planned(True, 0.1, 1.0, clearance_m=0.03),
+            planned(True, 0.1, 1.0, clearance_m=0.03, processor_s=0.04, concurrent=2.0),
             planned(False, 5.0),
-            planned(True, 0.3, 2.0, clearance_m=0.02),
+            planned(True, 0.3, 2.0, clearance_m=0.02, processor_s=0.08, concurrent=3.0),
             ComponentReport("execution", "", True, "", 1.0, 3.0, 2.0, motion=Motion(("pan",), TIMES, positions[:, :1])),
             ComponentReport("execution", "", False, "stopped", 3.5, 3.6, 0.1),
         ),
@@ -88,11 +90,14 @@ def episode(status: EpisodeStatus = EpisodeStatus.SUCCEEDED) -> EpisodeMeasureme
         ("task_time", 12.5),
         ("task_wall_time", 13.5),
         ("failed_states", 1.0),
-        ("generation_time", 0.25),
+        ("generation_time", 0.75),
+        ("method_processor_time", 6.5),
         ("generation_success", 1.0),
         ("candidates", 40.0),
         ("reachable_share", 0.25),
-        ("planning_time", 0.2),
+        ("planning_time", 1.8),
+        ("planning_processor_time", 0.06),
+        ("concurrent_plans", 3.0),
         ("planning_success", 2 / 3),
         ("path_length", 3.0),
         ("motion_duration", 2.0),
@@ -135,6 +140,16 @@ def test_a_mean_has_the_same_bits_in_whatever_sequence_concurrent_plans_ended() 
         measure(["planning_time", "path_length"], there).values
         == measure(["planning_time", "path_length"], back).values
     )
+
+
+def test_a_plan_that_was_made_to_see_whether_there_is_one_and_made_again_counts_once() -> None:
+    thrown_away, executed = planned(True, 0.1, 1.0), planned(True, 0.1, 3.0)
+    motion = ComponentReport("execution", "", True, "", 1.0, 3.0, 2.0, motion=executed.motion)
+    measured = measure(
+        ["path_length", "motion_duration", "planning_time"],
+        replace(episode(), reports=(thrown_away, replace(executed, wall_s=0.3), motion)),
+    )
+    assert measured.values == {"path_length": 6.0, "motion_duration": 2.0, "planning_time": 0.1}
 
 
 def test_what_was_not_recorded_has_no_value_and_no_metric_raises() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sample_experiment import METHODS, sample_description, sample_episodes, sample_record
 
-from modular_framework_benchmark.records.episode import EpisodeStatus
+from modular_framework_benchmark.records.episode import EpisodeStatus, Span
 from modular_framework_benchmark.records.experiment import Direction, Factor, Metric, MetricKind
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.results.errors import (
@@ -113,6 +113,21 @@ def test_spans_can_be_left_out_read_for_some_episodes_and_added_up(path: Path) -
         assert sums.loc[("PICK/APPROACH", method), "total_s"] == 2 * 3.5
         assert sums.loc[("planning", method), "count"] == 2
         assert sums.loc[("planning", method), "ended"] == 0
+
+
+def test_spans_at_the_same_time_cover_their_time_once(path: Path) -> None:
+    spans = [(0.0, 2.0), (1.0, 5.0), (1.5, 3.0), (7.0, 8.0), (8.0, None), (9.0, 9.5)]
+    record = replace(
+        sample_record(sample_episodes()[0]),
+        spans=tuple(Span("component", "planning", started_s, ended_s) for started_s, ended_s in spans),
+    )
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(sample_description(), sample_episodes())
+        database.write(number, record)
+        (row,) = database.span_totals(number).to_dict("records")
+    assert (row["count"], row["ended"]) == (6, 5)
+    assert row["total_s"] == pytest.approx(2.0 + 4.0 + 1.5 + 1.0 + 0.5)
+    assert row["covered_s"] == pytest.approx(5.0 + 1.0 + 0.5)
 
 
 def test_what_episodes_ran_with_is_kept_once_and_counted(path: Path) -> None:

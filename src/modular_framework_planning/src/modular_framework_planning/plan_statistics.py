@@ -80,12 +80,14 @@ class PlanStatistics:
         checks: of the collision checker by part of the plan; empty for a checker that does not count.
         refusals: the two bodies that refused the most checks; None where none did.
         run: what planned; None where the request was refused before.
+        processor_s: processor time of the plan [s], which plans at the same time do not lengthen by waiting.
     """
 
     phases_s: Mapping[str, float] = field(default_factory=dict)
     checks: Mapping[str, CheckCounts] = field(default_factory=dict)
     refusals: Refusals | None = None
     run: PlannerRun | None = None
+    processor_s: float = 0.0
 
     @property
     def summary(self) -> str:
@@ -110,6 +112,7 @@ class PlanStatistics:
         """Returns what ~planning_report says, for json.dumps."""
         return {
             "phases_s": dict(self.phases_s),
+            "processor_s": self.processor_s,
             "checks": {part: asdict(counts) for part, counts in self.checks.items()},
             "refusals": None if self.refusals is None else asdict(self.refusals),
             "summary": self.summary,

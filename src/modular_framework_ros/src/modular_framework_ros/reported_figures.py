@@ -51,6 +51,10 @@ CHECKED = Figure("checked", "generation", "", "Grasps whose reachability was che
 REACHABLE = Figure("reachable", "generation", "", "Grasps that the arm can reach without a collision.")
 BEST_RANK = Figure("best_rank", "generation", "", "Rank of the first reachable grasp in the method's order, from 1.")
 PLANNING_TIME = Figure("planning_time_s", "planning", "s", "Time from request to answer.", Clock.WALL, Source.MEASURED)
+PROCESSOR_TIME = Figure("processor_s", "planning", "s", "Processor time of the plan.", Clock.PROCESSOR, Source.MEASURED)
+CONCURRENT = Figure(
+    "concurrent", "planning", "", "Plans made at the same time, this one included.", source=Source.MEASURED
+)
 SEARCH_TIME = Figure(
     "search_time_s", "planning", "s", "Time until the planner found a path.", Clock.WALL, Source.MEASURED
 )

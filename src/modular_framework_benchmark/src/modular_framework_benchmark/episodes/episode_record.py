@@ -99,6 +99,8 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         task_started_s=float(answer.get("task_started_s", 0.0)),
         task_s=answer.get("task_s"),
         task_wall_s=answer.get("task_wall_s"),
+        generation_s=answer.get("generation_s"),
+        method_processor_s=answer.get("method_processor_s"),
         reports=reports_of(recording),
         joints=joints,
         hand=_hand(end.folder, joints) if answer.get("held") else None,
@@ -182,15 +184,16 @@ def _states(end: EpisodeEnd) -> tuple[Span, ...]:
 
 
 def _components(end: EpisodeEnd, recording: Mapping[str, Any]) -> list[Span]:
-    return [
-        Span(
-            "component",
-            entry["component"],
-            entry["wall_begin"] - end.begun_monotonic,
-            entry["wall_begin"] - end.begun_monotonic + entry["wall_s"],
-            "",
-            not entry["succeeded"],
-            entry["reason"],
+    """Returns what the components did; the generation before the task as it was measured, not as the method says."""
+    begun, answer, found = end.begun_monotonic, end.answer, []
+    generated_s = answer.get("requested_wall", 0.0) + answer.get("generation_s", 0.0)
+    for entry in recording.get("reports", ()):
+        begin, wall_s = entry["wall_begin"], entry["wall_s"]
+        if entry["component"] == "generation" and begin < generated_s:
+            begin, wall_s = answer["requested_wall"], answer.get("generation_s", wall_s)
+            generated_s = 0.0  # there is one request
+        ended_s = begin - begun + wall_s
+        found.append(
+            Span("component", entry["component"], begin - begun, ended_s, "", not entry["succeeded"], entry["reason"])
         )
-        for entry in recording.get("reports", ())
-    ]
+    return found

@@ -27,12 +27,18 @@ from std_srvs.srv import Trigger
 from modular_framework_benchmark.episodes.bag import NODE as BAG_NODE
 from modular_framework_benchmark.episodes.bag import BagRecording
 from modular_framework_benchmark.episodes.errors import BagError, EpisodeAbortedError
+from modular_framework_benchmark.episodes.process_times import processor_time_s
 from modular_framework_benchmark.episodes.ros_recording import model_samples, write_parameters, write_recording
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, FoulError, WorldError, judge, spawn
-from modular_framework_core.task_runner.ros_episode import GENERATE_SERVICE, EpisodeError, begin_episode
+from modular_framework_core.task_runner.ros_episode import (
+    GENERATE_SERVICE,
+    EpisodeError,
+    begin_episode,
+    generate_grasps,
+)
 from modular_framework_ros.calls import CallError, request_service, wait_until
 from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
 
@@ -60,7 +66,7 @@ class EpisodeRequest:
         hold_s: Simulated time after the end of the task when the world is looked at [s].
         shake_s: Simulated time for which the object is shaken after that [s].
         bag: Whether all topics are recorded to a bag.
-        method: Whether the launch has a method that generates grasps.
+        method_nodes: Absolute names of the nodes of the method that generates grasps; none without a method.
         controllers: Names of the controllers that must run before the task starts.
         parameters: ROS parameters to set before.
         begun: When the episode began, by the machine's monotonic clock [s].
@@ -72,7 +78,7 @@ class EpisodeRequest:
     hold_s: float
     shake_s: float
     bag: bool
-    method: bool
+    method_nodes: list[str]
     controllers: list[str]
     parameters: dict[str, Any]
     begun: float
@@ -147,7 +153,7 @@ class EpisodeRecorder:
         answer["parts"][part] = time.monotonic() - request.begun
 
     def _begin(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
-        """Puts the objects into the world, which begins again where its time can be held."""
+        """Puts the objects into the world, which begins again where its time can be held, and asks for grasps there."""
 
         def spawn_all() -> None:
             self._samples.clear()
@@ -156,11 +162,15 @@ class EpisodeRecorder:
                 spawn(entry)
             answer["interventions"] = judge().number
 
+        answer["processor_before_s"] = processor_time_s(request.method_nodes)
         if self._time.enabled:
             begin_episode(spawn_all, SETTLE_S)
         else:
             spawn_all()
             self._time.sleep(SETTLE_S)
+        answer["requested_s"], answer["requested_wall"] = self._now() - answer["zero"], time.monotonic()
+        if self._time.enabled and generate_grasps():
+            answer["generation_s"] = time.monotonic() - answer["requested_wall"]
         self._reached(request, answer, "ready")
 
     def _run_task(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
@@ -168,7 +178,7 @@ class EpisodeRecorder:
         self._samples.ends.clear()
         answer["begin_poses"] = judge().poses
         answer["task_started_s"] = self._now() - answer["zero"]
-        started, begin = request_service(START_SERVICE, Trigger, Trigger._request_class(), 30.0), time.monotonic()
+        started = request_service(START_SERVICE, Trigger, Trigger._request_class(), 30.0)
         if not started.success:
             raise WorldError(f"the task did not start: {started.message}")
         self._wait(lambda: bool(self._samples.ends))
@@ -177,9 +187,10 @@ class EpisodeRecorder:
             "outcome": end["outcome"],
             "reason": end["reason"],
             "task_succeeded": end["succeeded"],
-            "task_wall_s": time.monotonic() - begin,
-            "task_s": self._now() - answer["zero"] - answer["task_started_s"],
+            "task_wall_s": time.monotonic() - answer["requested_wall"],
+            "task_s": self._now() - answer["zero"] - answer["requested_s"],
         }
+        answer["method_processor_s"] = processor_time_s(request.method_nodes) - answer["processor_before_s"]
         self._reached(request, answer, "task")
 
     def _check(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
@@ -228,7 +239,7 @@ class EpisodeRecorder:
         wanted |= {LIST_CONTROLLERS} if request.controllers else set()
         self._wait(lambda: wanted <= _services())
         self._wait(lambda: set(request.controllers) <= _running_controllers().keys())
-        if request.method:
+        if request.method_nodes:
             self._wait(lambda: bool(_publishers(GENERATION_SIGNAL)))
             # a method offers the service soon after, or it has none
             until = time.monotonic() + GENERATION_SERVICE_S

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.metrics.recording_files import PARAMETERS, RECORDING, TRACKING, TRAJECTORY
-from modular_framework_ros.reported_figures import ATTEMPTS, CLEARANCE, PLANNING_TIME
+from modular_framework_ros.reported_figures import ATTEMPTS, CLEARANCE, CONCURRENT, PLANNING_TIME, PROCESSOR_TIME
 
 OF_A_RUN = ("run_id", "roslaunch", "seed")
 """Parameters that differ between episodes of the same configuration."""
@@ -221,9 +221,9 @@ def _planning(samples: Samples, zero: float) -> list[dict[str, Any]]:
     """Returns the reports of plans, each with the motion that has its start and its goal."""
     shown = [path for path in samples.paths if path.trajectory]
     reports = []
-    for wall, report in samples.planning:
-        if report["kind"] not in ("plan", "cartesian_path", "sequence"):
-            continue
+    plans = [entry for entry in samples.planning if entry[1]["kind"] in ("plan", "cartesian_path", "sequence")]
+    spans = [(wall - float(report.get("planning_time_s") or 0.0), wall) for wall, report in plans]
+    for wall, report in plans:
         work = {
             "component": "planning",
             "name": str(report.get("request_name") or report["kind"]),
@@ -234,8 +234,11 @@ def _planning(samples: Samples, zero: float) -> list[dict[str, Any]]:
         motion = next((path for path in shown if work["succeeded"] and _belongs(path, report)), None)
         if motion is not None:
             shown.remove(motion)
-        figures = {PLANNING_TIME.name: wall_s} | {
-            key: report[key] for key in (CLEARANCE.name, ATTEMPTS.name) if isinstance(report.get(key), int | float)
+        at_once = sum(begin < wall and end > wall - wall_s for begin, end in spans)
+        figures = {PLANNING_TIME.name: wall_s, CONCURRENT.name: max(at_once, 1)} | {
+            figure.name: report[figure.name]
+            for figure in (CLEARANCE, ATTEMPTS, PROCESSOR_TIME)
+            if isinstance(report.get(figure.name), int | float)
         }
         times_s = (report.get("started", report["time"]) - zero, report["time"] - zero)
         trajectory = motion.trajectory[-1].joint_trajectory if motion is not None else None

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import roslaunch.config
 import roslaunch.core
 import roslaunch.rlutil
+import roslaunch.xmlloader
 import rospkg
 
 from modular_framework_benchmark.episodes.errors import SettingsError
@@ -39,6 +41,7 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         check_arguments(path, given)
         values = argument_values(path, given)
         controllers: tuple[str, ...] = ()
+        method_nodes = _nodes_of(values.get(METHOD, ""))
         if values.get("robot_package") and values.get("controller_file"):
             folder = Path(rospkg.RosPack().get_path(values["robot_package"])) / "controllers"
             controllers = read_controller_file(folder / values["controller_file"]).controllers
@@ -49,7 +52,18 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         settings.launch_file,
         arguments,
         {"/task/wait_for_start": True, **settings.parameters},
-        bool(values.get(METHOD, "")),
+        method_nodes,
         controllers,
         values.get("wait_for_planning", "").lower() in TRUTHS,
     )
+
+
+def _nodes_of(method: str) -> tuple[str, ...]:
+    """Returns the names of the nodes in the launch file of a method; "" has none."""
+    if not method:
+        return ()
+    package, _, file = method.partition("/")
+    path = method if not package else roslaunch.rlutil.resolve_launch_arguments([package, file])[0]
+    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False)
+    config = roslaunch.config.load_config_default([path], None, loader=loader, verbose=False, assign_machines=False)
+    return tuple(node.namespace + node.name for node in config.nodes)

@@ -95,7 +95,7 @@ class TaskEpisodeRunner:
             "hold_s": settings.success.hold_s,
             "shake_s": settings.shake_s,
             "bag": settings.record_bag,
-            "method": launch.has_method,
+            "method_nodes": list(launch.method_nodes),
             "controllers": list(launch.controllers),
             "parameters": {"/seed": end.spec.seed, "/task/record_directory": str(end.folder / TASK_RECORDS)},
             "begun": end.begun_monotonic,

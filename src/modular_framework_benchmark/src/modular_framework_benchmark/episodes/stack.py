@@ -39,7 +39,7 @@ class StackLaunch:
         launch_file: Its name.
         arguments: Launch arguments.
         parameters: ROS parameters over those of the launch files, by absolute name.
-        has_method: Whether there is a method that generates grasps.
+        method_nodes: Absolute names of the nodes of the method that generates grasps; none without a method.
         controllers: Names of the controllers that are started.
         can_restart: Whether its world can begin again as after a cold start.
     """
@@ -48,7 +48,7 @@ class StackLaunch:
     launch_file: str
     arguments: Mapping[str, str]
     parameters: Mapping[str, Any]
-    has_method: bool
+    method_nodes: tuple[str, ...]
     controllers: tuple[str, ...]
     can_restart: bool
 

@@ -115,14 +115,13 @@ class _Reader:
         design = read_design(entries.get("design"), factors, reading) if factors else []
         self._note_unpaired(design, compared)
         numbers = self._numbers(len(design))
-        limit = numbers["time_limit"] or 0.0
-        metrics, measures = self._metrics(float(limit))
+        combinations = self._combinations(factors, design)
+        metrics, measures = self._metrics(combinations)
         self._note_metric_names(metrics, factors)
         stopping = self._stopping(metrics)
         if "description" in entries:
             reading.text(entries["description"], "description")
         record = self._record()
-        combinations = self._combinations(factors, design)
         if len(reading.faults):
             return None
         description = ExperimentDescription(
@@ -133,7 +132,7 @@ class _Reader:
             factors=tuple(Factor(factor, tuple(levels)) for factor, levels in factors.items()),
             compared=compared,
             metrics=metrics,
-            time_limit_s=float(limit),
+            time_limit_s=float(numbers["time_limit"] or 0.0),
             confidence=float(numbers["confidence"] or 0.0),
             sequential=stopping.kind is StoppingKind.SEQUENTIAL,
             source=str(self._path.resolve()),
@@ -217,10 +216,12 @@ class _Reader:
             return Stopping()
         return read_stopping(mapping, metrics, self._reading)
 
-    def _metrics(self, limit_s: float) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
+    def _metrics(self, combinations: tuple[Combination, ...]) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
         if self._mode is None:  # which metrics there are is not known
             return (), ()
-        return read_metrics(self._root.entries.get("metrics"), self._known.get(self._mode, {}), limit_s, self._reading)
+        budgets = {one.settings.get("planning_time", one.settings.get("timeout")) for one in combinations}
+        budget_s = budgets.pop() if len(budgets) == 1 else None
+        return read_metrics(self._root.entries.get("metrics"), self._known.get(self._mode, {}), budget_s, self._reading)
 
     def _note_metric_names(self, metrics: tuple[Metric, ...], factors: Levels) -> None:
         node = self._root.entries.get("metrics")

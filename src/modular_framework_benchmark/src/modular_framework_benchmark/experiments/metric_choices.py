@@ -14,6 +14,7 @@ from modular_framework_benchmark.records.experiment import Direction, Metric, Me
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
+from modular_framework_ros.reported_figures import Clock
 
 OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description", "lowest", "highest")
 KNOWN_KEYS = ("metric", "limit")
@@ -23,18 +24,18 @@ Measure = Any  # name of a known metric, or the mapping of a user's function
 
 
 def read_metrics(
-    node: Node | None, known: Map[str, Metric], time_limit_s: float, reading: Reading
+    node: Node | None, known: Map[str, Metric], budget_s: float | None, reading: Reading
 ) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
     """Returns the metrics, and how the episodes are told of them.
 
     Args:
         node: The list of the file; None where there is none: all that are known.
         known: The metrics of the mode, by name.
-        time_limit_s: Limit of durations that have none of their own [s].
+        budget_s: Real time that a planner or solver is given, the limit of its times [s]; None without one.
         reading: Where faults are noted.
     """
     if node is None:
-        return tuple(_limited(metric, time_limit_s) for metric in known.values()), tuple(known)
+        return tuple(_limited(metric, budget_s) for metric in known.values()), tuple(known)
     metrics: dict[str, Metric] = {}
     measures: list[Measure] = []
     for item in reading.items(node, "metrics", "[success, task_time]") or ():
@@ -44,16 +45,19 @@ def read_metrics(
         metric, measure = found
         if metric.name.lower() in (name.lower() for name in metrics):
             reading.faults.add(item.location, f"metrics has '{metric.name}' twice; remove one, or give it another name")
-        metrics[metric.name] = _limited(metric, time_limit_s)
+        metrics[metric.name] = _limited(metric, budget_s)
         measures.append(measure)
     return tuple(metrics.values()), tuple(measures)
 
 
-def _limited(metric: Metric, time_limit_s: float) -> Metric:
-    if metric.kind is MetricKind.TIME and metric.limit is None:
-        # what fails has held for no time at all, and has taken all the time there was
-        return dataclasses.replace(metric, limit=0.0 if metric.better is Direction.HIGHER else time_limit_s)
-    return metric
+def _limited(metric: Metric, budget_s: float | None) -> Metric:
+    """Gives a duration its own limit; the time limit of an episode is none, for it counts by another clock."""
+    if metric.kind is not MetricKind.TIME or metric.limit is not None:
+        return metric
+    if metric.better is Direction.HIGHER:
+        return dataclasses.replace(metric, limit=0.0)  # what fails has held for no time at all
+    within_budget = metric.component in ("planning", "kinematics") and metric.clock is Clock.WALL
+    return dataclasses.replace(metric, limit=budget_s if within_budget else None)
 
 
 def _read_metric(item: Node, known: Map[str, Metric], reading: Reading) -> tuple[Metric, Measure] | None:

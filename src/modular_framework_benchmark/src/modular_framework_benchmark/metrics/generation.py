@@ -14,9 +14,17 @@ def _first(episode: EpisodeMeasurements) -> ComponentReport | None:
 
 
 def generation_time(episode: EpisodeMeasurements) -> float | None:
-    """Real time that the first generation of grasps took [s]; None if it gave no grasp."""
+    """Real time from the request for grasps to the answer, measured from outside [s]; None without a grasp or request.
+
+    In the mode `grasps` it is the time of the search alone.
+    """
     first = _first(episode)
-    return first.wall_s if first is not None and first.succeeded else None
+    return episode.generation_s if first is not None and first.succeeded else None
+
+
+def method_processor_time(episode: EpisodeMeasurements) -> float | None:
+    """Processor time of the method's processes, children included, until the end of the task [s]."""
+    return episode.method_processor_s
 
 
 def generation_success(episode: EpisodeMeasurements) -> float | None:

@@ -145,8 +145,12 @@ class EpisodeMeasurements:
         cause: Why it did not succeed.
         states: What the states did, by wall time since the episode began.
         task_started_s: When the task was started [s].
-        task_s: Simulated time from the start of the task to its end [s]; None if it did not end.
+        task_s: Simulated time from the request for grasps, or else from when the objects rest, to the end of the task
+            [s]; None if it did not end.
         task_wall_s: The same in real time [s].
+        generation_s: Real time from the request for grasps to the answer [s]; None if nothing was requested.
+        method_processor_s: Processor time of the method's processes from before the objects were placed to the end of
+            the task [s]; None if it did not end.
         reports: What the components reported, in the order they ended.
         joints: Measured joints; None if none were recorded.
         tracking: One entry a trajectory controller.
@@ -166,6 +170,8 @@ class EpisodeMeasurements:
     task_started_s: float = 0.0
     task_s: float | None = None
     task_wall_s: float | None = None
+    generation_s: float | None = None
+    method_processor_s: float | None = None
     reports: tuple[ComponentReport, ...] = ()
     joints: JointSamples | None = None
     tracking: tuple[TrackingSamples, ...] = ()

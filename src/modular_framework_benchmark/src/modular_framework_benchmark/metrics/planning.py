@@ -7,11 +7,21 @@ import math
 
 from modular_framework_benchmark.metrics import motion_figures
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, Motion
-from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, SEARCH_TIME
+from modular_framework_ros.reported_figures import CLEARANCE, CONCURRENT, PLANNING_TIME, PROCESSOR_TIME, SEARCH_TIME
 
 
 def _motions(episode: EpisodeMeasurements) -> list[Motion]:
-    return [report.motion for report in episode.of_component("planning") if report.succeeded and report.motion]
+    """Returns the planned motions that were executed; all of them if none was, as when planning alone is measured.
+
+    A plan that only checks whether there is a motion, and is made again later, counts once.
+    """
+    planned = [report.motion for report in episode.of_component("planning") if report.succeeded and report.motion]
+    executed = {_key(report.motion) for report in episode.of_component("execution") if report.motion}
+    return [motion for motion in planned if _key(motion) in executed] or planned
+
+
+def _key(motion: Motion) -> tuple[tuple[str, ...], bytes]:
+    return motion.joints, motion.positions.tobytes()
 
 
 def _mean(values: list[float]) -> float | None:
@@ -19,14 +29,21 @@ def _mean(values: list[float]) -> float | None:
 
 
 def planning_time(episode: EpisodeMeasurements) -> float | None:
-    """Mean time a successful plan took, as the planner reports it [s]."""
-    return _mean(
-        [
-            report.figures.get(PLANNING_TIME, report.wall_s)
-            for report in episode.of_component("planning")
-            if report.succeeded
-        ]
-    )
+    """Mean real time of a plan from request to answer, failed plans included [s].
+
+    Plans that are made at the same time wait for each other: see `concurrent_plans`.
+    """
+    return _mean([report.figures.get(PLANNING_TIME, report.wall_s) for report in episode.of_component("planning")])
+
+
+def planning_processor_time(episode: EpisodeMeasurements) -> float | None:
+    """Mean processor time of a plan, failed plans included [s]; plans at the same time do not add to each other."""
+    return _mean(episode.values_of(PROCESSOR_TIME))
+
+
+def concurrent_plans(episode: EpisodeMeasurements) -> float | None:
+    """Greatest number of plans that were made at the same time."""
+    return max(episode.values_of(CONCURRENT), default=None)
 
 
 def search_time(episode: EpisodeMeasurements) -> float | None:
@@ -41,17 +58,17 @@ def planning_success(episode: EpisodeMeasurements) -> float | None:
 
 
 def path_length(episode: EpisodeMeasurements) -> float | None:
-    """Mean length of the planned paths through joint space [rad]."""
+    """Mean length of the planned paths that were executed, through joint space [rad]."""
     return _mean([motion_figures.path_length(motion.positions) for motion in _motions(episode)])
 
 
 def motion_duration(episode: EpisodeMeasurements) -> float | None:
-    """Mean duration of the planned motions [s]."""
+    """Mean duration of the planned motions that were executed [s]."""
     return _mean([motion_figures.motion_duration(motion.times_s) for motion in _motions(episode)])
 
 
 def smoothness(episode: EpisodeMeasurements) -> float | None:
-    """Mean log dimensionless jerk of the planned motions; nearer to 0 is smoother."""
+    """Mean log dimensionless jerk of the planned motions that were executed; nearer to 0 is smoother."""
     values = [motion_figures.smoothness(motion.times_s, motion.positions) for motion in _motions(episode)]
     return _mean([value for value in values if value is not None])
 

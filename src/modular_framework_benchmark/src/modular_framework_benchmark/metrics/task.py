@@ -18,12 +18,15 @@ def success(episode: EpisodeMeasurements) -> float | None:
 
 
 def task_time(episode: EpisodeMeasurements) -> float | None:
-    """Simulated time from the start of the task to its end [s]; None for a task that did not succeed."""
+    """Simulated time from the request for grasps to the end of the task [s]; None for a task that did not succeed.
+
+    Computing takes no simulated time where nodes hold it: see `task_wall_time` and `method_processor_time`.
+    """
     return episode.task_s if episode.status is EpisodeStatus.SUCCEEDED else None
 
 
 def task_wall_time(episode: EpisodeMeasurements) -> float | None:
-    """Real time from the start of the task to its end [s]; None for a task that did not succeed."""
+    """Real time from the request for grasps to the end of the task [s]; None for a task that did not succeed."""
     return episode.task_wall_s if episode.status is EpisodeStatus.SUCCEEDED else None
 
 

@@ -50,7 +50,10 @@ def measured_record(
         folder: Folder of the episode.
         watch: Started with the episode.
     """
-    measurements = EpisodeMeasurements(spec.settings, status, outcome, report.reason, reports=(report,), folder=folder)
+    generation_s = report.wall_s if report.component == "generation" else None
+    measurements = EpisodeMeasurements(
+        spec.settings, status, outcome, report.reason, generation_s=generation_s, reports=(report,), folder=folder
+    )
     try:
         measured = measure(spec.settings.get("metrics", ()), measurements)
     except MetricError as error:

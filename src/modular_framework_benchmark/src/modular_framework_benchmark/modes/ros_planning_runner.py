@@ -33,7 +33,7 @@ from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineS
 from modular_framework_planning.reproducible.seeded_planning import SeededPlanning
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
-from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, SEARCH_TIME, Figure
+from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, PROCESSOR_TIME, SEARCH_TIME, Figure
 
 MOTION_PERIOD_S = 0.01
 CLEARANCE_STATES = 25  # along a motion; the distances of one state cost about 0.1 s on detailed meshes
@@ -69,6 +69,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         statistics: PlanStatistics | None = None
         try:
             answer = prepared.seeded.plan(prepared.pipeline, problem.request, spec.seed)
+            statistics = answer.statistics
         except PlanningError as error:
             statistics = error.statistics
             code, reason = error.code, f"{problem.name}: {error.code.name}: {error.reason}"
@@ -83,9 +84,10 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
             started_s=started_s,
             ended_s=ended_s,
             wall_s=ended_s - started_s,
-            figures=_figures(problem, answer, spec.settings) if answer is not None else {},
+            figures=({} if statistics is None else {PROCESSOR_TIME: statistics.processor_s})
+            | (_figures(problem, answer, spec.settings) if answer is not None else {}),
             motion=_motion(answer.trajectory) if answer is not None else None,
-            ran=_ran(answer.statistics if answer is not None else statistics, prepared.model),
+            ran=_ran(statistics, prepared.model),
         )
         return measured_record(spec, _status(code), code.name, report, folder, watch)
 

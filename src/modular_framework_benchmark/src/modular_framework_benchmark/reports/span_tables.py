@@ -27,8 +27,8 @@ class SpanSummary:
         runs: How often it ran.
         failed: How often it failed.
         unended: How often it never ended; these have no duration.
-        mean_s: Mean duration of those that ended [s]; NaN without one.
-        per_episode_s: Sum of the durations, by the number of the method's episodes [s].
+        mean_s: Mean real time of those that ended [s]; NaN without one.
+        per_episode_s: Mean real time of an episode in which at least one of them ran [s].
     """
 
     kind: str
@@ -83,7 +83,7 @@ def summarise_spans(results: ExperimentResults, totals: pd.DataFrame, shown: pd.
     Args:
         results: the episodes.
         totals: a row for each kind, name and method, with the columns `kind`, `name`, the compared factor's name,
-            `count`, `ended`, `failed` and `total_s`.
+            `count`, `ended`, `failed`, `total_s` and `covered_s`.
         shown: spans of some episodes, which give the order in which states follow each other.
     """
     methods = methods_of(results)
@@ -99,7 +99,7 @@ def summarise_spans(results: ExperimentResults, totals: pd.DataFrame, shown: pd.
             int(row["failed"]),
             int(row["count"] - row["ended"]),
             float(row["total_s"] / row["ended"]) if row["ended"] else float("nan"),
-            float(row["total_s"] / episodes[row["method"]]),
+            float(row["covered_s"] / episodes[row["method"]]),
         )
         for row in rows
         if row["method"] in episodes.index

@@ -300,4 +300,5 @@ def spans_table(content: ReportContent, kind: str) -> Table:
         if item.kind == kind
     )  # fmt: skip
     columns = (kind, "method", "runs", "failed", "never ended", "mean [s]", "mean per episode [s]")
-    return Table(f"spans_{kind}", f"What each {kind} took.", columns, rows)
+    caption = f"Real time that each {kind} took; in the mean per episode, work at the same time counts once."
+    return Table(f"spans_{kind}", caption, columns, rows)

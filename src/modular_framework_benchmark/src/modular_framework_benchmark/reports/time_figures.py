@@ -58,10 +58,10 @@ def components_figure(summaries: Sequence[SpanSummary], methods: Sequence[str]) 
             for index, name in enumerate(names)
         ]
     )  # fmt: skip
-    stacked_bars(figure, height=140 + 50 * len(methods), value_title="mean time per episode [s]")
+    stacked_bars(figure, height=140 + 50 * len(methods), value_title="mean real time per episode [s]")
     summary = (
-        "Time that each component takes in an episode, mean over all episodes of the method: one in which a component "
-        "did not run counts as 0 s."
+        "Real time in which a component works, mean over all episodes of the method. Work at the same time, such as "
+        "concurrent plans, counts once; an episode in which a component did not run counts as 0 s."
     )
     return NamedFigure("components", "Time by component", summary, figure)
 
@@ -98,7 +98,7 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
         ticks="",
         showgrid=False,
     )
-    figure.update_xaxes(title_text="time since the episode began [s]", rangemode="tozero")
+    figure.update_xaxes(title_text="real time since the episode began [s]", rangemode="tozero")
     summary = (
         "States (wide bars) and components (narrow grey bars) of an episode. Red edges: failed; hatched: it never "
         "ended. For each method a success of median length and the first failure of the most frequent cause."

@@ -8,7 +8,7 @@ from collections.abc import Collection
 from typing import Any
 
 import pandas as pd
-from sqlalchemy import Connection, Select, column, func, select, table
+from sqlalchemy import Connection, Select, case, column, func, select, table
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.results import ExperimentResults
@@ -90,23 +90,34 @@ def span_totals(connection: Connection, number: int, description: ExperimentDesc
 
     Returns:
         A row for each kind, name and method, with the columns `kind`, `name`, the compared factor's name, `count`,
-        `ended` (how many have an end), `failed` and `total_s` (sum of the durations of those that ended).
+        `ended` (how many have an end), `failed`, `total_s` (sum of the durations of those that ended) and `covered_s`
+        (time in which at least one of them ran: spans of an episode that overlap count once).
     """
-    ended = SPANS.c.ended_s.is_not(None)
-    statement = (
-        select(SPANS.c.kind, SPANS.c.name, EPISODES.c.configuration)
-        .add_columns(func.count().label("count"), func.count(SPANS.c.ended_s).label("ended"))
-        .add_columns(func.count().filter(SPANS.c.failed).label("failed"))
-        .add_columns(func.sum(SPANS.c.ended_s - SPANS.c.started_s).filter(ended).label("total_s"))
+    one_kind = (SPANS.c.runid, SPANS.c.kind, SPANS.c.name)
+    order = (SPANS.c.started_s, SPANS.c.place)
+    before_s = func.max(SPANS.c.ended_s).over(partition_by=one_kind, order_by=order, rows=(None, -1))
+    alone_s = SPANS.c.ended_s - case((before_s > SPANS.c.started_s, before_s), else_=SPANS.c.started_s)
+    spans = (
+        select(SPANS.c.kind, SPANS.c.name, SPANS.c.started_s, SPANS.c.ended_s, SPANS.c.failed, EPISODES.c.configuration)
+        .add_columns(case((alone_s > 0.0, alone_s), else_=0.0).label("alone_s"))
         .join_from(EPISODES, SPANS, SPANS.c.runid == EPISODES.c.id)
         .where(EPISODES.c.descriptionid == number)
-        .group_by(SPANS.c.kind, SPANS.c.name, EPISODES.c.configuration)
+        .subquery()
+    )
+    statement = (
+        select(spans.c.kind, spans.c.name, spans.c.configuration)
+        .add_columns(func.count().label("count"), func.count(spans.c.ended_s).label("ended"))
+        .add_columns(func.count().filter(spans.c.failed).label("failed"))
+        .add_columns(func.sum(spans.c.ended_s - spans.c.started_s).label("total_s"))  # without those that did not end
+        .add_columns(func.sum(spans.c.alone_s).label("covered_s"))
+        .group_by(spans.c.kind, spans.c.name, spans.c.configuration)
     )
     columns = _read_columns(connection, statement)
     columns[description.compared] = [json.loads(each)[description.compared] for each in columns.pop("configuration")]
     names = ["kind", "name", description.compared]
     sums = pd.DataFrame(columns).fillna({"total_s": 0.0})
-    return sums.groupby(names, as_index=False, sort=True)[["count", "ended", "failed", "total_s"]].sum()
+    sums = sums.groupby(names, as_index=False, sort=True)
+    return sums[["count", "ended", "failed", "total_s", "covered_s"]].sum()
 
 
 def snapshot_values(

@@ -32,7 +32,7 @@ def begin_episode(spawn: Callable[[], None], settle_s: float) -> None:
     """Begins an episode; simulated time has to be held by the caller, from here to the end of the episode.
 
     In this sequence: the world begins again, objects are spawned while time stands still, they settle, the managers
-    forget what was added, a method that offers the service ``generate_grasps`` generates grasps.
+    forget what was added. Grasps are generated next, see :func:`generate_grasps`.
 
     Args:
         spawn: Puts the objects of the episode into the world.
@@ -46,22 +46,22 @@ def begin_episode(spawn: Callable[[], None], settle_s: float) -> None:
         spawn()
         if settle_s > 0.0:
             SimulatedTime().sleep(settle_s)
-        services = set(rosservice.get_service_list())
-        _forget_messages(services)
-        if rospy.resolve_name(GENERATE_SERVICE) in services:
-            generate_grasps()
+        _forget_messages(set(rosservice.get_service_list()))
     except CallError as error:
         raise EpisodeError(f"the episode cannot begin: {error}") from error
 
 
-def generate_grasps() -> None:
-    """Has the method generate grasps; that there are none is for the task to find out.
+def generate_grasps() -> bool:
+    """Asks the method to generate grasps; returns whether it offers the service. The task handles an empty result.
 
     Raises:
         CallError: the method does not answer.
     """
+    if rospy.resolve_name(GENERATE_SERVICE) not in rosservice.get_service_list():
+        return False
     answer = request_service(GENERATE_SERVICE, Trigger, TriggerRequest(), GENERATION_TIMEOUT_S)
     rospy.loginfo("%s: %s", GENERATE_SERVICE, answer.message)
+    return True
 
 
 def _forget_messages(services: set[str]) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -124,7 +125,7 @@ def answer(
     Raises:
         PlanningError: with code and reason, already reported.
     """
-    name = message.goal_constraints[0].name if message.goal_constraints else ""
+    name, begun_s = message.goal_constraints[0].name if message.goal_constraints else "", time.monotonic()
     details: dict[str, Any] = {
         "group": message.group_name,
         "planner_id": message.planner_id,
@@ -141,8 +142,10 @@ def answer(
             request = read_request(context, change(context.monitor.snapshot()), message, cancelled)
             scene = request.scene
             details["start"] = dict(zip(scene.model.joint_names, scene.positions.tolist(), strict=True))
+            begun_s = time.monotonic()
             found = context.plan(request)
     except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
+        details["planning_time_s"] = time.monotonic() - begun_s
         code = context.reporter.failure("plan", error, **details)
         if isinstance(error, PlanningError):
             context.markers.show_contacts(error.contacts)

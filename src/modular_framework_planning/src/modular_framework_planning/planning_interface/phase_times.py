@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -27,9 +27,14 @@ SETUP, GOALS, SEARCH, REPAIR, SHORTENING, TIMING, CHECK = (
 
 
 class PhaseTimes:
-    """Adds up the seconds and the collision checks of each part; a part inside another one counts for itself alone."""
+    """Adds up the seconds and the collision checks of each part; a part inside another one counts for itself alone.
 
-    def __init__(self) -> None:
+    Args:
+        processor_clock: processor time of what plans [s]: of its thread, or of its process.
+    """
+
+    def __init__(self, processor_clock: Callable[[], float] = time.thread_time) -> None:
+        self._processor_clock, self._processor_begun_s = processor_clock, processor_clock()
         self.seconds: dict[str, float] = {}
         self._checks: dict[str, NDArray[np.int64]] = {}
         self._checker: CountsChecks | None = None
@@ -65,12 +70,13 @@ class PhaseTimes:
 
     def statistics(self) -> PlanStatistics:
         """Returns what was measured until now."""
+        processor_s = self._processor_clock() - self._processor_begun_s
         if self._checker is None:
-            return PlanStatistics(dict(self.seconds), run=self.run)
+            return PlanStatistics(dict(self.seconds), run=self.run, processor_s=processor_s)
         counts = {}
         for phase, row in self._checks.items():
             asked, free, touching, states, exactly, by_spheres = row.tolist()
             if asked:
                 undecided = asked - free - touching
                 counts[phase] = CheckCounts(asked, free, touching, by_spheres, undecided, exactly, states)
-        return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals(), self.run)
+        return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals(), self.run, processor_s)

@@ -123,7 +123,7 @@ class PlanningPipeline:
         Raises:
             PlanningError: with the code and the reason; a partial result is never returned.
         """
-        phases = PhaseTimes()
+        phases = PhaseTimes(time.process_time if repeatable else time.thread_time)
         try:
             return self._plan(request, repeatable, phases)
         except PlanningError as error:
