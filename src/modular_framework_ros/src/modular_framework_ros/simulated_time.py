@@ -115,6 +115,15 @@ class SimulatedTime:
                 f"{latest()}; is its publisher running?"
             )
 
+    def now(self) -> rospy.Time | None:
+        """Returns the time at which the simulation stands; None where it is not held, and the clock is all there is.
+
+        Raises:
+            CallError: the simulation does not answer.
+        """
+        answer = self._advance(0.0) if self.enabled else None
+        return answer.stamp if answer is not None and answer.held else None
+
     def wait_until(self, condition: Callable[[], bool], timeout_s: float, period_s: float) -> bool:
         """Waits for a condition that simulated time brings about; returns whether it held in time.
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ import rospy
 from sensor_msgs.msg import PointCloud2
 
 from modular_framework_core.grasp_generation.grasp_candidates import NoCandidatesError
+from modular_framework_core.grasp_generation.wait_limit import WaitLimit
 from modular_framework_ros.calls import wait_until
 from modular_framework_ros.point_clouds import PointCloudError, point_array
 from modular_framework_ros.simulated_time import SimulatedTime
@@ -21,6 +23,8 @@ Array = npt.NDArray[np.float64]
 
 TRANSFORM_TIMEOUT_S, HELD_TRANSFORM_TIMEOUT_S = 2.0, 0.3
 """Longest wait for transforms [s of real time]; the second where nodes hold simulated time."""
+STANDSTILL_S = 300.0
+"""Longest wait for a cloud in real time [s], for a world that is paused, or whose time is held while a camera draws."""
 WARNING_PERIOD_S = 30.0
 BUFFER_BYTES = 1 << 25
 
@@ -61,7 +65,7 @@ class CloudSource:
         Args:
             topic: Topic of the cloud.
             frame: Frame of the result.
-            timeout_s: Longest wait [s of real time].
+            timeout_s: Longest wait [s of the ROS clock; of real time for a publisher].
 
         Raises:
             NoCandidatesError: There is none in time, or it cannot be used; the text says why.
@@ -104,16 +108,28 @@ class CloudSource:
         return self._transforms.stamps(frame, others, stamp, timeout_s)
 
     def _message(self, topic: str, timeout_s: float) -> PointCloud2:
-        """Returns the first message that shows the world as it is now, or later."""
-        begun, messages = rospy.Time.now(), []
+        """Returns the first message that shows the world as it is now, or later.
+
+        Where time is held, it is the message of the very time: a later one is of the world before it began again.
+        """
+        held, messages = self._time.now(), list[PointCloud2]()
+        begun = held or rospy.Time.now()
 
         def keep(message: PointCloud2) -> None:
-            if message.header.stamp >= begun or message.header.stamp.is_zero():
+            stamp = message.header.stamp
+            if stamp.is_zero() or stamp == begun or (held is None and stamp > begun):
                 messages.append(message)
 
         subscriber = rospy.Subscriber(topic, PointCloud2, keep, queue_size=1, buff_size=BUFFER_BYTES)
+        limit, since_s = WaitLimit(), time.monotonic()
+
+        def is_over() -> bool:
+            real_s = STANDSTILL_S if subscriber.get_num_connections() else timeout_s
+            return limit.is_exceeded(rospy.get_time(), timeout_s) or time.monotonic() - since_s > real_s
+
         try:
-            if not wait_until(lambda: bool(messages), timeout_s):
+            wait_until(lambda: bool(messages) or is_over(), STANDSTILL_S)
+            if not messages:
                 published = subscriber.get_num_connections()
                 raise NoCandidatesError(
                     f"no point cloud arrived on topic '{subscriber.resolved_name}' within {timeout_s:g} s, "

@@ -45,6 +45,8 @@ SCENE_PERIOD_S = 0.25
 SETTINGS_PERIOD_S = 2.0
 """Time between two readings of the parameters while the scene is watched [s]: each is two dozen calls of the master."""
 WAITING_PERIOD_S = 10.0
+WAITING_TASK = "/task/wait_for_start"
+"""Parameter that says whether the task waits until it is asked to start."""
 
 
 class Kept(Enum):
@@ -126,12 +128,15 @@ class GraspGenerator:
         """Generates for each object that appears, also when it was there before, or was moved, until ROS shuts down.
 
         With ``/wait_for_planning`` it generates once, and on request only from then on: what it sees when would depend
-        on the load of the machine.
+        on the load of the machine. With a task that waits for its start it generates on request only: whoever starts
+        the task asks for grasps first, and a second generation at the same time would slow the one that is measured.
         What may still arrive is waited for, at most ``~scene_timeout`` of the ROS clock: an object that is not
         there yet, a service that does not answer in time on a busy machine.
         """
         before: list[SceneObject] = []
-        wait_limit: WaitLimit | None = WaitLimit()  # None: every object that is there has been handled
+        on_request = self._time.enabled and bool(rospy.get_param(WAITING_TASK, False))
+        # None: every object that is there has been handled
+        wait_limit: WaitLimit | None = None if on_request else WaitLimit()
         scene_was_read = False
         settings, settings_read_s = read_settings(), time.monotonic()
         while not rospy.is_shutdown():
