@@ -74,6 +74,13 @@ def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_st
 
     assert warm.status is EpisodeStatus.SUCCEEDED, f"{warm.cause}\n{(tmp_path / 'warm/log.txt').read_text()}"
     assert warm.snapshot["final_objects"] == cold.snapshot["final_objects"]
+    generations = [(tmp_path / name / "log.txt").read_text().count(" were stored.") for name in ("cold", "warm")]
+    assert generations == [2, 1]  # once to warm up, and then once in each episode
+    for record in (cold, warm):
+        assert (record.metrics["method_processor_time"] or 0.0) > 0.0
+        assert (record.metrics["generation_time"] or 0.0) < (record.metrics["task_wall_time"] or 0.0)
+        assert 1.0 <= (record.metrics["concurrent_plans"] or 0.0) <= 3.0
+        assert (record.metrics["planning_processor_time"] or 0.0) > 0.0
     motions = [pd.read_parquet(tmp_path / name / "trajectory.parquet") for name in ("cold", "warm")]
     pd.testing.assert_frame_equal(*motions, check_exact=True)
 

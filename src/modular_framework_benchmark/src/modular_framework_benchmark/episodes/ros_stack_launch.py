@@ -23,6 +23,8 @@ DEFAULT_ARGUMENTS = {"wait_for_planning": "true", "real_time_factor": "0"}
 """Launch arguments of episodes that do not set them: simulated time waits for computations, and else runs as fast as
 it can, so that an episode does not depend on how busy the machine is."""
 TRUTHS = ("true", "1")
+LAUNCH_SEED = "/seed"
+"""Seed with which move_group starts its worker for seeded plans before the first one; each episode sets its own."""
 
 
 def resolve_launch(settings: TaskSettings) -> StackLaunch:
@@ -51,7 +53,7 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         settings.package,
         settings.launch_file,
         arguments,
-        {"/task/wait_for_start": True, **settings.parameters},
+        {"/task/wait_for_start": True, LAUNCH_SEED: 0, **settings.parameters},
         method_nodes,
         controllers,
         values.get("wait_for_planning", "").lower() in TRUTHS,
