@@ -207,6 +207,13 @@ def test_a_joint_moved_while_no_controller_ran_is_not_sent_back_when_one_starts(
     assert [joint.command for joint in loop.robot_hw.joints] == [0.5, 0.6]
 
 
+def test_a_controller_that_starts_on_resting_joints_brings_nothing_to_rest(start: Callable[..., Any]) -> None:
+    loop = start(stop_trajectory_duration=0.5)
+    assert not loop.controllers["c"].moving  # a simulation whose time is held would let time pass for it
+    loop.step()
+    assert not loop.controllers["c"].moving
+
+
 def test_a_robot_at_a_tenth_of_its_speed_takes_ten_times_as_long_on_the_same_path(start: Callable[..., Any]) -> None:
     tight = {"trajectory": 0.03, "goal": 0.001}
     loop = start(constraints={"a": tight, "b": tight})

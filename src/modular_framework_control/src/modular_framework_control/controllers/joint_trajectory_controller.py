@@ -28,6 +28,7 @@ from modular_framework_control.trajectory.goal_validation import GoalRules, Vali
 from modular_framework_control.trajectory.joint_trajectory import (
     POSITION,
     SHORTEST_SEGMENT_S,
+    VELOCITY,
     Array,
     Track,
     splice,
@@ -48,6 +49,8 @@ from modular_framework_control.trajectory.trajectory_plan import TrajectoryPlan
 from modular_framework_ros.node_handle import NodeHandle, read_bool, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.joint_trajectory_controller")
+AT_REST = 0.01
+"""Speed below which a joint needs no braking when the controller starts [rad/s or m/s]."""
 
 
 class JointTrajectoryController(Controller):
@@ -169,7 +172,8 @@ class JointTrajectoryController(Controller):
             raise ControllerError(self._unmeasured)
         self._plan.hold(self._actual[POSITION], time_s)
         self._rest()
-        self._stop()  # the joints may still move
+        if np.abs(self._actual[VELOCITY]).max(initial=0.0) > AT_REST:
+            self._stop()
         self._running = True
 
     def stopping(self, time_s: float) -> None:
