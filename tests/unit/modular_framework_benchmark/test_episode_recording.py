@@ -3,11 +3,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+import pytest
 import rospy
+from control_msgs.msg import GripperCommandActionGoal, JointTrajectoryControllerState
 from sensor_msgs.msg import JointState
 
-from modular_framework_benchmark.episodes.ros_recording import joint_states_in_turn, missing_turns
+from modular_framework_benchmark.episodes.ros_recording import joint_states_in_turn, missing_turns, write_recording
+from modular_framework_benchmark.episodes.ros_samples import Samples
+from modular_framework_benchmark.results.lerobot_frames import ACTION, read_frames
 
 RATE = 50.0
 STEP_S = 1.0 / 240.0
@@ -45,3 +51,20 @@ def test_lost_states_are_counted() -> None:
     assert missing_turns(times_s, RATE) == 0
     assert missing_turns(np.delete(times_s, [10, 11, 40]), RATE) == 3
     assert missing_turns(times_s[:0], RATE) == 0
+
+
+def test_the_action_of_a_learner_has_the_gripper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rospy, "get_time", lambda: 0.0)
+    samples = Samples()
+    samples.joints = states([0.1, 0.2, 0.3, 0.4], ("pan", "knuckle"))
+    arm = JointTrajectoryControllerState(joint_names=["pan"])
+    arm.header.stamp, arm.desired.positions, arm.actual.positions = rospy.Time.from_sec(0.1), [0.5], [0.5]
+    samples.controllers = [("arm", arm)]
+    close = GripperCommandActionGoal()
+    close.header.stamp, close.goal.command.position = rospy.Time.from_sec(0.25), 1.2
+    samples.gripper_goals = [("knuckle", close)]
+    write_recording(tmp_path, samples, {}, {"zero": 0.0, "simulated_s": 0.4}, None)
+    frames = read_frames(tmp_path / "trajectory.parquet", 10)
+    gripper = frames.values[ACTION][:, frames.names[ACTION].index("knuckle")]
+    assert gripper == pytest.approx([0.1, 0.2, 1.2, 1.2]), "the measured position before the first command"
+    assert "pan" in frames.names[ACTION]

@@ -50,7 +50,9 @@ def write_recording(
     poses = _object_poses(samples, list(spawned), answer)
     tracking = _within(_tracking(samples, zero), end_s)
     joints = samples.joints if turns is None else joint_states_in_turn(samples.joints, turns)
-    trajectory = _with_objects(_within(_trajectory(joints, tracking, zero), end_s), poses)
+    trajectory = _with_objects(
+        _within(_trajectory(joints, commands_of(tracking, samples.gripper_goals, zero), zero), end_s), poses
+    )
     trajectory.to_parquet(folder / TRAJECTORY)
     tracking.to_parquet(folder / TRACKING)
     content = {
@@ -173,7 +175,14 @@ def _turns_of(times_s: Any, turns: float) -> Any:
     return np.floor(times_s * turns + SAME_TIME_S)
 
 
-def _trajectory(joints: Sequence[Any], tracking: pd.DataFrame, zero: float) -> pd.DataFrame:
+def commands_of(tracking: pd.DataFrame, gripper_goals: Sequence[tuple[str, Any]], zero: float) -> pd.DataFrame:
+    """Returns what joints are commanded, from trajectory and gripper controllers: time_s, joint, desired."""
+    goals = [(goal.header.stamp.to_sec() - zero, joint, goal.goal.command.position) for joint, goal in gripper_goals]
+    columns = ["time_s", "joint", "desired"]
+    return pd.concat([tracking[columns], pd.DataFrame(goals, columns=columns)]) if goals else tracking[columns]
+
+
+def _trajectory(joints: Sequence[Any], commands: pd.DataFrame, zero: float) -> pd.DataFrame:
     """Returns a row for each time: `time_s`, and position, velocity, effort and command of each joint."""
     rows: dict[float, dict[str, float]] = {}
     for message in joints:
@@ -187,10 +196,10 @@ def _trajectory(joints: Sequence[Any], tracking: pd.DataFrame, zero: float) -> p
     frame = pd.DataFrame.from_dict(rows, orient="index").sort_index()
     frame.insert(0, "time_s", frame.index.to_numpy(dtype=float))
     frame = frame.reset_index(drop=True)
-    for joint, wanted in tracking.sort_values("time_s").groupby("joint"):
-        commands = np.searchsorted(wanted["time_s"].to_numpy(), frame["time_s"].to_numpy(), side="right") - 1
+    for joint, wanted in commands.sort_values("time_s").groupby("joint"):
+        last = np.searchsorted(wanted["time_s"].to_numpy(), frame["time_s"].to_numpy(), side="right") - 1
         values = wanted["desired"].to_numpy()
-        frame[f"{joint}/command"] = np.where(commands >= 0, values[np.maximum(commands, 0)], np.nan)
+        frame[f"{joint}/command"] = np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
     return frame
 
 
