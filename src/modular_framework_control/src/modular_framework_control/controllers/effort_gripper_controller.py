@@ -8,6 +8,7 @@ from typing import Any
 from modular_framework_control.controller_interface.pid import read_pid
 from modular_framework_control.controllers.gripper_action_controller import GripperActionController
 from modular_framework_control.hardware_interface.interfaces import EffortJointInterface
+from modular_framework_control.realtime.goal_handle import GoalStatus
 from modular_framework_ros.node_handle import NodeHandle
 
 
@@ -32,16 +33,8 @@ class EffortGripperActionController(GripperActionController):
         self._pid.reset()
         super().starting(time_s)
 
-    def stopping(self, time_s: float) -> None:
-        super().stopping(time_s)
-        self._handle.command = 0.0
-
-    def interrupted(self, time_s: float, reason: str) -> None:
-        super().interrupted(time_s, reason)
-        self._handle.command = 0.0
-
-    def failed(self, time_s: float, reason: str) -> None:
-        super().failed(time_s, reason)
+    def _end_all(self, status: GoalStatus, text: str) -> None:
+        super()._end_all(status, text)
         self._handle.command = 0.0
 
     def _apply(self, period_s: float) -> None:

@@ -124,15 +124,18 @@ class JointTrajectoryController(Controller):
         """
         if not self._running:
             raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
-        warnings = [foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance)]
+        trajectory, surplus = goal.trajectory, ""
         if self._rules.allow_partial:
-            trajectory, surplus = drop_surplus_values(goal.trajectory)
-            goal = replace(goal, trajectory=trajectory)
-            warnings.append(surplus)
-        for warning in filter(None, warnings):
-            LOGGER.warning("%s: %s", self._namespace, warning)
+            trajectory, surplus = drop_surplus_values(trajectory)
+        for warning in (foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance), surplus):
+            if warning:
+                LOGGER.warning("%s: %s", self._namespace, warning)
         here = np.array([handle.position for handle in self._handles])
-        self._mailbox.put(validate_goal(goal, goal_handle, self._rules, here))
+        try:
+            self._mailbox.put(validate_goal(replace(goal, trajectory=trajectory), goal_handle, self._rules, here))
+        finally:
+            if trajectory is not goal.trajectory:
+                trajectory.release()
         if not self._running:
             self._reject_waiting("the controller was stopped")
 

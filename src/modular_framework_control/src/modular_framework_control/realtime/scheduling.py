@@ -2,7 +2,8 @@
 """Asks the operating system to let the control loop run on time, where it permits that.
 
 The jitter that Python itself causes is reduced too: another thread releases the interpreter after a
-fraction of a cycle, and the garbage collector ignores all objects that exist when the loop begins.
+fraction of a cycle, and the garbage collector ignores all objects that exist when the loop begins, or that it has seen
+twice: to go through all of them takes many cycles while a goal of very many points is there.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ PRIORITY = 80
 OTHERS_BELOW = 10
 """By how much the priority of the other threads of a process is lower than that of the loop."""
 _SWITCH_INTERVAL_S = 2e-4
+_NO_FULL_COLLECTIONS = 2**31 - 1
 LATENCY_DEVICE = "/dev/cpu_dma_latency"
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
@@ -28,6 +30,7 @@ def prepare_interpreter() -> None:
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     gc.collect()
     gc.freeze()
+    gc.set_threshold(*gc.get_threshold()[:2], _NO_FULL_COLLECTIONS)
 
 
 def run_in_real_time(priority: int = PRIORITY) -> list[str]:

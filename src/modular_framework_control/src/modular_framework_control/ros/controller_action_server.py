@@ -3,15 +3,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import rospy
 from actionlib.server_goal_handle import ServerGoalHandle
+from actionlib_msgs.msg import GoalStatus as GoalStatusMsg
 
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.ros.outbox import Outbox
 from modular_framework_ros.action_server import SteadyActionServer
+
+
+@contextlib.contextmanager
+def released(lock: threading.RLock) -> Iterator[None]:
+    """Gives the lock, which the caller has acquired once, to others: a cancel must not wait until a goal is checked."""
+    lock.release()
+    try:
+        yield
+    finally:
+        lock.acquire()
+
 
 Submit = Callable[[Any, RealtimeGoalHandle[Any]], None]
 MakeResult = Callable[[RealtimeGoalHandle[Any]], Any]
@@ -51,6 +65,7 @@ class ControllerActionServer:
         self._make_result = make_result
         self._outbox = outbox
         self._goals: dict[RealtimeGoalHandle[Any], ServerGoalHandle] = {}
+        self._submitting = threading.Lock()  # goals keep their order
         self._server = SteadyActionServer(name, action, self._on_goal, self._on_cancel, auto_start=False)
         self._server.start()
 
@@ -70,7 +85,10 @@ class ControllerActionServer:
         )
         self._goals[goal_handle] = goal
         try:
-            self._submit(goal.get_goal(), goal_handle)
+            with released(self._server.lock), self._submitting:
+                self._submit(goal.get_goal(), goal_handle)
+            if goal.get_goal_status().status == GoalStatusMsg.RECALLING:  # canceled before it was submitted
+                self._cancel(goal_handle)
         except GoalRefusedError as error:
             del self._goals[goal_handle]
             rospy.logwarn("%s: goal rejected: %s", self._server.ns, error)

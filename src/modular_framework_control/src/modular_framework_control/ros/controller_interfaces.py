@@ -129,16 +129,22 @@ class JointTrajectoryRosInterface:
 
     def _submit(self, message: FollowJointTrajectoryGoal, goal_handle: TrajectoryGoalHandle) -> None:
         try:
-            self._controller.submit(conversions.goal_from_msg(message, self._loop_time.ahead_s), goal_handle)
+            self._hand_over(conversions.goal_from_msg(message, self._loop_time.ahead_s), goal_handle)
         except GoalRejectedError as error:
             result = conversions.trajectory_result_to_msg(error.code, str(error))
             raise GoalRefusedError(result, str(error)) from error
 
     def _on_command(self, message: JointTrajectoryMsg) -> None:
         try:
-            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message, self._loop_time.ahead_s)))
+            self._hand_over(TrajectoryGoal(conversions.trajectory_from_msg(message, self._loop_time.ahead_s)))
         except GoalRejectedError as error:
             rospy.logwarn("%s/command ignored: %s", self._name, error)
+
+    def _hand_over(self, goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None = None) -> None:
+        try:
+            self._controller.submit(goal, goal_handle)
+        finally:
+            goal.trajectory.release()
 
     def _on_query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
         try:

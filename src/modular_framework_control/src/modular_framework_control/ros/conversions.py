@@ -28,19 +28,20 @@ from modular_framework_control.controller_manager.controller_manager import Cont
 from modular_framework_control.controller_manager.controller_switch import ControllerState as LoadedState
 from modular_framework_control.controllers.gripper_action_controller import GripperState
 from modular_framework_control.controllers.joint_state_controller import JointStateSnapshot
-from modular_framework_control.trajectory.joint_trajectory import Array, JointTrajectory, TrajectoryPoint
+from modular_framework_control.trajectory.joint_trajectory import Array, JointTrajectory, TrajectoryPoint, parts
 from modular_framework_control.trajectory.tolerances import JointTolerance
 from modular_framework_control.trajectory.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectorySnapshot
 
 
 def trajectory_from_msg(message: JointTrajectoryMsg, ahead_s: float = 0.0) -> JointTrajectory:
-    """A trajectory_msgs/JointTrajectory as sent; it is not checked here."""
-    points = tuple(
-        TrajectoryPoint(
-            point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities), tuple(point.accelerations)
-        )
-        for point in message.points
-    )
+    """A trajectory_msgs/JointTrajectory as sent, not checked; takes its points, which are freed one by one."""
+    points = []
+    message.points.reverse()
+    for part in parts(len(message.points)):
+        for _ in range(part.start, part.stop):
+            sent = message.points.pop()
+            values = (tuple(sent.positions), tuple(sent.velocities), tuple(sent.accelerations))
+            points.append(TrajectoryPoint(sent.time_from_start.to_sec(), *values))
     stamp = message.header.stamp
     return JointTrajectory(tuple(message.joint_names), points, stamp.to_sec() - ahead_s if stamp else 0.0)
 

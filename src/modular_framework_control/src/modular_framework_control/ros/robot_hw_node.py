@@ -23,6 +23,7 @@ from modular_framework_control.realtime.scheduling import (
     run_in_real_time,
 )
 from modular_framework_control.ros.hardware_ready import HardwareNotReadyError, HardwareReadiness, ready_topics_of
+from modular_framework_control.ros.large_messages import receive_in_pieces
 from modular_framework_control.ros.loop_report import LoopReport
 from modular_framework_control.ros.ros_controller_manager import RosControllerManager
 from modular_framework_ros.node_handle import ParameterError, read_bool, read_number
@@ -278,6 +279,7 @@ def main() -> int:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
+    receive_in_pieces()
     rospy.init_node("robot_hw", disable_signals=True)
     finished = hold_shutdown(ended)
     node: RobotHwNode | None = None

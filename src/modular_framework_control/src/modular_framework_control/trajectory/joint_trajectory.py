@@ -9,9 +9,10 @@ segment.
 from __future__ import annotations
 
 import math
+import time
 from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 POSITION, VELOCITY, ACCELERATION = 0, 1, 2
 SHORTEST_SEGMENT_S = 1e-6
+ITEMS_AT_ONCE = 256
+PAUSE_S = 1e-4
 
 
 class InvalidTrajectoryError(Exception):
@@ -54,8 +57,13 @@ class JointTrajectory:
     """
 
     joint_names: tuple[str, ...]
-    points: tuple[TrajectoryPoint, ...]
+    points: Sequence[TrajectoryPoint]
     stamp_s: float = 0.0
+
+    def release(self) -> None:
+        """Drops the points of a list, a few at a time: Python frees an object with all its parts in one go."""
+        while isinstance(self.points, list) and self.points:
+            del self.points[-ITEMS_AT_ONCE:]
 
 
 def segment_coefficients(start: Array, end: Array, duration_s: Array | float, order: int) -> Array:
@@ -91,6 +99,18 @@ def segment_coefficients(start: Array, end: Array, duration_s: Array | float, or
     return np.stack(rows, axis=-2)
 
 
+def parts(count: int) -> Iterator[slice]:
+    """Divides `count` items among slices, with a pause between two.
+
+    A slice is short enough for one call of NumPy, in which the control loop cannot have the interpreter. Without
+    pauses a thread with real-time priority would use a processor up, and Linux would stop the process for 50 ms.
+    """
+    for begin in range(0, count, ITEMS_AT_ONCE):
+        if begin > 0:
+            time.sleep(PAUSE_S)
+        yield slice(begin, min(begin + ITEMS_AT_ONCE, count))
+
+
 class Spline:
     """A checked trajectory with the coefficients of all segments between its points.
 
@@ -109,92 +129,103 @@ class Spline:
     def __init__(self, trajectory: JointTrajectory) -> None:
         points = trajectory.points
         none = (0.0,) * len(trajectory.joint_names)
-        self.times_s = np.array([point.time_s for point in points])
-        self.states = np.array(
-            [(point.positions, point.velocities or none, point.accelerations or none) for point in points]
-        )
-        self.orders = np.array([1 if not point.velocities else 5 if point.accelerations else 3 for point in points])
-        self.coefficients = np.zeros((len(points) - 1, 6, len(none)))
-        durations_s = np.diff(self.times_s)[:, np.newaxis]
-        orders = np.minimum(self.orders[:-1], self.orders[1:])
+        self.times_s = np.empty(len(points))
+        self.states = np.empty((len(points), 3, len(none)))
+        self.orders = np.empty(len(points), int)
+        self.coefficients = np.empty((len(points) - 1, 6, len(none)))
+        for part in parts(len(points)):
+            self.times_s[part] = [point.time_s for point in points[part]]
+            self.states[part] = [
+                (point.positions, point.velocities or none, point.accelerations or none) for point in points[part]
+            ]
+            self.orders[part] = [
+                1 if not point.velocities else 5 if point.accelerations else 3 for point in points[part]
+            ]
+        for part in parts(len(points) - 1):
+            self._compute_segments(part, slice(part.start + 1, part.stop + 1))
+
+    def _compute_segments(self, starts: slice, ends: slice) -> None:
+        """Computes the coefficients of the segments between these points."""
+        orders = np.minimum(self.orders[starts], self.orders[ends])
+        durations_s = (self.times_s[ends] - self.times_s[starts])[:, np.newaxis]
         for order in (1, 3, 5):
             chosen = orders == order
-            self.coefficients[chosen] = segment_coefficients(
-                self.states[:-1][chosen], self.states[1:][chosen], durations_s[chosen], order
+            self.coefficients[starts][chosen] = segment_coefficients(
+                self.states[starts][chosen], self.states[ends][chosen], durations_s[chosen], order
             )
 
 
+@dataclass(frozen=True, slots=True)
 class Track:
     """The motion of some joints of a controller: consecutive segments, then rest at the last position.
 
-    Args:
+    The control loop makes tracks. So they copy nothing of a trajectory, which may be very long.
+
+    Attributes:
         joints: indices of the joints in the controller.
-        starts_s: start of each segment [s of the controller's time].
-        coefficients: of each segment, shape (segments, 6, joints).
-        end_s: end of the last segment [s].
-        end_position: where it ends, shape (joints,).
+        start_s: start of the first segment [s of the controller's time].
+        ends_s: end of each segment [s], shape (segments,).
+        first: coefficients of the first segment, shape (6, columns).
+        others: coefficients of the other segments, shape (segments - 1, 6, columns).
+        end_position: where it ends, shape (columns,).
         origin_s: time of its time_from_start 0 [s].
+        offset: added to the positions of `others`, shape (columns,).
+        columns: those of `joints` in the arrays; None for all.
     """
 
-    __slots__ = ("joints", "end_s", "origin_s", "_starts_s", "_coefficients", "_end_position")
+    joints: list[int]
+    start_s: float
+    ends_s: Array
+    first: Array
+    others: Array
+    end_position: Array
+    origin_s: float
+    offset: Array | float = 0.0
+    columns: list[int] | None = None
+    end_s: float = field(init=False)
 
-    def __init__(
-        self,
-        joints: Sequence[int],
-        starts_s: Sequence[float],
-        coefficients: Array,
-        end_s: float,
-        end_position: Array,
-        origin_s: float,
-    ) -> None:
-        self.joints = list(joints)
-        self.end_s = end_s
-        self.origin_s = origin_s
-        self._starts_s = list(starts_s)
-        self._coefficients = coefficients
-        self._end_position = end_position
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "end_s", float(self.ends_s[-1]))
 
     @classmethod
     def hold(cls, joints: Sequence[int], position: Array, time_s: float) -> Track:
         """Rest at `position`, shape (joints,), from `time_s` on."""
-        return cls(joints, [], np.zeros((0, 6, len(joints))), time_s, position.copy(), time_s)
+        at_rest = np.zeros((6, len(joints)))
+        at_rest[POSITION] = position
+        return cls.one_segment(joints, time_s, time_s, at_rest, at_rest[POSITION])
+
+    @classmethod
+    def one_segment(
+        cls, joints: Sequence[int], start_s: float, end_s: float, coefficients: Array, end_position: Array
+    ) -> Track:
+        """One segment with coefficients of shape (6, joints), from `start_s` to `end_s` [s]."""
+        return cls(list(joints), start_s, np.array([end_s]), coefficients, coefficients[:0], end_position, start_s)
 
     def sample(self, time_s: float) -> Array:
         """Position, velocity and acceleration at `time_s`, shape (3, joints)."""
-        if time_s > self.end_s or not self._starts_s:
-            state = np.zeros((3, len(self.joints)))
-            state[POSITION] = self._end_position
-            return state
-        i = max(0, bisect_right(self._starts_s, time_s) - 1)
-        t = max(0.0, time_s - self._starts_s[i])
-        t2 = t * t
-        t3 = t2 * t
-        basis = (
-            (1.0, t, t2, t3, t2 * t2, t2 * t3),
-            (0.0, 1.0, 2.0 * t, 3.0 * t2, 4.0 * t3, 5.0 * t2 * t2),
-            (0.0, 0.0, 2.0, 6.0 * t, 12.0 * t2, 20.0 * t3),
-        )
-        sampled: Array = np.dot(basis, self._coefficients[i])
-        return sampled
-
-    def first_segment(self) -> tuple[Array, float]:
-        """Coefficients of the first segment, shape (6, joints), and its duration [s]."""
-        end_s = self._starts_s[1] if len(self._starts_s) > 1 else self.end_s
-        return self._coefficients[0], end_s - self._starts_s[0]
+        if time_s > self.end_s:
+            state = np.zeros((3, len(self.end_position)))
+            state[POSITION] = self.end_position
+        else:
+            i = min(bisect_right(self.ends_s, time_s), len(self.ends_s) - 1)
+            t = max(0.0, time_s - (float(self.ends_s[i - 1]) if i > 0 else self.start_s))
+            t2 = t * t
+            t3 = t2 * t
+            basis = (
+                (1.0, t, t2, t3, t2 * t2, t2 * t3),
+                (0.0, 1.0, 2.0 * t, 3.0 * t2, 4.0 * t3, 5.0 * t2 * t2),
+                (0.0, 0.0, 2.0, 6.0 * t, 12.0 * t2, 20.0 * t3),
+            )
+            state = np.dot(basis, self.first if i == 0 else self.others[i - 1])
+            if i > 0:
+                state[POSITION] += self.offset
+        return state if self.columns is None else state[:, self.columns]
 
     def without(self, joints: Sequence[int]) -> Track | None:
         """This track for its other joints; None when none is left."""
         kept = [i for i, joint in enumerate(self.joints) if joint not in joints]
-        if not kept:
-            return None
-        return Track(
-            [self.joints[i] for i in kept],
-            self._starts_s,
-            self._coefficients[:, :, kept],
-            self.end_s,
-            self._end_position[kept],
-            self.origin_s,
-        )
+        columns = kept if self.columns is None else [self.columns[i] for i in kept]
+        return replace(self, joints=[self.joints[i] for i in kept], columns=columns) if kept else None
 
 
 def splice(
@@ -215,21 +246,16 @@ def splice(
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
-    coefficients = spline.coefficients[max(0, first - 1) :]
-    if offset.any():
-        coefficients = coefficients.copy()
-        coefficients[:, 0] += offset
-    if not (first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset)):
+    ends_s = origin_s + spline.times_s[first:]
+    if first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset):
+        bridge = spline.coefficients[first - 1].copy()
+        bridge[POSITION] += offset
+    else:
         target = spline.states[first].copy()
         target[POSITION] += offset
-        bridge = segment_coefficients(
-            state, target, origin_s + float(spline.times_s[first]) - splice_s, int(spline.orders[first])
-        )
-        coefficients = np.concatenate([bridge[np.newaxis], coefficients[1 if first > 0 else 0 :]])
-    knots_s = (origin_s + spline.times_s[first:]).tolist()
-    return Track(
-        joints, [splice_s, *knots_s[:-1]], coefficients, knots_s[-1], spline.states[-1, POSITION] + offset, origin_s
-    )
+        bridge = segment_coefficients(state, target, float(ends_s[0]) - splice_s, int(spline.orders[first]))
+    end_position = spline.states[-1, POSITION] + offset
+    return Track(list(joints), splice_s, ends_s, bridge, spline.coefficients[first:], end_position, origin_s, offset)
 
 
 def _whole_turns(position: Array, target: Array) -> Array:

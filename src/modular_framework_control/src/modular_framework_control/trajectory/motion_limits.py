@@ -7,6 +7,7 @@ and the joint arrives a little late.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_control.hardware_interface.joint_limit_parameters import POINT_MARGIN, JointLimits
-from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track
+from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track, parts
 
 VELOCITY_SHARE = 1.05
 """Largest velocity as a multiple of the limit: time parameterisations overshoot by that much between their points."""
@@ -23,7 +24,6 @@ CURVE_MARGIN = 1e-2
 """How far the curve between points may go beyond a position limit, and how far a joint may lag behind in the first
 segment [rad|m]."""
 _MOST_FAULTS = 8
-_SEGMENTS_AT_ONCE = 1024
 _NO_SPEED = "with it the joint may not move at all: correct it in robot_description or joint_limits"
 
 # Chebyshev nodes, whose largest sample is at most 2 % (velocity) below the largest value of a quintic segment.
@@ -90,7 +90,7 @@ class LimitViolations:
         self._names = tuple(names)
         self._limits = limits
         self._measured = measured
-        self._found: list[tuple[_Kind, NDArray[np.int64], Array]] = []
+        self._found: list[tuple[_Kind, NDArray[np.int64], Array]] = []  # in each, points in ascending order
 
     def add(self, kind: _Kind, values: Array, beyond: NDArray[np.bool_], first_point: int) -> None:
         """Adds the values, shape (points, joints), where `beyond` is true; the first row belongs to `first_point`."""
@@ -109,11 +109,11 @@ class LimitViolations:
         count = 0
         for kind, indices, values in self._found:  # there may be very many, and the control loop calls this
             begin = first if kind in (_Kind.POINT_POSITION, _Kind.POINT_VELOCITY) else first_segment
-            counted = np.flatnonzero(indices[:, 0] >= begin)
-            count += len(counted)
+            skipped = bisect_left(indices[:, 0], begin)
+            count += len(indices) - skipped
             described += [
                 self._described(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
-                for i in counted[: _MOST_FAULTS - len(described)]
+                for i in range(skipped, min(len(indices), skipped + _MOST_FAULTS - len(described)))
             ]
         more = count - len(described)
         return "; ".join(described) + (f"; and {more} more" if more else "")
@@ -157,26 +157,18 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
     """
     found = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
-    positions, velocities = spline.states[:, POSITION], spline.states[:, VELOCITY]
-    found.add(
-        _Kind.POINT_POSITION,
-        positions,
-        (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN),
-        0,
-    )
-    found.add(_Kind.POINT_VELOCITY, velocities, np.abs(velocities) > VELOCITY_SHARE * limits.fastest, 0)
+    for part in parts(len(spline.times_s)):
+        positions, velocities = spline.states[part, POSITION], spline.states[part, VELOCITY]
+        beyond = (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN)
+        found.add(_Kind.POINT_POSITION, positions, beyond, part.start)
+        found.add(_Kind.POINT_VELOCITY, velocities, np.abs(velocities) > VELOCITY_SHARE * limits.fastest, part.start)
     if np.isfinite(limits.fastest).any() or np.isfinite(limits.lowest).any() or np.isfinite(limits.highest).any():
         durations_s = np.diff(spline.times_s)
-        for begin in range(0, len(durations_s), _SEGMENTS_AT_ONCE):
-            chosen = slice(begin, begin + _SEGMENTS_AT_ONCE)
-            ways = _SegmentExtremes(spline.coefficients[chosen], durations_s[chosen])
-            found.add(
-                _Kind.CURVE_VELOCITY,
-                ways.velocities,
-                np.abs(ways.velocities) > VELOCITY_SHARE * limits.fastest,
-                begin + 1,
-            )
-            _add_positions(found, ways, limits, begin + 1)
+        for part in parts(len(durations_s)):
+            ways = _SegmentExtremes(spline.coefficients[part], durations_s[part])
+            too_fast = np.abs(ways.velocities) > VELOCITY_SHARE * limits.fastest
+            found.add(_Kind.CURVE_VELOCITY, ways.velocities, too_fast, part.start + 1)
+            _add_positions(found, ways, limits, part.start + 1)
     return found
 
 
@@ -194,8 +186,8 @@ def first_segment_violations(
     """
     found = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
-    coefficients, duration_s = track.first_segment()
-    ways = _SegmentExtremes(coefficients[np.newaxis], np.array([duration_s]))
+    duration_s = float(track.ends_s[0]) - track.start_s
+    ways = _SegmentExtremes(track.first[np.newaxis], np.array([duration_s]))
     speeds = np.abs(ways.velocities)
     late = (speeds - limits.fastest) * duration_s > CURVE_MARGIN
     found.add(_Kind.CURVE_VELOCITY, ways.velocities, late & (speeds > VELOCITY_SHARE * limits.fastest), point)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 
@@ -11,6 +12,7 @@ from modular_framework_control.trajectory.joint_trajectory import (
     InvalidTrajectoryError,
     JointTrajectory,
     TrajectoryPoint,
+    parts,
 )
 
 # Coefficients of a segment as short as they come stay finite with values up to this.
@@ -31,8 +33,9 @@ def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool
         for i, name in enumerate(names)
         if name not in known
     ]
-    for name in dict.fromkeys(name for name in names if name in known and names.count(name) > 1):
-        indices = " and ".join(str(i) for i, other in enumerate(names) if other == name)
+    times_named = Counter(names)
+    for name in (name for name in times_named if name in known and times_named[name] > 1):
+        indices = " and ".join(islice((str(i) for i, other in enumerate(names) if other == name), _MOST_FAULTS_LISTED))
         faults.append(f"joint '{name}' is named twice (indices {indices})")
     missing = [name for name in known if name not in names]
     if missing and not (allow_partial and names):
@@ -57,10 +60,10 @@ def drop_surplus_values(trajectory: JointTrajectory) -> tuple[JointTrajectory, s
     }
     if len(sizes) != 1 or max(sizes) <= count:
         return trajectory, ""
-    points = tuple(
+    points = [
         TrajectoryPoint(point.time_s, point.positions[:count], point.velocities[:count], point.accelerations[:count])
         for point in trajectory.points
-    )
+    ]
     return (
         JointTrajectory(trajectory.joint_names, points, trajectory.stamp_s),
         f"points have {max(sizes)} values each, only the first {count} are used, for: "
@@ -88,8 +91,10 @@ def _joined(faults: Iterator[str]) -> str:
 
 def _faults_of(trajectory: JointTrajectory) -> Iterator[str]:
     points = trajectory.points
-    for number, point in enumerate(points):
-        yield from (f"point {number}: {fault}" for fault in _faults_of_point(point, trajectory.joint_names))
+    for part in parts(len(points)):
+        for number in range(part.start, part.stop):
+            for fault in _faults_of_point(points[number], trajectory.joint_names):
+                yield f"point {number}: {fault}"
     if points and not math.isfinite(points[0].time_s):
         yield f"point 0: time_from_start is {points[0].time_s:.9g} s; expected a time"
     for number, (before, point) in enumerate(pairwise(points)):

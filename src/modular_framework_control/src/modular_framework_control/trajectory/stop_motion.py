@@ -99,5 +99,5 @@ def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: flo
     if duration_s <= SHORTEST_SEGMENT_S:
         return Track.hold([joint], begin[POSITION], time_s)
     end[POSITION] = position + 0.5 * duration_s * velocity
-    coefficients = segment_coefficients(begin, end, duration_s, order)[np.newaxis]
-    return Track([joint], [time_s], coefficients, time_s + duration_s, end[POSITION], time_s)
+    coefficients = segment_coefficients(begin, end, duration_s, order)
+    return Track.one_segment([joint], time_s, time_s + duration_s, coefficients, end[POSITION])
