@@ -105,7 +105,6 @@ class GraspGenerator:
             NoGraspError: Something needed is missing; the text names it.
         ParameterError: A parameter is not allowed.
         """
-        self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
         self._reporter = ComponentReporter("generation")
         self._reason = rospy.Publisher(f"{SIGNAL_TOPIC}/reason", String, queue_size=1, latch=True)
         settings = read_settings()
@@ -120,6 +119,8 @@ class GraspGenerator:
             raise NoGraspError(str(error)) from error
         if isinstance(self._method, SeeingMethod):
             self._method.connect()
+        # last of all that takes long: who sees the signal's topic expects an answer to a request soon
+        self._signal = rospy.Publisher(SIGNAL_TOPIC, Bool, queue_size=1, latch=True)
         self._services = [
             rospy.Service(name, Trigger, lambda _, kept=kept: self._on_demand(kept)) for name, kept in SERVICES.items()
         ]
