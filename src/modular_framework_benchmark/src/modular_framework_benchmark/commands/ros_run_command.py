@@ -86,8 +86,9 @@ def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Nam
 def _run(options: argparse.Namespace) -> int:
     # imported where it is needed: `resume` does without roslaunch
     from modular_framework_benchmark.experiments.ros_surroundings import RosSurroundings
+    from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
 
-    experiment = load_experiment(experiment_path(options.file), RosSurroundings(), known_metrics())
+    experiment = load_experiment(experiment_path(options.file), RosSurroundings(), known_metrics(), setting_checks())
     episodes = lay_out(experiment)
     if options.dry_run:
         print(design_text(experiment, episodes))

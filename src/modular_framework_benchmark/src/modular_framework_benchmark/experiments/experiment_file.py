@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping as Map
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from modular_framework_benchmark.experiments.experiment import Combination, Expe
 from modular_framework_benchmark.experiments.factor_reading import (
     Levels,
     combined,
+    note_equal_levels,
     note_unused,
     read_design,
     read_factors,
@@ -23,7 +25,8 @@ from modular_framework_benchmark.experiments.mode_settings import (
     read_settings,
 )
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
-from modular_framework_benchmark.experiments.setting_trees import check_references
+from modular_framework_benchmark.experiments.setting_checks import CheckedSettings, SettingsCheck
+from modular_framework_benchmark.experiments.setting_trees import check_references, location_below
 from modular_framework_benchmark.experiments.surroundings import Surroundings
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
@@ -40,17 +43,21 @@ KEYS = (*REQUIRED, *OPTIONAL)
 FILES = {"log": True, "trajectories": True, "bag": False, "video": False}
 MOST_EPISODES = 10_000_000
 
+SettingChecks = Map[str, SettingsCheck]
 KnownMetrics = Map[str, Map[str, Metric]]
 """The metrics there are, by name, by mode."""
 
 
-def load_experiment(path: Path, surroundings: Surroundings, known_metrics: KnownMetrics) -> Experiment:
+def load_experiment(
+    path: Path, surroundings: Surroundings, known_metrics: KnownMetrics, checks: SettingChecks | None = None
+) -> Experiment:
     """Reads and checks an experiment file.
 
     Args:
         path: The file.
         surroundings: What there is to refer to.
         known_metrics: The metrics of each mode.
+        checks: What looks up the settings of each mode; None: they are not looked up.
 
     Raises:
         ExperimentFault: The file cannot be used; carries every fault.
@@ -62,10 +69,16 @@ def load_experiment(path: Path, surroundings: Surroundings, known_metrics: Known
         raise ExperimentFault([Fault(start, "there is no such file; name an experiment file (.yaml)")]) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ExperimentFault([Fault(start, f"the file cannot be read: {error}")]) from error
-    return read_experiment(text, path, surroundings, known_metrics)
+    return read_experiment(text, path, surroundings, known_metrics, checks)
 
 
-def read_experiment(text: str, path: Path, surroundings: Surroundings, known_metrics: KnownMetrics) -> Experiment:
+def read_experiment(
+    text: str,
+    path: Path,
+    surroundings: Surroundings,
+    known_metrics: KnownMetrics,
+    checks: SettingChecks | None = None,
+) -> Experiment:
     """Reads and checks the text of an experiment file; arguments and errors as for `load_experiment`."""
     faults = FaultList()
     start = SourceLocation(str(path), 1, 1)
@@ -78,7 +91,7 @@ def read_experiment(text: str, path: Path, surroundings: Surroundings, known_met
     if not isinstance(root, Mapping):
         raise ExperimentFault([Fault(root.location, "the file must be a mapping, from keys such as experiment")])
     reading = Reading(faults, path.resolve().parent, surroundings)
-    experiment = _Reader(root, text, path, reading, known_metrics).read()
+    experiment = _Reader(root, text, path, reading, known_metrics, checks or {}).read()
     if experiment is None:
         raise ExperimentFault(faults.sorted())
     return experiment
@@ -87,7 +100,16 @@ def read_experiment(text: str, path: Path, surroundings: Surroundings, known_met
 class _Reader:
     """Reads the parts of one file."""
 
-    def __init__(self, root: Mapping, text: str, path: Path, reading: Reading, known_metrics: KnownMetrics) -> None:
+    def __init__(
+        self,
+        root: Mapping,
+        text: str,
+        path: Path,
+        reading: Reading,
+        known_metrics: KnownMetrics,
+        checks: SettingChecks,
+    ) -> None:
+        self._checks = checks
         self._text, self._path, self._reading, self._known = text, path, reading, known_metrics
         mode = value_of(root, "mode")
         self._mode = str(mode.value) if isinstance(mode, Scalar) and mode.value in MODES else None
@@ -246,10 +268,24 @@ class _Reader:
     def _combinations(self, factors: Levels, design: list[dict[str, str]]) -> tuple[Combination, ...]:
         if self._mode is None or not self._refers_to_factors or not all(factors.values()):
             return ()
-        return tuple(
-            Combination(item, read_settings(str(self._mode), combined(self._base, factors, item), self._reading))
-            for item in design
-        )
+        found, resolved = [], {}
+        for item in design:
+            node = combined(self._base, factors, item)
+            before = len(self._reading.faults)
+            settings = read_settings(str(self._mode), node, self._reading)
+            if len(self._reading.faults) == before:
+                resolved[tuple(item.items())] = self._resolved(node, settings)
+            found.append(Combination(item, settings))
+        note_equal_levels(factors, resolved, self._reading)
+        return tuple(found)
+
+    def _resolved(self, node: Mapping, settings: Map[str, Any]) -> str:
+        """Looks up the names in the settings of a combination; returns what runs, equal texts for equal things."""
+        check = self._checks.get(str(self._mode))
+        checked = CheckedSettings((), settings) if check is None else check(settings)
+        for fault in checked.faults:
+            self._reading.faults.add(location_below(node, fault.keys), fault.text)
+        return json.dumps(checked.resolved, sort_keys=True, default=repr) if checked.resolved is not None else ""
 
 
 def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueReading) -> Stopping:

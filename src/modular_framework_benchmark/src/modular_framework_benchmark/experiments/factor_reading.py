@@ -109,6 +109,27 @@ def note_unused(factors: Levels, base: Mapping, node: Mapping, reading: Reading)
             )
 
 
+def note_equal_levels(factors: Levels, resolved: Map[tuple[tuple[str, str], ...], str], reading: Reading) -> None:
+    """Notes two levels of a factor that run the same in every combination that has them: they cannot differ.
+
+    Args:
+        factors: The factors.
+        resolved: What runs, by combination; empty if it could not be looked up.
+        reading: Where faults are noted.
+    """
+    for name, levels in factors.items():
+        runs: dict[str, dict[tuple[tuple[str, str], ...], str]] = {label: {} for label in levels}
+        for combination, text in resolved.items():
+            rest = tuple(item for item in combination if item[0] != name)
+            runs[dict(combination)[name]][rest] = text
+        for one, other in itertools.combinations(levels, 2):
+            if runs[one] and runs[one] == runs[other] and all(runs[one].values()):
+                reading.faults.add(
+                    levels[other].value.location,
+                    f"the levels '{one}' and '{other}' of factor '{name}' run the same; change or remove one",
+                )
+
+
 def combined(base: Mapping, factors: Levels, configuration: Map[str, str]) -> Mapping:
     """Returns the settings of one level of each factor: those of the base, and over them those of the levels."""
     chosen = {name: factors[name][label] for name, label in configuration.items()}

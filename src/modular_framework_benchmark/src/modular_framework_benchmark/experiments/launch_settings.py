@@ -16,6 +16,7 @@ DEFAULT_TASK = "simulation_pick.yaml"
 OWN_ARGUMENTS = {
     "task_constructor_script": "give it with the key task",
     "end_with_task": "an episode needs its launch after the task has ended",
+    "seed": "each episode has its own seed, made from the experiment's key seed",
 }
 """Launch arguments that the episodes set, and what to do instead."""
 
@@ -56,6 +57,12 @@ def read_arguments(node: Node, reading: Reading) -> dict[str, str] | None:
             reading.faults.add(mapping.keys[name], f"the argument '{name}' cannot be given: {OWN_ARGUMENTS[name]}")
         elif not isinstance(value, Scalar):
             reading.faults.add(value.location, f"the argument '{name}' must be one value, found {kind_of(value)}")
+        elif name == "simulation" and _argument_text(value).lower() not in ("true", "1"):
+            reading.faults.add(
+                value.location,
+                f"the argument 'simulation' is {_argument_text(value)}; allowed: true. An experiment places "
+                "objects and judges success in the simulated world; run the task on the robot with run_framework",
+            )
         else:
             arguments[name] = _argument_text(value)
     return arguments

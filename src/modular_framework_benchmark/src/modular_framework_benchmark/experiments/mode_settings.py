@@ -16,6 +16,12 @@ from modular_framework_core.files.located_yaml import Mapping as Node_Mapping
 from modular_framework_core.files.located_yaml import Node, Scalar
 
 ReadValue = Callable[[Node, Reading], Any]
+OWN_PARAMETERS = {
+    "/seed": "each episode has its own seed, made from the experiment's key seed",
+    "/task/wait_for_start": "an episode starts its task itself",
+    "/task/record_directory": "an episode keeps the record of its task in its own folder",
+}
+"""Parameters that the episodes set, and what to do instead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,14 +118,25 @@ def _parameters(node: Node, reading: Reading) -> dict[str, Any] | None:
     if mapping is None:
         return None
     for name, location in mapping.keys.items():
+        if name in OWN_PARAMETERS:
+            reading.faults.add(location, f"the parameter '{name}' cannot be given: {OWN_PARAMETERS[name]}")
         if not name.startswith("/") or name != "/" + "/".join(part for part in name.split("/") if part):
             reading.faults.add(location, f"the parameter '{name}' must be a whole name from /, such as /planner_name")
     return {name: json_value(value) for name, value in mapping.entries.items()}
 
 
-def _planner_parameters(node: Node, reading: Reading) -> dict[str, Any] | None:
-    mapping = reading.mapping(node, "planner_parameters", "{range: 0.5}")
-    return None if mapping is None else {name: json_value(value) for name, value in mapping.entries.items()}
+def _extra_parameters(node: Node, reading: Reading) -> list[str]:
+    """Reads the names of parameters that nodes of the user's own read."""
+    items = reading.items(node, "extra_parameters", "[/my_node/my_parameter]") or ()
+    return [name for item in items if (name := reading.text(item, "a name in extra_parameters")) is not None]
+
+
+def _named_values(what: str, example: str) -> ReadValue:
+    def read(node: Node, reading: Reading) -> dict[str, Any] | None:
+        mapping = reading.mapping(node, what, example)
+        return None if mapping is None else {name: json_value(value) for name, value in mapping.entries.items()}
+
+    return read
 
 
 def _robot(node: Node, reading: Reading) -> Any:
@@ -152,13 +169,6 @@ def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str]:
     return files
 
 
-def _named_numbers(node: Node, reading: Reading) -> dict[str, float | None] | None:
-    mapping = reading.mapping(node, "method_parameters", "{finger_clearance: 0.01}")
-    if mapping is None:
-        return None
-    return {name: reading.number(value, name, -1e9, 1e9) for name, value in mapping.entries.items()}
-
-
 def _grasp_settings(node: Node_Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
     """Looks the models up, and checks that the target is one of the objects; it is the first one by default."""
     objects = launch_settings.placed_objects(values["objects"], launch_settings.DEFAULT_LAUNCH, {}, reading)
@@ -179,6 +189,7 @@ _LAUNCH_KEYS = {
     "launch": SettingKey(launch_settings.read_launch, launch_settings.DEFAULT_LAUNCH),
     "arguments": SettingKey(launch_settings.read_arguments, {}),
     "parameters": SettingKey(_parameters, {}),
+    "extra_parameters": SettingKey(_extra_parameters, []),
     "objects": SettingKey(read_objects, []),
     "warm": SettingKey(_truth("warm"), True),
 }
@@ -196,7 +207,7 @@ MODES: Mapping[str, Mode] = {
             "robot": SettingKey(_robot, required=True),
             "problems": SettingKey(problem_sets.read_problems, required=True),
             "planner": SettingKey(_text("planner"), ""),
-            "planner_parameters": SettingKey(_planner_parameters, {}),
+            "planner_parameters": SettingKey(_named_values("planner_parameters", "{range: 0.5}"), {}),
             "pipeline": SettingKey(_text("pipeline"), "ompl"),
             "group": SettingKey(_text("group"), ""),
             "planning_time": SettingKey(_seconds("planning_time"), 5.0),
@@ -222,7 +233,7 @@ MODES: Mapping[str, Mode] = {
             "group": SettingKey(_text("group"), required=True),
             "gripper_joint": SettingKey(_text("gripper_joint"), required=True),
             "method": SettingKey(_text("method"), required=True),
-            "method_parameters": SettingKey(_named_numbers, {}),
+            "method_parameters": SettingKey(_named_values("method_parameters", "{finger_clearance: 0.01}"), {}),
             "objects": SettingKey(read_objects, required=True),
             "target": SettingKey(_text("target"), ""),
             "max_checks": SettingKey(_count("max_checks", 1, 100_000), 40),

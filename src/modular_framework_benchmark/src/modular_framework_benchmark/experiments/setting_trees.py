@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from collections.abc import Mapping as Map
 
-from modular_framework_core.files.faults import FaultList, listing, nearest
+from modular_framework_core.files.faults import FaultList, SourceLocation, listing, nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
 
 _REFERENCE = re.compile(r"\$(\$|[A-Za-z_][A-Za-z0-9_-]*)")
@@ -90,3 +90,16 @@ def leaves(node: Mapping, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[s
             yield from leaves(value, (*above, key))
         else:
             yield (*above, key), value
+
+
+def location_below(node: Mapping, keys: tuple[str, ...]) -> SourceLocation:
+    """Returns where the value is that keys lead to, or the innermost value above it."""
+    found: Node = node
+    for key in keys:
+        if not isinstance(found, Mapping):
+            break
+        name = key if key in found.entries else next((name for name in found.entries if key.startswith(f"{name}/")), "")
+        if not name:
+            break
+        found = found.entries[name]
+    return found.location

@@ -21,7 +21,7 @@ _GROUP_KEY = "manipulator_group_name"
 
 @dataclass(frozen=True, slots=True)
 class KnownNames:
-    """Names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group.
+    """Names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, planner.
 
     Attributes:
         names: Kind -> the names there are; a kind that is left out is not known, and any name of it may be right.
@@ -41,6 +41,10 @@ class KnownNames:
             self.origins,
             self.manipulator_group,
         )
+
+    def with_planners(self, planners: frozenset[str]) -> KnownNames:
+        """Returns these names with the planners there are."""
+        return KnownNames({**self.names, "planner": planners}, self.origins, self.manipulator_group)
 
     def with_robot(self, srdf: str, origin: str) -> KnownNames:
         """Returns these names with the planning groups and postures of a robot.

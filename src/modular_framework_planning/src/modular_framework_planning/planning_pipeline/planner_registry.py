@@ -67,6 +67,11 @@ class PlannerRegistry:
         others = (f"{name}/{item}" for name, spec in self.specs.items() for item in self._planners(spec))
         return (*own, *(name for name in others if name.partition("/")[0] != self.default))
 
+    def all_names(self) -> tuple[str, ...]:
+        """Returns every name that a planner answers to: alone, and as PIPELINE/PLANNER."""
+        planners = [(name, item) for name, spec in self.specs.items() for item in self._planners(spec)]
+        return tuple(dict.fromkeys(text for name, item in planners for text in (item, f"{name}/{item}")))
+
     def resolve(self, name: str, group: str = "", pipeline: str = "") -> ResolvedPlanner:
         """Returns what plans.
 

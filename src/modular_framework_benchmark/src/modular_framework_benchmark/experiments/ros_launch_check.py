@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Resolves what a launch names, before anything starts: parameters, planners, pipelines, adapters, groups, joints."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import rospkg
+
+from modular_framework_core.files import default_folders
+from modular_framework_core.files.faults import TaskFault, listing, nearest
+from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
+from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
+from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves
+from modular_framework_core.task_constructor import generator, pipeline
+from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
+from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.planning_pipeline.planner_registry import (
+    PlannerRegistry,
+    ResolvedPlanner,
+    UnknownNameError,
+)
+from modular_framework_ros.parameter_declarations import node_declaration
+from modular_framework_urdf.srdf_reader import read_srdf
+from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.xml_text import XmlError
+
+MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
+PIPELINES = "planning_pipelines"
+RUN_TASK, ARGUMENTS = "run_task", "arguments"
+
+
+class LaunchCheck:
+    """Checks a launch with the parameters that replace those of its files.
+
+    Args:
+        launch: What the launch file starts.
+        given: Parameters by whole name that are set over those of the launch file.
+        extra: Names of them that nodes of the user's own read.
+    """
+
+    def __init__(
+        self, launch: LaunchPreview, given: Mapping[str, Any] | None = None, extra: Container[str] = ()
+    ) -> None:
+        self._given, self._extra = dict(given or {}), extra
+        self.launch = launch.with_parameters(self._given)
+        self._names = DeclaredNames(self.launch)
+        self._pipelines: tuple[str, ...] = ()
+        self._node = next((node for node in launch.nodes if node.executable == MOVE_GROUP), None)
+        if self._node is not None:
+            self._pipelines = tuple(launch.below(f"{self._node.name}/{PIPELINES}"))
+
+    def faults(self) -> list[LaunchFault]:
+        """Returns everything that is wrong."""
+        try:
+            return [
+                *self._names.unread(self._given, self._extra),
+                *self._names.misspelt(leaves(self._given)),
+                *self._names.wrong_values(),
+                *self._robot_faults(),
+                *(self._planner_faults() if self._node is not None else ()),
+                *self._controller_faults(),
+                *self._task_faults(),
+            ]
+        except (PlanningError, ModelError) as error:
+            return [LaunchFault("", str(error))]
+
+    def registry(self) -> PlannerRegistry | None:
+        """Returns the planners of the launch; None if it starts no move_group."""
+        if self._node is None:
+            return None
+        limits = self.launch.below(f"{self._node.namespace}{DESCRIPTION}_planning")
+        return PlannerRegistry(self.launch.below(self._node.name), limits)
+
+    def _planner_faults(self) -> Iterator[LaunchFault]:
+        registry = self.registry()
+        assert registry is not None and self._node is not None
+        for text in registry.adapter_faults():
+            yield LaunchFault("", text)
+        for name, value in self._names.naming("pipeline"):
+            if value not in registry.specs:
+                yield _unknown(name, "pipeline", value, tuple(registry.specs))
+        group = str(self.launch.parameters.get("/arm_group_name", ""))
+        for name, value in self._names.naming("planner"):
+            try:
+                found = registry.resolve(value, group)
+            except UnknownNameError as error:
+                yield _unknown(name, error.what, error.name, error.known)
+                continue
+            for text in registry.faults(found):
+                yield LaunchFault(name, f"planner '{value}': {text.replace('; it is ignored', '')}")
+        yield from self._pipeline_faults(registry, f"{self._node.name}/{PIPELINES}/")
+
+    def _pipeline_faults(self, registry: PlannerRegistry, parent: str) -> Iterator[LaunchFault]:
+        """Yields what is wrong with the pipelines' parameters that are given."""
+        declared = node_declaration("modular_framework_planning", "planning_pipeline")
+        assert declared is not None
+        for name, value in leaves(self._given).items():
+            if not name.startswith(parent):
+                continue
+            pipeline, key, *rest = [*name.removeprefix(parent).split("/"), ""]
+            known = (*declared.parameters, *self._groups())
+            if pipeline not in self._pipelines and f"{parent}{pipeline}/planning_plugin" not in self.launch.parameters:
+                yield _unknown(name, "pipeline", pipeline, self._pipelines)
+            elif key not in known:
+                yield LaunchFault(
+                    name, f"pipeline '{pipeline}' has no parameter '{key}'; {listing(known)}{nearest(key, known)}"
+                )
+            elif key == "planner_configs" and len(rest) > 2:
+                yield from self._setting_faults(registry, name, value, rest[:2])
+            elif key in declared.parameters and not rest[1:] and declared.parameters[key].fault(value):
+                yield LaunchFault(name, f"parameter '{name}' {declared.parameters[key].fault(value)}")
+
+    def _setting_faults(
+        self, registry: PlannerRegistry, name: str, value: Any, names: list[str]
+    ) -> Iterator[LaunchFault]:
+        planner, key = names
+        pipeline = name.split("/")[3]
+        try:
+            found = registry.resolve(planner, "", pipeline)
+        except UnknownNameError as error:
+            yield _unknown(name, error.what, error.name, error.known)
+            return
+        for text in registry.faults(found, {key: value}):
+            yield LaunchFault(name, text.replace("; it is ignored", ""))
+
+    def _groups(self) -> tuple[str, ...]:
+        text = self.launch.parameters.get(f"/{DESCRIPTION}_semantic")
+        try:
+            return tuple(read_srdf(str(text), f"/{DESCRIPTION}_semantic").groups) if text else ()
+        except XmlError:
+            return ()
+
+    def _robot_faults(self) -> Iterator[LaunchFault]:
+        """Yields the planning groups and joints that the robot does not have."""
+        groups = self._groups()
+        for name, value in self._names.naming("group") if groups else ():
+            if value not in groups:
+                yield _unknown(name, "planning group", value, groups)
+        text = self.launch.parameters.get(f"/{DESCRIPTION}")
+        try:
+            joints = tuple(joint.name for joint in read_urdf(str(text)).joints) if text else ()
+        except XmlError:
+            return
+        for name, value in self._names.naming("joint") if joints else ():
+            if value not in joints:
+                yield _unknown(name, "joint", value, joints)
+
+    def _controller_faults(self) -> Iterator[LaunchFault]:
+        """Yields controller files that are not there or cannot be read."""
+        for node in self.launch.nodes:
+            if node.executable == "robot_controllers_spawner" and len(node.arguments.split()) == 2:
+                package, file = node.arguments.split()
+                folder = Path(rospkg.RosPack().get_path(package)) / "controllers"
+                try:
+                    read_controller_file(folder / file)
+                except ControllerFileError as error:
+                    there = [path.name for path in folder.glob("*.yaml")]
+                    yield LaunchFault(
+                        "controller_file", f"argument 'controller_file': {error}{nearest(file, there)}", ARGUMENTS
+                    )
+
+    def planner(self) -> ResolvedPlanner | None:
+        """Returns what plans for the task; None if the launch has no planner, or none of the name it gives."""
+        registry, group = self.registry(), str(self.launch.parameters.get("/arm_group_name", ""))
+        try:
+            return registry.resolve(str(self.launch.parameters.get("/planner_name", "")), group) if registry else None
+        except UnknownNameError:
+            return None
+
+    def _task_faults(self) -> Iterator[LaunchFault]:
+        """Yields what is wrong with the task, its states and templates, or the state machine that is loaded."""
+        for node in self.launch.nodes:
+            if node.executable == RUN_TASK:
+                own = self.launch.below(node.name)
+                machine = str(own.get("state_machine_to_load", "")).strip()
+                yield from self._machine_faults(machine) if machine else self._script_faults(own)
+
+    def _machine_faults(self, machine: str) -> Iterator[LaunchFault]:
+        folder, name = generator.default_output_directory(), "state_machine_to_load"
+        if not (Path(machine).is_file() or (folder / machine).is_file()):
+            there = sorted(path.name for path in folder.glob("*.py"))
+            text = f"argument '{name}': there is no file {machine}, nor in {folder}; {listing(there, 'it is empty')}"
+            yield LaunchFault(name, f"{text}{nearest(machine, there)}", ARGUMENTS)
+
+    def _script_faults(self, own: Mapping[str, Any]) -> Iterator[LaunchFault]:
+        script = str(own.get("task_constructor_script", ""))
+        folders = [pipeline.directories_from(str(own.get(f"{kind}_directory", ""))) for kind in ("states", "templates")]
+        for kind, given in zip(("states", "templates"), folders, strict=True):
+            for folder in given:
+                if not folder.is_dir():
+                    name = f"{kind}_directory"
+                    yield LaunchFault(name, f"argument '{name}': there is no folder {folder}", ARGUMENTS)
+                    return
+        try:
+            pipeline.check_task(
+                default_folders.task_script(Path(script)),
+                default_folders.states_folders(folders[0]),
+                default_folders.templates_folders(folders[1]),
+                self._known_names(str(own.get("config_directory", ""))),
+            )
+        except TaskFault as error:
+            for fault in error.faults:
+                yield LaunchFault("", f"the task: {fault}", "task")
+        except (OSError, ValueError) as error:
+            yield LaunchFault("", f"the task cannot be read: {error}", "task")
+
+    def _known_names(self, config: str) -> KnownNames:
+        names = names_of_config(Path(config)) if config else KnownNames()
+        srdf = str(self.launch.parameters.get(f"/{DESCRIPTION}_semantic") or "")
+        names = names.with_robot(srdf, f"the parameter /{DESCRIPTION}_semantic") if srdf else names
+        registry = self.registry()
+        return names if registry is None else names.with_planners(frozenset(registry.all_names()))
+
+
+def _unknown(name: str, what: str, found: str, known: tuple[str, ...]) -> LaunchFault:
+    text = f"there is no {what} '{found}'; {listing(known)}{nearest(found, known)}"
+    return LaunchFault(name, f"parameter '{name}': {text}" if name else text)
