@@ -29,7 +29,6 @@ WRAPPER = """<launch>
     <arg name="controller_file" value="ur5_controller.yaml" if="$(arg own_server)"/>
     <arg name="connection_file" value="connection_emulators.yaml"/>
     <arg name="task_constructor_script" value="pick_and_hold.yaml"/>
-    <arg name="generated_state_machine_name" value="pick_and_hold.py"/>
     <arg name="gui" value="false"/>
     <arg name="rviz" value="false"/>
     <arg name="end_with_task" value="true"/>

@@ -276,7 +276,8 @@ class _Reader:
             if len(self._reading.faults) == before:
                 resolved[tuple(item.items())] = self._resolved(node, settings)
             found.append(Combination(item, settings))
-        note_equal_levels(factors, resolved, self._reading)
+        if not len(self._reading.faults):
+            note_equal_levels(factors, resolved, self._reading)
         return tuple(found)
 
     def _resolved(self, node: Mapping, settings: Map[str, Any]) -> str:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from modular_framework_core.files import default_folders
 from modular_framework_core.files.faults import TaskFault, listing, nearest
 from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
-from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves
+from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves, preview_launch
 from modular_framework_core.task_constructor import generator, pipeline
 from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
 from modular_framework_planning.errors import ModelError, PlanningError
@@ -77,8 +78,10 @@ class LaunchCheck:
     def _planner_faults(self) -> Iterator[LaunchFault]:
         registry = self.registry()
         assert registry is not None and self._node is not None
-        for text in registry.adapter_faults():
-            yield LaunchFault("", text)
+        parent = f"{self._node.name}/{PIPELINES}/"
+        given = [name.removeprefix(parent).split("/")[0] for name in leaves(self._given) if name.startswith(parent)]
+        broken = registry.adapter_faults([registry.default, *given])
+        yield from (LaunchFault("", text) for text in broken)
         for name, value in self._names.naming("pipeline"):
             if value not in registry.specs:
                 yield _unknown(name, "pipeline", value, tuple(registry.specs))
@@ -89,9 +92,14 @@ class LaunchCheck:
             except UnknownNameError as error:
                 yield _unknown(name, error.what, error.name, error.known)
                 continue
+            except ModelError:
+                continue  # noted above
+            for text in registry.adapter_faults([found.pipeline]):
+                if text not in broken:
+                    yield LaunchFault(name, text)
             for text in registry.faults(found):
                 yield LaunchFault(name, f"planner '{value}': {text.replace('; it is ignored', '')}")
-        yield from self._pipeline_faults(registry, f"{self._node.name}/{PIPELINES}/")
+        yield from self._pipeline_faults(registry, parent)
 
     def _pipeline_faults(self, registry: PlannerRegistry, parent: str) -> Iterator[LaunchFault]:
         """Yields what is wrong with the pipelines' parameters that are given."""
@@ -167,7 +175,7 @@ class LaunchCheck:
         registry, group = self.registry(), str(self.launch.parameters.get("/arm_group_name", ""))
         try:
             return registry.resolve(str(self.launch.parameters.get("/planner_name", "")), group) if registry else None
-        except UnknownNameError:
+        except (UnknownNameError, ModelError):
             return None
 
     def _task_faults(self) -> Iterator[LaunchFault]:
@@ -194,18 +202,8 @@ class LaunchCheck:
                     name = f"{kind}_directory"
                     yield LaunchFault(name, f"argument '{name}': there is no folder {folder}", ARGUMENTS)
                     return
-        try:
-            pipeline.check_task(
-                default_folders.task_script(Path(script)),
-                default_folders.states_folders(folders[0]),
-                default_folders.templates_folders(folders[1]),
-                self._known_names(str(own.get("config_directory", ""))),
-            )
-        except TaskFault as error:
-            for fault in error.faults:
-                yield LaunchFault("", f"the task: {fault}", "task")
-        except (OSError, ValueError) as error:
-            yield LaunchFault("", f"the task cannot be read: {error}", "task")
+        names = self._known_names(str(own.get("config_directory", "")))
+        yield from _task_faults(script, tuple(folders[0]), tuple(folders[1]), _Names(names))
 
     def _known_names(self, config: str) -> KnownNames:
         names = names_of_config(Path(config)) if config else KnownNames()
@@ -215,6 +213,48 @@ class LaunchCheck:
         return names if registry is None else names.with_planners(frozenset(registry.all_names()))
 
 
+class _Names:
+    """The names a task may use; equal ones have equal content, so that a task is checked once for each."""
+
+    def __init__(self, names: KnownNames) -> None:
+        self.names = names
+        self._content = repr(sorted((kind, sorted(found)) for kind, found in names.names.items()))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Names) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+
+@lru_cache(maxsize=64)
+def _task_faults(
+    script: str, states: tuple[Path, ...], templates: tuple[Path, ...], known: _Names
+) -> tuple[LaunchFault, ...]:
+    """Returns the faults of a task; a task does not change while an experiment is read."""
+    try:
+        pipeline.check_task(
+            default_folders.task_script(Path(script)),
+            default_folders.states_folders(states),
+            default_folders.templates_folders(templates),
+            known.names,
+        )
+    except TaskFault as error:
+        return tuple(LaunchFault("", f"the task: {fault}", "task") for fault in error.faults)
+    except (OSError, ValueError) as error:
+        return (LaunchFault("", f"the task cannot be read: {error}", "task"),)
+    return ()
+
+
 def _unknown(name: str, what: str, found: str, known: tuple[str, ...]) -> LaunchFault:
     text = f"there is no {what} '{found}'; {listing(known)}{nearest(found, known)}"
     return LaunchFault(name, f"parameter '{name}': {text}" if name else text)
+
+
+def launch_faults(path: str, arguments: Sequence[str]) -> list[str]:
+    """Returns everything that is wrong with the names in a launch file, its arguments and its configuration files.
+
+    Raises:
+        roslaunch.core.RLException: The launch file cannot be loaded.
+    """
+    return [fault.text for fault in LaunchCheck(preview_launch(path, arguments)).faults()]

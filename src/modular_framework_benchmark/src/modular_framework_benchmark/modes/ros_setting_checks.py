@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any
@@ -23,7 +24,9 @@ from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves, preview_launch
 from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.kinematics.kinematics_settings import NUMERIC
 from modular_framework_planning.planning_pipeline.planner_registry import ResolvedPlanner, UnknownNameError
+from modular_framework_urdf.urdf_reader import read_urdf
 
 NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")
 
@@ -32,14 +35,24 @@ def setting_checks() -> dict[str, SettingsCheck]:
     """Returns what looks up the settings of each mode."""
     planning, kinematics, grasps = PlanningEpisodeRunner(), KinematicsEpisodeRunner(), GraspEpisodeRunner()
 
+    def check_kinematics(settings: Mapping[str, Any]) -> None:
+        solver = str(settings["solver"])
+        if solver not in ("", NUMERIC) and "/" not in solver:
+            raise ModeError(f"solver '{solver}': allowed are {NUMERIC}, and PACKAGE/PLUGIN of a kinematics.yaml")
+        kinematics.prepared(settings)
+
     def check_grasps(settings: Mapping[str, Any]) -> None:
+        joint = str(settings["gripper_joint"])
+        joints = [item.name for item in read_urdf(grasps.robot(settings["robot"]).urdf).joints]
+        if joint not in joints:
+            raise ModeError(f"gripper_joint '{joint}': the robot has none; {listing(joints)}{nearest(joint, joints)}")
         load_method(str(settings["method"]), settings["method_parameters"])
         grasps.prepared(settings)
 
     return {
         "task": check_task,
         "planning": lambda settings: check_planning(planning, settings),
-        "kinematics": lambda settings: _checked_by(kinematics.prepared, settings),
+        "kinematics": lambda settings: _checked_by(check_kinematics, settings),
         "grasps": lambda settings: _checked_by(check_grasps, settings),
     }
 
@@ -61,11 +74,9 @@ def _checked_by(prepare: Any, settings: Mapping[str, Any]) -> CheckedSettings:
 
 def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
     """Checks the launch and the task of mode `task`."""
-    given = _plain(settings, "objects", "success")
+    given = {key: settings[key] for key in ("launch", "arguments", "task")}
     try:
-        stack = resolve_launch(read_settings(EpisodeSpec(0, {}, 0, 1, given)))
-        path = roslaunch.rlutil.resolve_launch_arguments([stack.package, stack.launch_file])[0]
-        launch = _preview(path, tuple(f"{name}:={value}" for name, value in stack.arguments.items()))
+        launch = _preview(json.dumps(given))
     except (SettingsError, roslaunch.core.RLException, rospkg.ResourceNotFound) as error:
         return CheckedSettings((SettingFault(("arguments",), str(error)),), None)
     check = LaunchCheck(launch, settings["parameters"], tuple(settings["extra_parameters"]))
@@ -84,9 +95,12 @@ def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
     )
 
 
-@lru_cache(maxsize=64)
-def _preview(path: str, arguments: tuple[str, ...]) -> LaunchPreview:
-    return preview_launch(path, arguments)
+@lru_cache(maxsize=256)
+def _preview(settings: str) -> LaunchPreview:
+    """Returns what an episode with these settings launches: JSON with launch, arguments and task."""
+    stack = resolve_launch(read_settings(EpisodeSpec(0, {}, 0, 1, json.loads(settings))))
+    path = roslaunch.rlutil.resolve_launch_arguments([stack.package, stack.launch_file])[0]
+    return preview_launch(path, [f"{name}:={value}" for name, value in stack.arguments.items()])
 
 
 def check_planning(runner: PlanningEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:

@@ -88,6 +88,7 @@ def run_launch_file(
     task_name: str,
     later_files: Sequence[Path] = (),
     leaves_nodes: bool = False,
+    faults: Callable[[str, list[str]], Sequence[str]] = lambda path, arguments: (),
 ) -> int:
     """Runs a launch file until its task or one of its nodes ends, and prints last why it ended.
 
@@ -97,6 +98,7 @@ def run_launch_file(
         arguments: Launch arguments, `name:=value`; the launch file has `end_with_task`.
         task_name: Name of the node that runs the task; "" if the end of every node ends the launch.
         later_files: Launch files read after it: their parameters replace those of the launch file.
+        faults: Returns what is wrong with the names in the launch file and its arguments; nothing starts then.
         leaves_nodes: Whether this process exits at once when a node died, and leaves the others to the caller.
 
     Returns:
@@ -106,6 +108,9 @@ def run_launch_file(
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (package, launch_file))])[0]
         check_arguments(path, arguments)
+        found = faults(path, arguments)
+        if found:
+            raise roslaunch.core.RLException(f"{path}: {len(found)} faults:" + "".join(f"\n  {text}" for text in found))
         ends_with_task = argument_values(path, arguments)["end_with_task"]
         watcher = EndWatcher(task_name, bool(roslaunch.loader.convert_value(ends_with_task, "bool")))
         uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)

@@ -14,6 +14,7 @@ import jinja2
 
 from modular_framework_core.files import default_folders
 from modular_framework_core.files.atomic_files import write_atomically
+from modular_framework_core.task_constructor.header_fields import module_name_fault
 from modular_framework_core.task_constructor.state_catalogue import StateSource
 from modular_framework_core.task_constructor.task_spec import MachineSpec, TaskSpec
 
@@ -127,19 +128,32 @@ def generate(task: TaskSpec, templates: Iterable[Path], digest: str = "not kept"
     return text
 
 
-def module_path(task: TaskSpec, directory: Path) -> Path:
-    """Returns where the module of a task belongs in a directory."""
-    return directory / f"{task.name}.py"
+def module_path(task: TaskSpec, directory: Path, file_name: str = "") -> Path:
+    """Returns where the module of a task belongs in a directory.
+
+    Args:
+        task: The task.
+        directory: The directory.
+        file_name: Name of the file, with or without .py; "" for the task's name.
+
+    Raises:
+        ValueError: The name cannot be that of a Python module.
+    """
+    stem = file_name.removesuffix(".py") or task.name
+    fault = module_name_fault(stem)
+    if fault:
+        raise ValueError(f"generated_state_machine_name: '{file_name}' {fault}")
+    return directory / f"{stem}.py"
 
 
-def write(task: TaskSpec, text: str, directory: Path) -> Path:
-    """Writes a generated module to ``<directory>/<task name>.py``, executable, in one step.
+def write(task: TaskSpec, text: str, directory: Path, file_name: str = "") -> Path:
+    """Writes a generated module, executable, in one step; arguments and errors as for ``module_path``.
 
     Returns:
         The path of the file.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    target = module_path(task, directory)
+    target = module_path(task, directory, file_name)
     write_atomically(target, text, mode=0o755)
     return target
 

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import keyword
 import re
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
+MAX_NAME_LENGTH = 100
 _LABEL = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _NODE_NAME = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
 
@@ -26,10 +28,28 @@ def identifier(node: Node, what: str, faults: FaultList) -> str | None:
     name = text(node, what, faults)
     if name is None:
         return None
-    if name.isidentifier() and name.isascii() and not keyword.iskeyword(name):
-        return name
-    faults.add(node.location, f"{what} '{name}' must be letters, digits and underscores, and start with a letter")
-    return None
+    fault = module_name_fault(name)
+    if fault:
+        faults.add(node.location, f"{what} '{name}' {fault}")
+    return None if fault else name
+
+
+def module_name_fault(name: str) -> str:
+    """Returns why a text cannot be the name of a generated module; "" if it can."""
+    if not name.isidentifier() or not name.isascii() or keyword.iskeyword(name):
+        return "must be letters, digits and underscores, and start with a letter"
+    if len(name) > MAX_NAME_LENGTH:
+        return f"has {len(name)} characters; allowed are {MAX_NAME_LENGTH}: it is the name of a file"
+    try:
+        found = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        found = None
+    if found is not None and found.origin:
+        return (
+            f"is the Python module {found.origin}, which a file of that name would hide from the state machines "
+            "beside it; choose another name"
+        )
+    return ""
 
 
 def node_name(node: Node, faults: FaultList) -> str | None:

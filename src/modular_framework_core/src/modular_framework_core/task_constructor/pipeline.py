@@ -50,10 +50,12 @@ def construct_task(
     templates_directories: Sequence[Path],
     output: Path,
     known: KnownNames | None = None,
+    file_name: str = "",
 ) -> tuple[TaskSpec, Path]:
     """Checks a task and writes its module into the directory ``output``; returns the task and the path of the module.
 
-    A module that is there already is kept when nothing it was made from has changed.
+    A module that is there already is kept when nothing it was made from has changed. The file has the task's name, or
+    ``file_name``.
 
     Raises:
         TaskFault, FileNotFoundError: As ``check_task``.
@@ -61,9 +63,9 @@ def construct_task(
     """
     task = check_task(script, states_directories, templates_directories, known)
     digest = generator.digest_line(task, templates_directories)
-    target = generator.module_path(task, output)
+    target = generator.module_path(task, output, file_name)
     if not generator.is_up_to_date(target, digest):
-        generator.write(task, generator.generate(task, templates_directories, digest), output)
+        generator.write(task, generator.generate(task, templates_directories, digest), output, file_name)
     return task, target
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import keyword
 from typing import Any
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
@@ -17,6 +18,11 @@ from modular_framework_core.task_constructor.task_spec import StateSpec
 
 _RESERVED = ("source", "transitions", "remapping", "params")
 """Keys of a state that are not options of it."""
+
+
+def _is_argument(key: str) -> bool:
+    """Returns whether the generated module can pass an option to the constructor of a state."""
+    return key.isidentifier() and not keyword.iskeyword(key) and key != "self"
 
 
 class StateBuilder:
@@ -35,7 +41,7 @@ class StateBuilder:
             given = [key for key in body.entries if key == "source" or meant_key(key, ["source"]) is None]
             body = spelt_as_meant(body, [*_RESERVED, *given], f"state '{label}': key", self._faults)
         else:
-            free = [key for key in body.entries if source.takes_any_option and key.isidentifier()]
+            free = [key for key in body.entries if source.takes_any_option and _is_argument(key)]
             what = f"state '{label}' ({source.name}): key"
             body = spelt_as_meant(body, [*_RESERVED, *source.options, *free], what, self._faults)
         if "source" not in body.entries:

@@ -6,7 +6,7 @@ Parameters (used where there is no argument):
     ``~task_constructor_script``: path of the task script, or its name in the API package's folder of scripts.
     ``~state_machine_to_load``: path of an existing state machine, or its name in the folder of generated ones; when it
         is not empty, nothing is generated.
-    ``~generated_state_machine_name``: name expected of the generated file; another one is only remarked.
+    ``~generated_state_machine_name``: file name of the generated state machine; empty: the task's name.
     ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list); the
         framework's own are found after them.
     ``~config_directory``: folder whose files have the names of messages a task may use; empty: these are not checked.
@@ -329,13 +329,11 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
         for folder in StateCatalogue(states).empty_directories:
             rospy.logwarn(pipeline.no_states_in(folder))
         output = generator.default_output_directory()
-        task, path = pipeline.construct_task(script, states, templates, output, _known_names())
+        file_name = str(rospy.get_param("~generated_state_machine_name", "") or "")
+        task, path = pipeline.construct_task(script, states, templates, output, _known_names(), file_name)
     except (TaskFault, generator.GenerationError, OSError, ValueError) as error:
         raise TaskNotRun(str(error)) from error
     rospy.loginfo(f"state machine of task '{task.name}' written to {path}")
-    expected = str(rospy.get_param("~generated_state_machine_name", "") or path.name)
-    if expected != path.name:
-        rospy.loginfo(f"generated_state_machine_name is '{expected}'; the file has the task's name: '{path.name}'")
     return _prepare_machine(path)
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,7 +93,12 @@ class PlannerRegistry:
             spec = self.specs.get(item)
             if spec is None:
                 raise UnknownNameError("pipeline", item, tuple(self.specs))
-            known = planner_ids(spec)
+            try:
+                known = planner_ids(spec)
+            except ModelError:
+                if wanted or item == self.default:
+                    raise
+                continue  # move_group leaves such a pipeline out
             asked = without_group(planner or spec.settings.default_planner(group))
             kind, settings = planner_kind(
                 spec.settings.planner_configs.get(asked) or {}, spec.settings.groups, asked, group
@@ -114,10 +119,13 @@ class PlannerRegistry:
         check = getattr(planner_class(found.plugin), "parameter_faults", None)
         return list(check(found.planner, found.settings if settings is None else settings)) if check else []
 
-    def adapter_faults(self) -> list[str]:
-        """Returns what is wrong with the plugins and request adapters that the pipelines name, one sentence each."""
+    def adapter_faults(self, pipelines: Iterable[str]) -> list[str]:
+        """Returns what is wrong with the plugins and request adapters of some pipelines, one sentence each."""
         faults = []
-        for name, spec in self.specs.items():
+        for name in dict.fromkeys(pipelines):
+            spec = self.specs.get(name)
+            if spec is None:
+                continue
             try:
                 planner_class(spec.planner)
                 make_adapters(spec.adapters)
@@ -126,7 +134,10 @@ class PlannerRegistry:
         return faults
 
     def _planners(self, spec: PipelineSpec) -> tuple[str, ...]:
-        known = planner_ids(spec)
+        try:
+            known = planner_ids(spec)
+        except ModelError:
+            return ()
         named = (
             name
             for name, item in spec.settings.planner_configs.items()

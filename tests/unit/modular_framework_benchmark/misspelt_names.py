@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Misspelt and impossible names and values at every place where a name or a value may stand, and what refuses each."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import roslaunch.core
+import roslaunch.rlutil
+import rospkg
+import yaml
+
+from modular_framework_benchmark.commands.mode_runners import known_metrics
+from modular_framework_benchmark.experiments.experiment_file import read_experiment
+from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
+from modular_framework_benchmark.experiments.ros_surroundings import RosSurroundings
+from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
+from modular_framework_core.launching.launch_arguments import check_arguments
+from modular_framework_core.task_constructor import pipeline
+
+TASK: dict[str, Any] = {
+    "experiment": "picks",
+    "mode": "task",
+    "task": "simulation_pick.yaml",
+    "arguments": {"world_file": "ur5_table.world"},
+    "parameters": {"/planner_name": "$planner"},
+    "objects": [{"model": "cube", "x": [-0.25, 0.25], "y": [0.36, 0.64], "on": 0.84}],
+    "success": {"lifted": 0.10, "hold_time": 2.0},
+    "factors": {"planner": ["RRTConnect", "BKPIECE"]},
+    "compare": "planner",
+    "metrics": ["success", "task_time"],
+    "trials": 5,
+}
+PLAIN = TASK | {
+    "parameters": {},
+    "factors": {"world": {"a": {}, "b": {"arguments": {"weld_grasps": True}}}},
+    "compare": "world",
+}
+PROBLEMS = "problems"
+PLANNING: dict[str, Any] = {
+    "experiment": "plans",
+    "mode": "planning",
+    "robot": "panda_hand_moveit_config",
+    "problems": PROBLEMS,
+    "group": "panda_arm",
+    "planner": "$planner",
+    "factors": {"planner": ["RRTConnect", "RRT"]},
+    "compare": "planner",
+    "trials": 2,
+}
+KINEMATICS: dict[str, Any] = {
+    "experiment": "solvers",
+    "mode": "kinematics",
+    "robot": "panda_hand_moveit_config",
+    "group": "$group",
+    "factors": {"group": ["panda_arm", "panda_manipulator"]},
+    "compare": "group",
+    "trials": 2,
+}
+GRASPS: dict[str, Any] = {
+    "experiment": "grasps",
+    "mode": "grasps",
+    "robot": "panda_hand_moveit_config",
+    "group": "panda_manipulator",
+    "gripper_joint": "panda_finger_joint1",
+    "method": "$method",
+    "objects": [{"model": "cube", "x": 0.4, "y": 0.0, "on": 0.0}],
+    "factors": {
+        "method": [
+            "top_down_grasps.ros_top_down_node:TopDownMethod",
+            "antipodal_grasps.ros_antipodal_node:AntipodalMethod",
+        ],
+    },
+    "compare": "method",
+    "trials": 2,
+}
+PIPELINE = "/move_group/planning_pipelines/ompl"
+GENERATOR = "/top_down_grasp_generator"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One wrong name or value.
+
+    Attributes:
+        place: Where it stands.
+        wrong: The name or value.
+        refused: Returns what refuses it, given a folder for files; "" if nothing does.
+        words: Pattern that the refusal has: the nearest name, or what is allowed.
+    """
+
+    place: str
+    wrong: str
+    refused: Callable[[Path], str]
+    words: str
+
+    def is_refused(self, folder: Path) -> bool:
+        """Returns whether it is refused with the words that help."""
+        return re.search(self.words, self.refused(folder), re.DOTALL) is not None
+
+
+@cache
+def checks() -> Any:
+    """Returns what looks up the settings of each mode, once: robots stay loaded."""
+    return setting_checks()
+
+
+def experiment_faults(content: dict[str, Any], folder: Path) -> str:
+    """Returns the faults of an experiment; "" if it could run."""
+    try:
+        read_experiment(
+            yaml.safe_dump(content), folder / "experiment.yaml", RosSurroundings(), known_metrics(), checks()
+        )
+    except ExperimentFault as error:
+        return str(error)
+    return ""  # fmt: skip
+
+
+def changed(base: dict[str, Any], path: tuple[Any, ...], value: Any) -> dict[str, Any]:
+    """Returns an experiment with another value at the end of a path of keys."""
+    content: dict[str, Any] = yaml.safe_load(yaml.safe_dump(base))
+    inner: Any = content
+    for key in path[:-1]:
+        inner = inner.setdefault(key, {}) if isinstance(inner, dict) else inner[key]
+    inner[path[-1]] = value
+    return content
+
+
+def in_experiment(base: dict[str, Any], path: tuple[Any, ...], value: Any, words: str) -> Case:
+    """Returns the case of a value in an experiment."""
+    return Case(
+        f"{base['mode']}: {'.'.join(map(str, path))}",
+        str(value),
+        lambda folder: experiment_faults(changed(base, path, value), folder),
+        words,
+    )
+
+
+def in_parameters(name: str, value: Any, words: str) -> Case:
+    """Returns the case of a ROS parameter in an experiment of mode task."""
+    return in_experiment(TASK, ("parameters", name), value, words)
+
+
+def in_launch(argument: str, words: str, package: str = "modular_framework_api") -> Case:
+    """Returns the case of an argument of run_framework."""
+
+    def refused(folder: Path) -> str:
+        path = roslaunch.rlutil.resolve_launch_arguments([package, "start_framework.launch"])[0]
+        try:
+            check_arguments(path, [argument])
+            return "\n".join(launch_faults(path, [argument]))
+        except roslaunch.core.RLException as error:
+            return str(error)
+
+    return Case("run_framework", argument, refused, words)
+
+
+def in_config(file: str, key: str, value: Any, words: str) -> Case:
+    """Returns the case of a value in a configuration file."""
+
+    def refused(folder: Path) -> str:
+        shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
+        for path in shipped.iterdir():
+            (folder / path.name).write_bytes(path.read_bytes())
+        content = yaml.safe_load((folder / file).read_text())
+        (folder / file).write_text(yaml.safe_dump(changed(content, tuple(key.split("/")), value)))
+        return in_launch(f"config_directory:={folder}", "").refused(folder)
+
+    return Case(file, f"{key}: {value}", refused, words)
+
+
+def in_task(old: str, new: str, words: str) -> Case:
+    """Returns the case of a text in the task that an experiment names."""
+
+    def refused(folder: Path) -> str:
+        path = Path(rospkg.RosPack().get_path("modular_framework_api")) / "task_constructor_scripts"
+        text = (path / "pick_and_hold.yaml").read_text()
+        assert old in text, old
+        (folder / "task.yaml").write_text(text.replace(old, new, 1))
+        return experiment_faults({**TASK, "task": "task.yaml"}, folder)
+
+    return Case("task of an experiment", new, refused, words)
+
+
+def in_script(text: str, words: str, state: str = "") -> Case:
+    """Returns the case of a task that `state_machine_generator --check` reads, with a state of the user's own."""
+
+    def refused(folder: Path) -> str:
+        (folder / "own.yaml").write_text(text)
+        (folder / "states").mkdir()
+        if state:
+            (folder / "states" / "mine.py").write_text(state)
+        printed = io.StringIO()
+        with contextlib.redirect_stderr(printed):
+            code = pipeline.main([str(folder / "own.yaml"), str(folder / "states"), "--check"])
+        return printed.getvalue() if code else ""
+
+    return Case("task script", text.split("\n")[0][:40], refused, words)
+
+
+OWN_STATE = """import smach
+class Mine(smach.State):
+    def __init__(self, outcomes=("success",), **options):
+        super().__init__(outcomes=list(outcomes))
+"""
+OWN_TASK = """name: {name}
+source: state_machine
+outcomes: [success]
+node_name: own
+states:
+  - FIRST: {{source: mine, {option}outcomes: [success], transitions: {{success: success}}}}
+"""
+
+CASES = [
+    # ROS parameters of an experiment
+    in_parameters("/planer_name", "RRT", "did you mean '/planner_name'"),
+    in_parameters("/planner_name", "BKPIECEE", "no planner 'BKPIECEE'.*did you mean 'BKPIECE'"),
+    in_parameters("/planner_name", "omple/RRT", "no pipeline 'omple'.*did you mean 'ompl'"),
+    in_parameters("/planner_name", "pilz_industrial_motion_planner/LINE", "no planner.*LIN'"),
+    in_parameters("/planner_name", 3, "is 3; allowed: a text"),
+    in_parameters("/robot_speed_factor", 7, "is 7; allowed: a number, above 0 and at most 1"),
+    in_parameters("/robot_speed_factor", "fast", "is 'fast'; allowed: a number"),
+    in_parameters("/arm_group_name", "armm", "no planning group 'armm'.*did you mean 'arm'"),
+    in_parameters("/number_plan_attempt", 0, "is 0; allowed: a whole number, at least 1"),
+    in_parameters("/number_plan_attempt", 1.5, "is 1.5; allowed: a whole number"),
+    in_parameters("/planning_max_time", -1.0, "is -1.0; allowed: a number, above 0"),
+    in_parameters("/max_torque", "strong", "is 'strong'; allowed: a number"),
+    in_parameters("/manipulator_group_name", "ezgriper", "no planning group 'ezgriper'.*did you mean 'ezgripper'"),
+    in_parameters("/seed", 5, "each episode has its own seed"),
+    in_parameters("/task/wait_for_start", False, "an episode starts its task itself"),
+    in_parameters(f"{GENERATOR}/yaw_step", -3, "is -3; allowed: a number, at least 0.02"),
+    in_parameters(f"{GENERATOR}/yaw_stp", 0.3, f"did you mean '{GENERATOR}/yaw_step'"),
+    in_parameters(f"{GENERATOR}/finger_clearance", "wide", "is 'wide'; allowed: a number"),
+    in_parameters(f"{GENERATOR}/max_grasps", 0, "is 0; allowed: a whole number, at least 1"),
+    in_parameters(f"{GENERATOR}/check_reachability", "yes please", "allowed: true or false"),
+    in_parameters(
+        f"{GENERATOR}/gripper_joint", "ezgripper_knuckle_palm_L1", "no joint.*did you mean 'ezgripper_knuckle"
+    ),
+    in_parameters(GENERATOR, {"max_checks": -4}, "is -4; allowed: a whole number, at least 1"),
+    in_parameters("/antipodal_grasp_generator/max_grasps", 3, "no node of the launch reads"),
+    in_parameters("/gazebo/physics_engine", "bullet", "is 'bullet'; allowed: pybullet, mujoco"),
+    in_parameters("/gazebo/time_step", 0.05, "is 0.05; allowed: a number, at least 0.0001 and at most 0.01"),
+    in_parameters("/gazebo/weld_grasp", True, "did you mean '/gazebo/weld_grasps'"),
+    in_parameters(
+        f"{PIPELINE}/planner_configs/RRTConnect/range", -1, "'range' is '-1'.*allowed: a number of at least 0"
+    ),
+    in_parameters(f"{PIPELINE}/planner_configs/RRTConnect/rnge", 1.0, "no setting 'rnge'.*did you mean 'range'"),
+    in_parameters(f"{PIPELINE}/planner_configs/RRTConect/range", 1.0, "no planner 'RRTConect'.*'RRTConnect'"),
+    in_parameters(f"{PIPELINE}/planner_configs/RRT/goal_bias", 2.0, "'goal_bias' is '2.0'.*from 0 to 1"),
+    in_parameters(
+        f"{PIPELINE}/plannr_configs/RRTConnect/range", 1.0, "no parameter 'plannr_configs'.*'planner_configs'"
+    ),
+    in_parameters("/move_group/planning_pipelines/omple/planner_configs/RRT/range", 1.0, "no pipeline 'omple'.*'ompl'"),
+    in_parameters("/move_group/longest_valid_segment_fraction", 0.1, "no node of the launch reads"),
+    in_parameters("/move_group/default_planning_pipeline", "omple", "no pipeline 'omple'.*did you mean 'ompl'"),
+    in_parameters(f"{PIPELINE}/request_adapters", "AddTimeOptimal", "AddTimeOptimal' is not known; known are"),
+    in_parameters(f"{PIPELINE}/planning_plugin", "ompl_interface/OMPL", "known are ompl_interface/OMPLPlanner"),
+    in_parameters(f"{PIPELINE}/jiggle_fraction", 3, "is 3; allowed: a number, at least 0 and at most 1"),
+    in_parameters("/move_group/trajectory_execution/allowed_start_tolerance", -1, "allowed: a number, at least 0"),
+    # Launch arguments of an experiment
+    in_experiment(TASK, ("arguments",), {"world_fil": "ur5_table.world"}, "did you mean 'world_file'"),
+    in_experiment(TASK, ("arguments", "world_file"), "ur5_tabel.world", "did you mean 'ur5_table.world'"),
+    in_experiment(TASK, ("arguments", "physics_engine"), "bullet", "allowed: pybullet, mujoco"),
+    in_experiment(TASK, ("arguments", "time_step"), 0.05, "at most 0.01"),
+    in_experiment(TASK, ("arguments", "simulation"), False, "allowed: true"),
+    in_experiment(TASK, ("arguments", "seed"), 4, "each episode has its own seed"),
+    in_experiment(PLAIN, ("arguments", "planner_name"), "RRTConect", "no planner 'RRTConect'.*'RRTConnect'"),
+    in_experiment(
+        TASK, ("arguments", "controller_file"), "ur5_controllers.yaml", "ur5_ezgripper_controller_simulation"
+    ),
+    in_experiment(
+        TASK, ("arguments", "method_launch_file"), "top_down_grasp/top_down_grasps.launch", "top_down_grasps"
+    ),
+    in_experiment(TASK, ("arguments", "states_directory"), "/no/states", "no folder /no/states"),
+    in_experiment(TASK, ("arguments", "templates_directory"), "/no/templates", "no folder /no/templates"),
+    in_experiment(TASK, ("arguments", "state_machine_to_load"), "not_there.py", "no file not_there.py"),
+    # Other keys of an experiment
+    in_experiment(TASK, ("launch",), "modular_framework_api/start_framwork.launch", "did you mean 'start_framework"),
+    in_experiment(TASK, ("task",), "simulation_pik.yaml", "did you mean 'simulation_pick.yaml'"),
+    in_experiment(TASK, ("objects", 0, "model"), "cub", "did you mean 'cube'"),
+    in_experiment(TASK, ("success", "liftd"), 0.1, "did you mean 'lifted'"),
+    in_experiment(TASK, ("metrics",), ["sucess"], "did you mean 'success'"),
+    in_experiment(TASK, ("mode",), "tasks", "did you mean 'task'"),
+    in_experiment(TASK, ("compare",), "planer", "did you mean 'planner'"),
+    in_experiment(TASK, ("trails",), 5, "'trails' is unknown; allowed: .*trials"),
+    in_experiment(TASK, ("factors", "planner"), ["RRTConnect", "ompl/RRTConnect"], "run the same"),
+    in_experiment(
+        PLAIN,
+        ("factors", "world"),
+        {"a": {"arguments": {"weld_grasps": False}}, "b": {"arguments": {"weld_grasps": False}}},
+        "run the same",
+    ),
+    # The task that an experiment names
+    in_task("source: plan", "source: plann", "did you mean 'plan'"),
+    in_task("target_state_type: joint_state", "target_state_type: joint_stat", "joint_state"),
+    in_task("plan_name:", "plan_nam:", "did you mean 'plan_name'"),
+    # Other modes
+    in_experiment(PLANNING, ("factors", "planner"), ["RRTConnect", "RTT"], "no planner 'RTT'.*did you mean 'RRT'"),
+    in_experiment(PLANNING, ("pipeline",), "omple", "no pipeline 'omple'.*did you mean 'ompl'"),
+    in_experiment(PLANNING, ("group",), "pandaarm", "no planning group 'pandaarm'.*did you mean 'panda_arm'"),
+    in_experiment(PLANNING, ("robot",), "panda_hand_moveit_confg", "did you mean 'panda_hand_moveit_config'"),
+    in_experiment(PLANNING, ("planner_parameters",), {"rang": 1.0}, "no setting 'rang'.*did you mean 'range'"),
+    in_experiment(PLANNING, ("planner_parameters",), {"range": "far"}, "'range' is 'far'.*a number of at least 0"),
+    in_experiment(PLANNING, ("parameters",), {f"{PIPELINE}/plannr_configs/RRT/range": 1.0}, "'planner_configs'"),
+    in_experiment(KINEMATICS, ("factors", "group"), ["panda_arm", "panda_amr"], "panda_arm"),
+    in_experiment(KINEMATICS, ("solver",), "trac_ikk", "allowed|known"),
+    in_experiment(GRASPS, ("gripper_joint",), "panda_finger_joint", "panda_finger_joint1"),
+    in_experiment(GRASPS, ("method_parameters",), {"finger_clearance": "wide"}, "is 'wide'; allowed: a number"),
+    in_experiment(GRASPS, ("method_parameters",), {"finger_clearence": 0.01}, "did you mean 'finger_clearance'"),
+    in_experiment(GRASPS, ("factors", "method"), ["top_down_grasps.ros_top_down_node:TopDown", "b:C"], "MODULE:CLASS"),
+    # run_framework and configuration files
+    in_launch("planner_name:=BKPIECEE", "no planner 'BKPIECEE'.*did you mean 'BKPIECE'"),
+    in_launch("physics_engine:=mujoko", "is 'mujoko'; allowed: pybullet, mujoco"),
+    in_launch("controller_file:=no.yaml", "ur5_ezgripper_controller_simulation.yaml"),
+    in_launch("seed:=-4", "is -4; allowed: a whole number, at least 0"),
+    in_launch("task_constructor_script:=simulation_pik.yaml", "simulation_pik.yaml"),
+    in_launch("planner_name:=RRTConect", "did you mean 'RRTConnect'", "panda_hand_robot"),
+    in_config("motion_planner_config.yaml", "planner_name", "BKPIECEE", "did you mean 'BKPIECE'"),
+    in_config("motion_planner_config.yaml", "robot_speed_factor", 1.5, "is 1.5; allowed: a number, above 0"),
+    in_config(
+        "motion_planner_config.yaml", "arm_group_name", "arm_and_manipulatr", "did you mean 'arm_and_manipulator'"
+    ),
+    in_config("generative_methods_config.yaml", "top_down_grasp_generator/yaw_stp", 0.2, "did you mean.*yaw_step'"),
+    in_config("generative_methods_config.yaml", "top_down_grasp_generator/max_checks", "all", "is 'all'; allowed"),
+    # Task scripts
+    in_script(OWN_TASK.format(name="own", option="lambda: 3, "), "key 'lambda' is unknown", OWN_STATE),
+    in_script(OWN_TASK.format(name="own", option="class: 3, "), "key 'class' is unknown", OWN_STATE),
+    in_script(OWN_TASK.format(name="own", option="self: 3, "), "key 'self' is unknown", OWN_STATE),
+    in_script(OWN_TASK.format(name="n" * 300, option=""), "has 300 characters; allowed are 100", OWN_STATE),
+    in_script(OWN_TASK.format(name="rospy", option=""), "is the Python module .*choose another name", OWN_STATE),
+]
+
+
+def write_problem(folder: Path) -> None:
+    """Writes an empty planning problem, which experiments of mode planning name."""
+    (folder / PROBLEMS).mkdir(exist_ok=True)
+    for kind in ("scene", "request"):
+        (folder / PROBLEMS / f"{kind}0001.yaml").write_text("{}\n")

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is named is what runs: a name that nothing answers to is refused before anything starts.
+
+A third of the cases; `benchmarks/named_is_run` has all of them, and gives some to the commands.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from misspelt_names import (
+    CASES,
+    GENERATOR,
+    GRASPS,
+    KINEMATICS,
+    OWN_STATE,
+    OWN_TASK,
+    PIPELINE,
+    PLAIN,
+    PLANNING,
+    TASK,
+    Case,
+    changed,
+    experiment_faults,
+    in_launch,
+    in_script,
+    write_problem,
+)
+
+
+@pytest.mark.parametrize("case", CASES[::3], ids=lambda case: f"{case.place} {case.wrong}"[:60])
+def test_a_wrong_name_or_value_is_refused_with_the_nearest_or_the_allowed_one(case: Case, tmp_path: Path) -> None:
+    write_problem(tmp_path)
+    assert case.is_refused(tmp_path)
+
+
+@pytest.mark.parametrize("content", [TASK, PLANNING, KINEMATICS, GRASPS], ids=lambda content: content["mode"])
+def test_the_experiments_that_the_cases_change_are_in_order(content: dict, tmp_path: Path) -> None:
+    write_problem(tmp_path)
+    assert experiment_faults(content, tmp_path) == ""
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("parameters", "/planner_name"), "RRTConnectkConfigDefault"),
+        (("parameters", "/planner_name"), "LIN"),
+        (("parameters", "/planner_name"), "stomp/stomp"),
+        (("parameters", f"{PIPELINE}/planner_configs/RRTConnect/range"), 0.4),
+        (("parameters", f"{PIPELINE}/planner_configs"), {"Mine": {"type": "geometric::RRT", "range": 0.2}}),
+        (("parameters", GENERATOR), {"yaw_step": 0.5}),
+        (("arguments", "physics_engine"), "mujoco"),
+        (("arguments", "planner_name"), "PRM"),
+    ],
+)
+def test_names_that_something_answers_to_are_taken(path: tuple[str, ...], value: object, tmp_path: Path) -> None:
+    assert experiment_faults(changed(PLAIN, path, value), tmp_path) == ""
+
+
+def test_a_parameter_of_a_node_of_ones_own_is_taken_when_it_is_listed(tmp_path: Path) -> None:
+    content = changed(TASK, ("parameters", "/my_node/gain"), 2.0)
+    assert "extra_parameters" in experiment_faults(content, tmp_path)
+    assert experiment_faults({**content, "extra_parameters": ["/my_node/gain"]}, tmp_path) == ""
+
+
+def test_all_faults_of_an_experiment_are_listed_at_once(tmp_path: Path) -> None:
+    content = changed(TASK, ("parameters",), {"/planer_name": "$planner", "/robot_speed_factor": 7, "/max_torq": 1})
+    faults = experiment_faults(changed(content, ("arguments", "physics_engine"), "bullet"), tmp_path)
+    assert all(word in faults for word in ("planer_name", "robot_speed_factor", "max_torq", "bullet")), faults
+
+
+@pytest.mark.parametrize(
+    "package", ["modular_framework_api", "panda_hand_robot", "iiwa_wsg50_robot", "dual_panda_robot"]
+)
+@pytest.mark.parametrize("method", ["top_down_grasps", "antipodal_grasps", "point_cloud_grasps"])
+def test_what_is_shipped_names_only_what_is_there(package: str, method: str, tmp_path: Path) -> None:
+    assert in_launch(f"method_launch_file:={method}/{method}.launch", "", package).refused(tmp_path) == ""
+
+
+def test_an_own_state_with_free_options_is_in_order(tmp_path: Path) -> None:
+    assert in_script(OWN_TASK.format(name="own", option="gain: 3, "), "", OWN_STATE).refused(tmp_path) == ""
