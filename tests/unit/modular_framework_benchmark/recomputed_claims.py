@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recomputes from a result database what a report claims of it, with sqlite3 and NumPy alone.
+"""Recomputes from a result database what a report claims of it, with sqlite3, NumPy and SciPy's distributions alone.
 
 It imports nothing of the product, so that no fault of its statistics can hide in its tests. Run it on a report:
 `python3 recomputed_claims.py DATABASE REPORT.html`.
@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 STATUSES = ("succeeded", "failed", "timed_out", "broken")
-NORMAL_975 = 1.959963984540054
 
 
 def claims_of(page: str) -> dict[str, Any]:
@@ -73,16 +73,26 @@ def counted_value(episode: dict[str, Any], metric: dict[str, Any]) -> tuple[floa
     return value, False
 
 
-def wilson(successes: int, episodes: int) -> tuple[float, float]:
-    """Returns the 95 % interval of a rate. Source: E. B. Wilson, J. American Statistical Association, 1927."""
-    z, share = NORMAL_975, successes / episodes
-    middle = (share + z * z / (2 * episodes)) / (1 + z * z / episodes)
-    half = z / (1 + z * z / episodes) * math.sqrt(share * (1 - share) / episodes + z * z / (4 * episodes * episodes))
-    return middle - half, middle + half
+def score(episode: dict[str, Any], metric: dict[str, Any]) -> float | None:
+    """Returns what an episode of the mode `task` counts in a comparison: a failure is worse than any value."""
+    value = None if episode["status"] == "broken" else episode.get(metric["name"])
+    succeeded = episode["status"] == "succeeded"
+    if metric["name"] == "success":
+        return float(succeeded)
+    if metric["kind"] != "rate" and not succeeded and (metric["component"] == "task" or value is None):
+        return math.inf if metric["better"] == "lower" else -math.inf
+    return value
+
+
+def exact_rate(successes: int, episodes: int, level: float = 0.95) -> tuple[float, float]:
+    """Returns Clopper and Pearson's interval of a rate by the beta distribution."""
+    error = (1 - level) / 2
+    low = stats.beta.ppf(error, successes, episodes - successes + 1) if successes else 0.0
+    return low, stats.beta.isf(error, successes + 1, episodes - successes) if successes < episodes else 1.0
 
 
 def check_summary(claim: dict[str, Any], metric: dict[str, Any], episodes: list[dict[str, Any]]) -> None:
-    """Checks the counts, the estimate, its interval, median and quartiles of a method by a metric."""
+    """Checks the counts, the estimate, its interval, mean and quartiles of a method by a metric."""
     where = f"{claim['method']} {claim['metric']} {claim['levels']}"
     pairs = [counted_value(episode, metric) for episode in episodes]
     values = np.array([value for value, _ in pairs if value is not None])
@@ -90,31 +100,28 @@ def check_summary(claim: dict[str, Any], metric: dict[str, Any], episodes: list[
     assert counts["episodes"] == len(episodes), where
     for status in STATUSES:
         assert counts[status] == sum(episode["status"] == status for episode in episodes), where
-    assert counts["counted"] == len(values), where
+    scores = np.sort([found for episode in episodes if (found := score(episode, metric)) is not None])
+    assert counts["counted"] == counts["units"] == len(scores), where  # every episode has a seed of its own here
     assert counts["censored"] == sum(censored for _, censored in pairs), where
-    assert counts["missing"] == len(episodes) - len(values), where
-    if not len(values):
+    assert counts["missing"] == len(episodes) - len(scores), where
+    if not len(scores):
         assert claim["estimate"] is None, where
         return
-    estimate, interval = claim["estimate"], claim["estimate"]["interval"]
-    assert math.isclose(estimate["value"], values.mean(), rel_tol=1e-9), where
+    interval = claim["estimate"]["interval"]
     if metric["kind"] == "rate":
-        assert np.allclose((interval["low"], interval["high"]), wilson(int(values.sum()), len(values))), where
+        assert math.isclose(claim["estimate"]["value"], values.mean(), rel_tol=1e-9), where
+        assert np.allclose((interval["low"], interval["high"]), exact_rate(int(values.sum()), len(values))), where
         return
-    assert math.isclose(claim["median"], np.median(values), rel_tol=1e-9), where
+    assert math.isclose(claim["mean"]["value"], values.mean(), rel_tol=1e-9), where
     assert np.allclose(claim["quartiles"], np.quantile(values, (0.25, 0.75))), where
-    check_interval(interval, values, where)
+    rank = next(rank for rank in range(len(scores)) if stats.binom.cdf(rank + 1, len(scores), 0.5) > 0.025)
+    wanted = (np.median(scores), scores[rank], scores[-1 - rank])
+    assert [finite(end) for end in wanted] == [claim["estimate"]["value"], interval["low"], interval["high"]], where
 
 
-def check_interval(interval: dict[str, Any], values: np.ndarray, where: str) -> None:
-    """Checks the interval of a mean against that of the normal distribution, which skewed values may make wider."""
-    if not np.ptp(values):
-        assert interval["low"] == interval["high"] == values[0], where
-        return
-    half = NORMAL_975 * values.std(ddof=1) / math.sqrt(len(values))
-    assert interval["low"] < values.mean() < interval["high"], where
-    if len(values) >= 50:
-        assert 0.8 < (interval["high"] - interval["low"]) / (2 * half) < 1.8, where
+def finite(value: float) -> float | None:
+    """Returns a number as JSON has it."""
+    return float(value) if math.isfinite(value) else None
 
 
 def check_comparison(
@@ -123,43 +130,45 @@ def check_comparison(
     """Checks the pairs, the difference, its interval and the verdict of a comparison."""
     where = f"{claim['first']} {claim['second']} {claim['metric']}"
     others = [name for name in json.loads(episodes[0]["configuration"]) if name != compared]
-    sides: list[dict[tuple[Any, ...], float | None]] = [
+    sides: list[dict[tuple[Any, ...], dict[str, Any]]] = [
         {
-            (episode["trial"], *(episode[name] for name in others)): counted_value(episode, metric)[0]
+            (episode["trial"], *(episode[name] for name in others)): episode
             for episode in episodes
             if episode[compared] == method
         }
         for method in (claim["first"], claim["second"])
     ]
-    common = [key for key in sides[0] if key in sides[1]]
-    pairs = [(sides[0][key], sides[1][key]) for key in common]
-    kept = np.array([(one, two) for one, two in pairs if one is not None and two is not None])
-    assert claim["counts"]["pairs"] == len(kept), where
-    assert claim["counts"]["missing"] == len(pairs) - len(kept), where
-    if not len(kept):
-        assert claim["difference"] is None, where
-        assert claim["verdict"] == "no_data", where
+    pairs = [(sides[0][key], sides[1][key]) for key in sides[0] if key in sides[1]]
+    scores = [tuple(score(episode, metric) for episode in pair) for pair in pairs]
+    kept = [pair for pair in scores if None not in pair]
+    counts = claim["counts"]
+    assert (counts["pairs"], counts["missing"]) == (len(kept), len(pairs) - len(kept)), where
+    if not kept:
+        assert (claim["difference"], claim["verdict"]) == (None, "no_data"), where
         return
-    differences = kept[:, 0] - kept[:, 1]
-    assert math.isclose(claim["difference"]["value"], differences.mean(), rel_tol=1e-9, abs_tol=1e-12), where
-    interval = claim["difference"]["interval"]
-    assert interval["low"] <= differences.mean() <= interval["high"], where
-    half = NORMAL_975 * differences.std(ddof=1) / math.sqrt(len(differences))
-    if len(differences) >= 50:
-        assert 0.75 < (interval["high"] - interval["low"]) / (2 * half) < 1.8, where
-    check_verdict(claim, metric, interval, where)
+    higher, lower = (sum(bool(test(*pair)) for pair in kept) for test in (float.__gt__, float.__lt__))
+    won, lost = (higher, lower) if metric["better"] == "higher" else (lower, higher)
+    assert (counts["won"], counts["lost"], counts["units"]) == (won, lost, len(kept)), where
+    assert math.isclose(claim["difference"]["value"], (won - lost) / len(kept), abs_tol=1e-12), where
+    if metric["kind"] != "rate":
+        both = [[counted_value(episode, metric)[0] for episode in pair] for pair in pairs]
+        known = [one - two for one, two in both if one is not None and two is not None]
+        assert math.isclose(claim["mean_difference"]["value"], np.mean(known), rel_tol=1e-9, abs_tol=1e-12), where
+    p_value = stats.binomtest(won, won + lost).pvalue if won + lost else 1.0
+    assert math.isclose(claim["p_value"], p_value, rel_tol=1e-6, abs_tol=1e-12), where
+    check_verdict(claim, won, lost, where)
 
 
-def check_verdict(claim: dict[str, Any], metric: dict[str, Any], interval: dict[str, Any], where: str) -> None:
+def check_verdict(claim: dict[str, Any], won: int, lost: int, where: str) -> None:
     """Checks that a difference is claimed only where the corrected p value and the interval both show it."""
+    interval = claim["difference"]["interval"]
+    assert interval["low"] <= claim["difference"]["value"] <= interval["high"], where
     shown = claim["p_corrected"] <= 0.05 and (interval["low"] > 0 or interval["high"] < 0)
-    higher = claim["difference"]["value"] > 0
-    first_better = higher == (metric["better"] == "higher")
-    assert claim["verdict"] == (("first_better" if first_better else "second_better") if shown else "not_shown"), where
+    assert claim["verdict"] == (("first_better" if won > lost else "second_better") if shown else "not_shown"), where
     assert claim["p_value"] <= claim["p_corrected"] <= 1.0, where
-    shown_better = claim["first"] if first_better else claim["second"]
+    better = claim["first"] if won > lost else claim["second"]
     assert ("no difference" in claim["sentence"]) is not shown, where
-    assert not shown or claim["sentence"].startswith(shown_better), where
+    assert not shown or claim["sentence"].startswith(better), where
 
 
 def check_failures(claims: dict[str, Any], episodes: list[dict[str, Any]], compared: str) -> None:

@@ -52,8 +52,8 @@ def test_figures_are_listed_and_written_as_png_and_pdf(tmp_path: Path, capsys: p
     path = stored(tmp_path, "results.db")
     assert report([path, "--figure", "list"]) == 0
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    assert {"success", "differences", "distribution_path_length"} <= set(names)
-    for name, ending, first in (("success", ".png", b"\x89PNG"), ("distribution_path_length", ".pdf", b"%PDF")):
+    assert {"ranking", "differences", "distribution_path_length"} <= set(names)
+    for name, ending, first in (("ranking", ".png", b"\x89PNG"), ("distribution_path_length", ".pdf", b"%PDF")):
         into = tmp_path / f"image{ending}"
         assert report([path, "--figure", name + ending, "--into", str(into)]) == 0
         assert into.read_bytes().startswith(first)
@@ -63,9 +63,9 @@ def test_figures_are_listed_and_written_as_png_and_pdf(tmp_path: Path, capsys: p
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--figure", "sucess"), "success, differences"),
-        (("--figure", "success.svg"), "png, pdf"),
-        (("--figure", "success", "--table", "latex"), "give one of them"),
+        (("--figure", "rankin"), "ranking, differences"),
+        (("--figure", "ranking.svg"), "png, pdf"),
+        (("--figure", "ranking", "--table", "latex"), "give one of them"),
     ],
 )
 def test_what_cannot_be_drawn_is_named_with_what_can(
@@ -79,7 +79,7 @@ def test_without_a_browser_the_error_says_what_to_install(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("BROWSER_PATH", str(tmp_path / "absent"))
-    assert report([stored(tmp_path, "results.db"), "--figure", "success"]) == 2
+    assert report([stored(tmp_path, "results.db"), "--figure", "ranking"]) == 2
     assert "apt-get install chromium" in capsys.readouterr().err
 
 

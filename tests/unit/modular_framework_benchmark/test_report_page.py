@@ -46,11 +46,47 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Page:
     return Page.of(experiment.store(folder / "results.db"), folder / "report.html")
 
 
-def test_the_plain_sentences_of_success_come_first(page: Page) -> None:
-    answer = page.tree.xpath("//section[@class='answer']/p")
-    first = page.claims["analysis"]["comparisons"][0]["sentence"].lower()
-    assert any(first in paragraph.text_content().lower() for paragraph in answer)
-    assert page.words.index("succe") < page.words.index("Each metric by method")
+def test_the_first_screen_says_how_many_succeeded_who_is_better_and_where_they_failed(page: Page) -> None:
+    rows = page.rows("answer")
+    assert [row[0] for row in rows] == ["rrt_connect", "bitstar", "stomp"]
+    for row, summary in zip(rows, page.claims["analysis"]["summaries"], strict=False):
+        counts = summary["counts"]
+        assert row[1] == f"{counts['succeeded']} of {counts['episodes']} episodes"
+        assert re.fullmatch(r"[\d.]+ \([\d.]+ to [\d.]+\)", row[2])
+        assert re.match(r"\d+: ", row[4])
+    paragraphs = [element.text_content() for element in page.tree.xpath("//section[@class='answer']/p")]
+    shown = [item for item in page.claims["analysis"]["comparisons"] if item["verdict"].endswith("better")]
+    assert len(paragraphs) <= len(shown) + 2
+    not_shown = len(page.claims["analysis"]["comparisons"]) - len(shown)
+    assert f"o difference shown in {not_shown} of 21 comparisons" in " ".join(paragraphs)
+    assert "The unit is the scene: 28 scenes. Claims are about scenes like these, at the levels of object" in page.words
+    assert page.words.index("succeeded") < page.words.index("Each metric by method")
+
+
+def test_many_methods_are_ranked_in_one_figure_and_not_paired_in_prose(tmp_path: Path) -> None:
+    planners = tuple((f"planner_{place}", 0.2 + 0.15 * place, 1.0) for place in range(5))
+    experiment = replace(SMALL, trials=30, planners=planners, with_spans=False, with_files=False)
+    page = Page.of(experiment.store(tmp_path / "results.db"), tmp_path / "report.html")
+    figures = page.figures()
+    assert list(figures["ranking"]["data"][0]["y"])[0] == "planner_4"
+    assert "differences" not in figures
+    paragraphs = page.tree.xpath("//section[@class='answer']/p")
+    assert len(paragraphs) < 25
+    assert "success: planner_4 is better than planner_0" in page.words
+
+
+def test_two_trials_print_values_and_one_line_for_all_that_could_not_be_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    planners = tuple((f"planner_{place}", 1.0, 1.0) for place in range(10))
+    experiment = replace(SMALL, trials=2, planners=planners, objects=("can",), with_spans=False, with_files=False)
+    assert main([str(experiment.store(tmp_path / "results.db")), "--into", str(tmp_path / "report.html")]) == 0
+    printed = capsys.readouterr().out
+    lines = printed.splitlines()
+    assert len(lines) == 1 + 10 + 1 + 2
+    assert re.search(r"planner_3 +\d of 2 episodes +[\d.]+ ", printed)
+    assert "(interval)" in lines[0] and " to " not in "".join(lines[1:11])
+    assert re.match(r"none could have been shown with 1?.*2 scenes in \d+ of 315 comparisons", lines[12])
 
 
 def test_it_says_how_many_of_the_planned_episodes_are_finished(page: Page) -> None:
@@ -62,7 +98,7 @@ def test_the_overview_has_each_metric_of_each_method_with_its_interval(page: Pag
     assert [row[0].split("\u00a0")[0].partition(" [")[0] for row in rows] == [
         "success", "task time", "candidates", "planning time", "path length", "tracking error", "slip",
     ]  # fmt: skip
-    assert all(re.fullmatch(r"−?[\d.]+ \(−?[\d.]+ to −?[\d.]+\)", cell) for row in rows for cell in row[1:4])
+    assert all(re.fullmatch(r"−?[\d.]+ \(−?[\d.]+ to (−?[\d.]+|failure)\)", cell) for row in rows for cell in row[1:4])
 
 
 def test_missing_and_censored_values_are_counted_for_each_method(page: Page) -> None:

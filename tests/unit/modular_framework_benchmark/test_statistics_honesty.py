@@ -18,11 +18,6 @@ EXPERIMENTS = 200
 MOST = 20  # of 200; with a true share of 5 % more are seen once in 1,000 simulations
 
 
-@pytest.fixture(autouse=True)
-def quick_correction(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gc.collect", lambda: 0)  # statsmodels collects garbage in every correction
-
-
 def experiment(random: np.random.Generator, methods: str, pairs: int, advantage: float = 0.0) -> ExperimentResults:
     """Returns an experiment with methods that are identical, or of which A fails less often."""
     ease = random.beta(3.0, 1.0, pairs)

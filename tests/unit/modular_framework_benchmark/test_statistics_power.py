@@ -1,14 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planner of episodes: exact power by counting every outcome, sample sizes that reach it, Holm's correction."""
+"""The planner of episodes: exact power by counting every outcome, sample sizes that reach it, the correction."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from scipy import stats
+from statistics_results import TIME, results_of
+from statsmodels.stats.multitest import multipletests
 
-from modular_framework_benchmark.statistics.corrections import corrected, families
-from modular_framework_benchmark.statistics.power import pairs_for_rate, pairs_for_value, rate_power
-from modular_framework_benchmark.statistics.rates import Discordance, paired_p_value
+from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.statistics.corrections import corrected
+from modular_framework_benchmark.statistics.planned_power import power_text
+from modular_framework_benchmark.statistics.power import (
+    fewest_units,
+    pairs_for_rate,
+    rate_power,
+    smallest_difference,
+)
+from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval, paired_p_value
+from modular_framework_benchmark.statistics.sequential import anytime_p_value
 
 
 @pytest.mark.parametrize(("pairs", "difference", "differing"), [(12, 0.5, 0.6), (30, 0.2, 0.4), (25, 0.0, 0.3)])
@@ -20,7 +33,7 @@ def test_power_is_the_share_of_all_outcomes_that_show_the_difference(
         stats.multinomial.pmf([one, other, pairs - one - other], pairs, shares)
         for one in range(pairs + 1)
         for other in range(pairs + 1 - one)
-        if one > other and paired_p_value(Discordance(one, other, pairs)) <= 0.05
+        if one > other and paired_p_value(PairOutcomes(one, other, pairs)) <= 0.05
     )
     assert rate_power(pairs, difference, differing) == pytest.approx(counted, abs=1e-9)
 
@@ -39,25 +52,92 @@ def test_the_planned_pairs_are_near_the_formula_for_many_pairs() -> None:
     assert pairs_for_rate(0.05, 0.12) == pytest.approx(formula, rel=0.1)
 
 
-def test_values_need_the_pairs_of_a_t_test_and_a_few_more() -> None:
-    # A paired t test of half a standard deviation needs 34 pairs (33.4 before rounding); 33.4 / 0.955 = 34.9.
-    assert pairs_for_value(0.5, 1.0) == 35
-    assert pairs_for_value(2.0, 4.0) == 35
-    assert pairs_for_value(100.0, 1.0) == 6
-
-
 def test_a_difference_that_would_take_more_than_a_million_pairs_has_no_plan() -> None:
     assert pairs_for_rate(0.0005, 0.5) is None
-    assert pairs_for_value(0.0005, 1.0) is None
 
 
-def test_holms_correction_gives_the_published_p_values() -> None:
-    assert corrected([0.01, 0.04, None, 0.03, 0.005]) == pytest.approx([0.03, 0.06, None, 0.06, 0.02])
-    assert corrected([0.02], share=0.5) == [0.04]
-    assert corrected([None]) == [None]
-    assert corrected([]) == []
+def test_normal_values_half_a_deviation_apart_need_at_most_55_pairs() -> None:
+    won = stats.norm.cdf(0.5)
+    pairs = pairs_for_rate(2 * won - 1, 1.0)
+    assert pairs is not None and pairs <= 55
 
 
-def test_success_and_the_other_metrics_share_the_error_rate_half_and_half() -> None:
-    assert families(["success", "task_time", "path_length"], "success") == (0.5, 0.5)
-    assert families(["success"], "success") == (1.0, 1.0)
+@pytest.mark.parametrize("error_rate", [0.05, 0.025, 0.05 / 28])
+def test_with_the_fewest_units_a_clean_sweep_shows_a_difference_and_with_one_less_it_does_not(
+    error_rate: float,
+) -> None:
+    units = fewest_units(error_rate)
+
+    def shows(count: int) -> bool:
+        outcomes = PairOutcomes(count, 0, count)
+        return stats.binomtest(count, count).pvalue <= error_rate and paired_interval(outcomes).low > 0.0
+
+    assert shows(units) and (units == 6 or not shows(units - 1))
+    ever = fewest_units(error_rate, at_any_time=True)
+    assert anytime_p_value(np.ones(ever)) <= error_rate < anytime_p_value(np.ones(ever - 1))
+
+
+def test_the_smallest_difference_is_shown_with_the_power_and_one_point_less_is_not() -> None:
+    found = smallest_difference(100, 0.05, 0.3)
+    assert found is not None
+    assert rate_power(100, found, 0.3) >= 0.8 > rate_power(100, found - 0.01, 0.3)
+    assert smallest_difference(10, 0.05 / 56) is None
+
+
+def test_holms_correction_is_that_of_statsmodels_where_every_comparison_can_be_shown() -> None:
+    p_values = [0.01, 0.04, 0.03, 0.005]
+    expected = multipletests(p_values, method="holm")[1]
+    assert corrected(p_values, [0.0] * 4, 0.05, 1.0)[0] == pytest.approx(expected)
+    assert corrected([0.02], [0.0], 0.05, 0.5) == ([0.04], 1)
+
+
+def test_comparisons_that_cannot_be_shown_do_not_count() -> None:
+    # R. E. Tarone, Biometrics 46 (1990) 515-522: with k = 2, two of the four can have a p value of 0.025.
+    found, count = corrected([0.02, 0.5, 0.3, 1.0], [0.001, 0.01, 0.25, 1.0], 0.05, 1.0)
+    assert count == 2
+    assert found[0] == pytest.approx(0.04)
+    assert all(value > 0.05 for value in found[1:])
+
+
+def test_the_correction_keeps_the_error_rate_of_identical_methods_with_few_decided_pairs() -> None:
+    random = np.random.default_rng(2)
+    false = 0
+    for _ in range(2000):
+        decided = random.integers(0, 9, 12)
+        won = random.binomial(decided, 0.5)
+        p_values = [1.0 if not all_ else stats.binomtest(int(one), int(all_)).pvalue
+                    for one, all_ in zip(won, decided, strict=True)]  # fmt: skip
+        false += min(corrected(p_values, [2.0 ** (1 - int(all_)) for all_ in decided], 0.05, 1.0)[0]) <= 0.05
+    assert 0 < false <= 130
+
+
+def planned(methods: int, trials: int, problems: int = 0) -> str:
+    names = tuple("abcdefgh"[:methods])
+    description = replace(
+        results_of({name: [] for name in names}, (TIME,), {"task_time": {name: [] for name in names}}).description,
+        mode="planning" if problems else "task",
+    )
+    episodes = [
+        EpisodeSpec(
+            methods * trial + place, {"method": name}, trial, trial, {"problem": trial % problems} if problems else {}
+        )
+        for trial in range(trials)
+        for place, name in enumerate(names)
+    ]
+    return power_text(description, episodes)
+
+
+def test_the_dry_run_says_that_nothing_can_be_shown_with_10_pairs_and_28_comparisons() -> None:
+    assert planned(8, 10).count("nothing, whatever happens: at least 12 scenes would have to be won") == 2
+
+
+def test_the_dry_run_names_the_smallest_difference_and_what_others_need() -> None:
+    text = planned(2, 100)
+    assert f"success: from {100 * (smallest_difference(100, 0.025, 0.3) or 0):g} points" in text
+    assert f"{pairs_for_rate(0.05, 0.3, 0.025):,}, {pairs_for_rate(0.1, 0.3, 0.025)} and" in text
+    assert "60, 70 and 80 % of the pairs won need" in text
+
+
+def test_the_dry_run_counts_repeated_problems_as_one_unit() -> None:
+    assert "with 20 problems for each method" in planned(2, 100, problems=20)
+    assert "with 100 seeds for each method" in planned(2, 100, problems=1)  # one problem is not drawn

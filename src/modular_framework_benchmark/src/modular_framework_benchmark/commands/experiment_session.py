@@ -97,7 +97,7 @@ class ExperimentSession:
         return EXIT_INTERRUPTED
 
     def _print_results(self, end: RunEnd) -> int:
-        """Prints the sentences of the comparison and writes the report; fails when no episode says anything."""
+        """Prints the first screen of the report and writes the page; fails when no episode says anything."""
         from modular_framework_benchmark.commands.report_command import write_page  # takes seconds to import
         from modular_framework_benchmark.reports.report_source import OpenedExperiment
 
@@ -106,12 +106,12 @@ class ExperimentSession:
         page = self._database.folder / f"{self._name}.html"
         results = self._database.load(self._number, spans=False)
         try:
-            sentences = write_page(OpenedExperiment(self._database, self._number, results), page)
+            answer = write_page(OpenedExperiment(self._database, self._number, results), page)
         except ReportError as error:
             again = f"{COMMAND} report {shlex.quote(self._shown)} --experiment {self._name} --into FILE"
             print(f"error: no report: {error}; the results are stored. To write it: {again}", file=sys.stderr)
             return EXIT_FAILED
-        print(*sentences, f"report: {page}", sep="\n")
+        print(answer, f"report: {page}", sep="\n")
         episodes = results.episodes
         if len(episodes) and (episodes["status"] == EpisodeStatus.BROKEN.value).all():
             print(f"error: every episode broke; the first one: {episodes['cause'].iloc[0]}", file=sys.stderr)

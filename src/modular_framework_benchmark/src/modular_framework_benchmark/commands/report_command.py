@@ -16,7 +16,7 @@ from modular_framework_benchmark.reports.paper_tables import latex_table, markdo
 from modular_framework_benchmark.reports.report_content import ReportContent, gather
 from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import OpenedExperiment, open_source
-from modular_framework_benchmark.reports.tables import overview_table
+from modular_framework_benchmark.reports.tables import answer_text, overview_table
 
 TABLES = {"markdown": markdown_table, "latex": latex_table}
 
@@ -26,8 +26,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_reporting(_parser(), arguments, _report)
 
 
-def write_page(opened: OpenedExperiment, into: Path) -> tuple[str, ...]:
-    """Writes the report page of an experiment; returns the sentences that compare its methods.
+def write_page(opened: OpenedExperiment, into: Path) -> str:
+    """Writes the report page of an experiment; returns its first screen as text.
 
     Args:
         opened: The experiment.
@@ -39,7 +39,7 @@ def write_page(opened: OpenedExperiment, into: Path) -> tuple[str, ...]:
     """
     content = gather(opened.results, opened.source(into.absolute().parent))
     write_file(into, report_page(content, opened.database.label).encode())
-    return tuple(content.analysis.sentences)
+    return answer_text(content)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -56,6 +56,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME[.png|.pdf]",
         help="write this figure as an image, PNG if nothing is said; 'list' names those there are",
     )
+    parser.add_argument(
+        "--mean-intervals", action="store_true", help="give differences of means of bounded metrics an interval"
+    )
     parser.add_argument("--table", choices=sorted(TABLES), help="print the table of methods for a paper")
     return parser
 
@@ -69,7 +72,7 @@ def _report(given: argparse.Namespace) -> int:
     with open_source(given.database, given.experiment) as opened:
         name = opened.results.description.name
         into = given.into or Path(f"{name}_{figure}.{image_format}" if figure else f"{name}.html")
-        content = gather(opened.results, opened.source(into.absolute().parent))
+        content = gather(opened.results, opened.source(into.absolute().parent), given.mean_intervals)
         if given.table:
             return _write_table(content, given)
         if figure == "list":
@@ -79,8 +82,7 @@ def _report(given: argparse.Namespace) -> int:
             write_file(into, figure_image(find_figure(content.figures, figure), image_format))
         else:
             write_file(into, report_page(content, opened.database.label).encode())
-    for sentence in content.analysis.sentences[:3]:
-        print(sentence)
+    print(answer_text(content))
     print(f"report: wrote {into}", file=sys.stderr)
     return 0
 

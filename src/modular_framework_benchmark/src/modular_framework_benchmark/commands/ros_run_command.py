@@ -91,7 +91,10 @@ def _run(options: argparse.Namespace) -> int:
     experiment = load_experiment(experiment_path(options.file), RosSurroundings(), known_metrics(), setting_checks())
     episodes = lay_out(experiment)
     if options.dry_run:
+        from modular_framework_benchmark.statistics.planned_power import power_text  # takes a second to import
+
         print(design_text(experiment, episodes))
+        print(power_text(experiment.description, episodes))
         return 0
     target = options.database or f"{experiment.description.name}.db"
     return run_episodes(experiment, episodes, _session_options(options, target))

@@ -25,8 +25,8 @@ class Stopping:
     Attributes:
         kind: The rule.
         metric: Name of the metric that a sequential rule looks at.
-        smallest_difference: Difference below which the methods count as alike, in the unit of the metric, for a rate
-            from 0 to 1; None: it stops for a shown difference only.
+        smallest_difference: Win difference below which the methods count as alike, from 0 to 1, for a rate the
+            difference of the rates; None: it stops for a shown difference only.
     """
 
     kind: StoppingKind = StoppingKind.FIXED

@@ -144,6 +144,7 @@ class _Reader:
         if "description" in entries:
             reading.text(entries["description"], "description")
         record = self._record()
+        self._note_repeated_problems(stopping, combinations, int(numbers["trials"] or 0))
         if len(reading.faults):
             return None
         description = ExperimentDescription(
@@ -238,6 +239,17 @@ class _Reader:
             return Stopping()
         return read_stopping(mapping, metrics, self._reading)
 
+    def _note_repeated_problems(self, stopping: Stopping, items: tuple[Combination, ...], trials: int) -> None:
+        """Notes problems that repeat under a sequential rule: a repeated problem adds to a unit that was looked at."""
+        counts = {len(item.settings.get("problems", ())) for item in items}
+        fewest = min((count for count in counts if count > 1), default=trials)
+        if stopping.kind is StoppingKind.SEQUENTIAL and fewest < trials:
+            self._reading.faults.add(
+                self._root.entries["stopping"].location,
+                f"a sequential rule needs a problem for each trial: {fewest} problems, {trials} trials; make more "
+                "problems, set fewer trials, or use {rule: fixed}",
+            )
+
     def _metrics(self, combinations: tuple[Combination, ...]) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
         if self._mode is None:  # which metrics there are is not known
             return (), ()
@@ -307,7 +319,7 @@ def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueRead
     values: dict[str, Any] = {}
     if "smallest_difference" in known.entries:
         values["smallest_difference"] = reading.number(
-            known.entries["smallest_difference"], "smallest_difference", 1e-9
+            known.entries["smallest_difference"], "smallest_difference", 1e-9, 1.0
         )
     if "metric" in known.entries:
         names = dict.fromkeys(["success", *(metric.name for metric in metrics)])

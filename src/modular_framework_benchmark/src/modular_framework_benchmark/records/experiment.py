@@ -101,6 +101,7 @@ class ExperimentDescription:
         sequential: Whether a stopping rule looks at the results: its comparisons must then hold at any time.
         source: Path of the experiment file, from whose folder its relative paths count; "" where there is none.
         ran_with: Digests of all that its episodes run with beside their settings, by what it is; empty: not known.
+        extended: Whether episodes were added after some had been finished, which is a look at the results.
     """
 
     name: str
@@ -115,3 +116,9 @@ class ExperimentDescription:
     sequential: bool = False
     source: str = ""
     ran_with: Mapping[str, str] = field(default_factory=dict)
+    extended: bool = False
+
+    @property
+    def holds_at_any_time(self) -> bool:
+        """Returns whether its tests must hold however often the results are looked at."""
+        return self.sequential or self.extended

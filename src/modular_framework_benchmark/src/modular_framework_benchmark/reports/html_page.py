@@ -17,9 +17,11 @@ from plotly.offline import get_plotlyjs
 
 from modular_framework_benchmark.reports import number_text
 from modular_framework_benchmark.reports.figure_style import NamedFigure, words
-from modular_framework_benchmark.reports.report_content import SUCCESS, ReportContent, machine_readable
+from modular_framework_benchmark.reports.report_content import ReportContent, machine_readable
 from modular_framework_benchmark.reports.tables import (
     Cell,
+    answer_sentences,
+    answer_table,
     comparison_table,
     levels_table,
     method_table,
@@ -28,9 +30,7 @@ from modular_framework_benchmark.reports.tables import (
     spans_table,
     status_table,
 )
-from modular_framework_benchmark.statistics.comparison import Verdict
 
-MOST_SENTENCES = 10
 SECTIONS = (
     ("comparison", "Comparison"), ("components", "By component"), ("missing", "Missing values"),
     ("levels", "Other factors"), ("timelines", "Time"), ("failures", "Failures"),
@@ -54,10 +54,11 @@ def report_page(content: ReportContent, database: str) -> str:
         content=content,
         database=database,
         figures=figures,
-        answer=_answer(content),
+        answer=answer_sentences(content),
         sections=[section for section in SECTIONS if section[0] not in absent],
         components=[_component(content, name) for name in content.components],
         tables={
+            "answer": answer_table(content),
             "overview": overview_table(content),
             "statuses": status_table(content),
             "missing": missing_table(content),
@@ -66,18 +67,6 @@ def report_page(content: ReportContent, database: str) -> str:
             "components": spans_table(content, "component"),
         },
     )
-
-
-def _answer(content: ReportContent) -> dict[str, Sequence[str]]:
-    """Returns the sentences that come first, those of success and of differences that are shown, and the others."""
-    wanted = [
-        item.sentence
-        for item in content.analysis.comparisons
-        if item.metric == SUCCESS or item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
-    ]
-    sentences = content.analysis.sentences
-    first = [sentence for sentence in sentences if sentence in wanted][:MOST_SENTENCES] or sentences[:1]
-    return {"first": first, "further": [sentence for sentence in sentences if sentence not in first]}
 
 
 def _as_sentence(text: str) -> str:

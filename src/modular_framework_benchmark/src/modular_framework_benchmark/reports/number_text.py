@@ -7,6 +7,8 @@ import math
 from datetime import UTC, datetime
 
 NONE = "–"
+FINEST = {"s": 3, "m": 4, "rad": 4, "Nm": 1, "N": 1, "%": 1}
+"""Decimals beyond which a value of a unit says nothing: 1 ms, 0.1 mm, 0.0001 rad."""
 
 
 def decimals_for(width: float) -> int:
@@ -22,14 +24,25 @@ def decimals_for(width: float) -> int:
     return min(max(figures - 1 - magnitude, 0), 9)
 
 
-def number_text(value: float | None, decimals: int | None = None) -> str:
-    """Returns a number; with three significant figures when `decimals` is not given; a dash for None and NaN."""
-    if value is None or not math.isfinite(value):
+def number_text(value: float | None, decimals: int | None = None, unit: str = "") -> str:
+    """Returns a number; with three significant figures when `decimals` is not given; a dash for None and NaN.
+
+    Args:
+        value: the number; an infinite one is a failure.
+        decimals: how many there are.
+        unit: limits the decimals to what means something, but for two figures of a small value.
+    """
+    if value is None or math.isnan(value):
         return NONE
+    if math.isinf(value):
+        return "failure"
+    magnitude = math.floor(math.log10(abs(value))) if value else 0
     if decimals is None:
         if value == 0.0:
             return "0"
-        decimals = min(max(2 - math.floor(math.log10(abs(value))), 0), 9)
+        decimals = min(max(2 - magnitude, 0), 9)
+    if unit in FINEST:
+        decimals = min(decimals, max(FINEST[unit], 1 - magnitude))
     text = f"{value:,.{decimals}f}"
     return text.lstrip("-") if float(text.replace(",", "")) == 0.0 else text.replace("-", "−")
 
@@ -41,21 +54,21 @@ def share_text(share: float | None, decimals: int = 1) -> str:
     return f"{number_text(100.0 * share, decimals)} %"
 
 
-def interval_text(estimate: float | None, low: float | None, high: float | None) -> str:
-    """Returns an estimate and its interval, all with the decimals that the interval's width allows, if it has a width.
+def interval_text(estimate: float | None, low: float | None, high: float | None, unit: str = "") -> str:
+    """Returns an estimate and its interval, all with the decimals that the interval's width and the unit allow.
 
     Args:
         estimate: the number; None and NaN give a dash.
         low: lower end; None for no interval.
         high: upper end.
+        unit: of the numbers.
     """
-    if estimate is None or not math.isfinite(estimate):
-        return NONE
-    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
-        return number_text(estimate)
-    decimals = decimals_for((high - low) / 2.0) if high > low else None
-    ends = f"{number_text(low, decimals)} to {number_text(high, decimals)}"
-    return f"{number_text(estimate, decimals)} ({ends})"
+    if estimate is None or math.isnan(estimate) or low is None or high is None:
+        return number_text(estimate, unit=unit)
+    finite = [end for end in (low, estimate, high) if math.isfinite(end)]
+    decimals = decimals_for((max(finite) - min(finite)) / 2.0) if finite and max(finite) > min(finite) else None
+    ends = f"{number_text(low, decimals, unit)} to {number_text(high, decimals, unit)}"
+    return f"{number_text(estimate, decimals, unit)} ({ends})"
 
 
 def p_value_text(p_value: float | None) -> str:

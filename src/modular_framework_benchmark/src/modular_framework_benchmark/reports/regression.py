@@ -18,7 +18,7 @@ from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.statistics.analysis import compare
 from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
-from modular_framework_benchmark.statistics.observations import metrics_of
+from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of
 
 SIDE = "side"
 AFTER, BEFORE = "after", "before"
@@ -30,6 +30,7 @@ class Change(Enum):
     BETTER = "better"
     WORSE = "worse"
     NOT_SHOWN = "no difference shown"
+    NOT_SHOWABLE = "could not be shown"
     NO_DATA = "nothing to compare"
 
 
@@ -37,6 +38,7 @@ _CHANGES = {
     Verdict.FIRST_BETTER: Change.BETTER,
     Verdict.SECOND_BETTER: Change.WORSE,
     Verdict.NOT_SHOWN: Change.NOT_SHOWN,
+    Verdict.NOT_SHOWABLE: Change.NOT_SHOWABLE,
     Verdict.NO_DATA: Change.NO_DATA,
 }
 """What a verdict says where the later experiment is the first of the comparison."""
@@ -109,12 +111,13 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
         merged = _merged(before, after, method, metrics, of_method)
         comparisons = {item.metric: item for item in compare(merged)}
         changes += [MetricChange(method, metric, comparisons[metric.name]) for metric in metrics_of(merged)]
-        pairs += changes[-len(metrics_of(merged))].comparison.counts.pairs
+        counts = comparisons[SUCCESS.name].counts
+        pairs += 0 if counts.at_random else counts.pairs
         episodes += len(merged.episodes)
     notes.append(
         f"{pairs:,} pairs of episodes with the same method, levels, trial and seed, of {episodes:,} episodes."
         if pairs
-        else "No two episodes have the same method, levels, trial and seed: the comparison is unpaired, and less sure."
+        else "No two episodes have the same method, levels, trial and seed: pairs are any two episodes."
     )
     return Regression(before.description, after.description, tuple(changes), confidence, tuple(notes))
 
@@ -185,6 +188,8 @@ def _merged(
         compared=SIDE,
         metrics=metrics,
         confidence=confidence,
+        sequential=before.description.sequential or after.description.sequential,
+        extended=before.description.extended or after.description.extended,
     )
     episodes = pd.concat(sides, ignore_index=True)
     finished = all(len(item.episodes) >= item.planned for item in (before, after))

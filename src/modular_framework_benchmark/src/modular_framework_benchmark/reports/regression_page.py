@@ -14,9 +14,9 @@ from modular_framework_benchmark.reports.html_page import render_page
 from modular_framework_benchmark.reports.number_text import counted, number_text, p_value_text
 from modular_framework_benchmark.reports.regression import Change, MetricChange, Regression
 from modular_framework_benchmark.reports.report_content import plain_json
-from modular_framework_benchmark.reports.tables import Cell, Table, estimate_text, metric_title
+from modular_framework_benchmark.reports.tables import Cell, Table, metric_title, pairs_text, table_text, wins_text
 
-COLORS = {Change.BETTER: "#176639", Change.WORSE: "#b3261e", Change.NOT_SHOWN: "#5f6c7b", Change.NO_DATA: "#5f6c7b"}
+COLORS = {Change.BETTER: "#176639", Change.WORSE: "#b3261e"}
 DIFFERING = "The two runs also differ in what they ran with, so a change may come from there"
 MOODS = {Change.BETTER: "better", Change.WORSE: "worse"}
 
@@ -24,7 +24,16 @@ MOODS = {Change.BETTER: "better", Change.WORSE: "worse"}
 def changes_table(regression: Regression) -> Table:
     """Returns each metric of each method before and after, and what is shown."""
     rows = tuple(_row(item) for item in regression.changes)
-    columns = ("method", "metric", "before", "after", "after − before (interval)", "p corrected", "pairs", "result")
+    columns = (
+        "method",
+        "metric",
+        "before",
+        "after",
+        "won − lost [points] (interval)",
+        "p corrected",
+        "pairs",
+        "result",
+    )
     return Table("changes", "Each metric of each method in both experiments.", columns, rows, regression.notes)
 
 
@@ -32,18 +41,18 @@ def _row(item: MetricChange) -> tuple[Cell, ...]:
     found = item.comparison
     scale = 100.0 if item.metric.kind is MetricKind.RATE else 1.0
     before, after = (
-        number_text(None if value is None else scale * value) for value in (found.second_estimate, found.first_estimate)
+        number_text(None if value is None else scale * value, unit=item.metric.unit)
+        for value in (found.second_estimate, found.first_estimate)
     )
-    pairs = f"{found.counts.pairs:,}" if found.counts.pairs else "unpaired"
     shown = item.change in MOODS
     return (
         Cell(item.method),
         Cell(metric_title(item.metric)),
         Cell(before, is_number=True),
         Cell(after, is_number=True),
-        Cell(estimate_text(found.difference, item.metric), is_number=True),
+        Cell(wins_text(found), is_number=True),
         Cell(p_value_text(found.p_corrected), is_number=True),
-        Cell(pairs, is_number=True),
+        Cell(pairs_text(found.counts), is_number=True),
         Cell(item.change.value, shown, mood=MOODS.get(item.change, "")),
     )
 
@@ -55,6 +64,8 @@ def summary_sentences(regression: Regression) -> tuple[str, ...]:
         f"{counted(counts[Change.WORSE], 'metric')} of methods got worse, {counts[Change.BETTER]:,} better; "
         f"no difference is shown in {counts[Change.NOT_SHOWN]:,}"
     )
+    if counts[Change.NOT_SHOWABLE]:
+        text += f", none could have been shown in {counts[Change.NOT_SHOWABLE]:,}"
     if counts[Change.NO_DATA]:
         text += f", nothing to compare in {counts[Change.NO_DATA]:,}"
     ordered = [item for change in (Change.WORSE, Change.BETTER) for item in regression.changes if item.change is change]
@@ -64,11 +75,8 @@ def summary_sentences(regression: Regression) -> tuple[str, ...]:
 def regression_text(regression: Regression) -> str:
     """Returns the comparison as plain text."""
     table = changes_table(regression)
-    rows = [table.columns, *(tuple(cell.text for cell in row) for row in table.rows)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(table.columns))]
-    lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     marks = [f"{DIFFERING}:", *(f"  {text}" for text in regression.differing), ""] if regression.differing else []
-    return "\n".join([*marks, *summary_sentences(regression), "", *lines, "", *table.notes]) + "\n"
+    return "\n".join([*marks, *summary_sentences(regression), "", table_text(table), "", *table.notes]) + "\n"
 
 
 def regression_page(regression: Regression, before: str, after: str) -> str:
@@ -79,7 +87,8 @@ def regression_page(regression: Regression, before: str, after: str) -> str:
         before: database of the earlier experiment.
         after: that of the later one.
     """
-    figures = [figure for figure in (_figure(regression, True), _figure(regression, False)) if figure]
+    figure = _figure(regression)
+    figures = [figure] if figure else []
     data = {
         "before": regression.before.name,
         "after": regression.after.name,
@@ -105,39 +114,34 @@ def regression_page(regression: Regression, before: str, after: str) -> str:
     )
 
 
-def _figure(regression: Regression, of_rates: bool) -> NamedFigure | None:
-    """Returns the changes of rates in points, or those of the other metrics in percent of the earlier value."""
+def _figure(regression: Regression) -> NamedFigure | None:
+    """Returns the win differences of all metrics in points."""
     bars = []
     for item in regression.changes:
-        difference, before = item.comparison.difference, item.comparison.second_estimate
-        if (item.metric.kind is MetricKind.RATE) is not of_rates or difference is None or difference.interval is None:
-            continue
-        unit = 1.0 if of_rates else abs(before or 0.0)
-        if unit:
+        difference = item.comparison.difference
+        if difference is not None and difference.interval is not None:
             ends = (difference.interval.low, difference.value, difference.interval.high)
-            bars.append((item, tuple(100.0 * end / unit for end in ends)))
+            bars.append((item, tuple(100.0 * end for end in ends)))
     if not bars:
         return None
-    what = "difference [points]" if of_rates else "change [% of the value before]"
     figure = go.Figure(_markers(bars))
     figure.add_vline(x=0.0, line={"color": MUTED, "width": 1})
     styled(figure, height=130 + 30 * len(bars))
     figure.update_layout(showlegend=False)
-    figure.update_xaxes(title_text=what)
+    figure.update_xaxes(title_text="pairs in which the later one is better − worse [points]")
     figure.update_yaxes(range=[len(bars) - 0.5, -0.5], ticks="")
-    title = "Changes of rates" if of_rates else "Changes of other metrics"
-    summary = "After − before with its interval. Green: shown to be better; red: worse; grey: no difference shown."
-    return NamedFigure("rates" if of_rates else "values", title, summary, figure)
+    summary = "Win differences with their intervals. Green: shown to be better; red: worse; grey: no difference shown."
+    return NamedFigure("changes", "Changes", summary, figure)
 
 
 def _markers(bars: Sequence[tuple[MetricChange, tuple[float, ...]]]) -> list[go.Scatter]:
     names = unique_labels([f"{item.method}, {words(item.metric.name)}" for item, _ in bars], 56)
     return [
         go.Scatter(
-            x=[value], y=[name], mode="markers", marker={"color": COLORS[item.change], "size": 9},
+            x=[value], y=[name], mode="markers", marker={"color": COLORS.get(item.change, MUTED), "size": 9},
             error_x={
                 "type": "data", "symmetric": False, "array": [high - value], "arrayminus": [value - low],
-                "color": COLORS[item.change], "thickness": 1.6, "width": 5,
+                "color": COLORS.get(item.change, MUTED), "thickness": 1.6, "width": 5,
             },
             hovertemplate="%{y}: %{x:+.3g}<extra></extra>",
         )

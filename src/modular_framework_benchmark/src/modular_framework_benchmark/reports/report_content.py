@@ -25,13 +25,14 @@ from modular_framework_benchmark.reports.run_record import (
     warnings_of,
 )
 from modular_framework_benchmark.reports.span_tables import SpanSummary, choose_episodes, summarise_spans
-from modular_framework_benchmark.reports.success_figures import differences_figure, levels_figure, success_figure
+from modular_framework_benchmark.reports.success_figures import differences_figure, levels_figure, ranking_figure
 from modular_framework_benchmark.reports.time_figures import components_figure, progress_figure, timelines_figure
 from modular_framework_benchmark.statistics.analysis import analyse, summarise_by_level
 from modular_framework_benchmark.statistics.comparison import Analysis, MethodSummary
 from modular_framework_benchmark.statistics.observations import metrics_of
 
 SUCCESS = "success"
+MOST_PAIRED = 3  # methods whose pairs are drawn; more are ranked in one figure
 COMPONENTS = ("task", "generation", "planning", "execution", "grasp")  # the order of a pick; a user's own follow
 
 
@@ -112,15 +113,20 @@ class ReportContent:
     commands: tuple[str, ...]
 
     @property
+    def unit_noun(self) -> str:
+        """Returns what an independent unit of the comparisons is."""
+        return next((item.unit_noun for item in self.analysis.comparisons), "episode")
+
+    @property
     def components(self) -> tuple[str, ...]:
         """Returns the components that have metrics."""
         return tuple(dict.fromkeys(metric.component for metric in self.metrics))
 
 
-def gather(results: ExperimentResults, source: ReportSource) -> ReportContent:
-    """Returns the content of the report of an experiment."""
+def gather(results: ExperimentResults, source: ReportSource, mean_intervals: bool = False) -> ReportContent:
+    """Returns the content of the report of an experiment; `mean_intervals` is that of `analyse`."""
     description = results.description
-    analysis = analyse(results)
+    analysis = analyse(results, mean_intervals=mean_intervals)
     levels = _success_by_level(results)
     chosen = choose_episodes(results)
     timelines = source.spans_of([item.number for item in chosen])
@@ -155,10 +161,16 @@ def _success_by_level(results: ExperimentResults) -> tuple[MethodSummary, ...]:
 
 def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[NamedFigure]:
     return _made(
-        success_figure([item for item in analysis.summaries if item.metric == SUCCESS]),
-        differences_figure([item for item in analysis.comparisons if item.metric == SUCCESS]),
+        ranking_figure(analysis.summaries, _main_metric(results)),
+        differences_figure([item for item in analysis.comparisons if item.metric == SUCCESS])
+        if len(analysis.methods) <= MOST_PAIRED
+        else None,
         *distribution_figures(results, analysis.methods),
     )
+
+
+def _main_metric(results: ExperimentResults) -> Metric | None:
+    return next((item for item in results.description.metrics if item.name != SUCCESS), None)
 
 
 def _made(*figures: NamedFigure | None) -> list[NamedFigure]:

@@ -1,70 +1,84 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws how often methods succeed: bars with intervals, differences between methods, and by level of other factors."""
+"""Draws how often methods succeed: ranked with intervals, in pairs of methods, and by level of other factors."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import plotly.graph_objects as go
+from plotly.subplots import make_subplots
 
+from modular_framework_benchmark.records.experiment import Direction, Metric
 from modular_framework_benchmark.reports.figure_style import (
     INK,
     MUTED,
     NamedFigure,
-    color_of,
+    axis_title,
     label,
     styled,
     unique_labels,
     words,
 )
 from modular_framework_benchmark.reports.number_text import count_text, counted, share_text
-from modular_framework_benchmark.statistics.comparison import Comparison, MethodSummary
+from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, MethodSummary
 
 MOST_ROWS = 60
 
 
-def success_figure(summaries: Sequence[MethodSummary]) -> NamedFigure | None:
-    """Returns a bar for each method with its interval; None when no method has an episode.
+def ranking_figure(summaries: Sequence[MethodSummary], main: Metric | None) -> NamedFigure | None:
+    """Returns success and the main metric of each method with their intervals, the best first; None without episodes.
 
     Args:
-        summaries: of the metric `success`, over all levels of the other factors.
+        summaries: of each method by each metric, over all levels of the other factors.
+        main: the metric beside success; None where there is none.
     """
-    known = [(index, item, item.estimate) for index, item in enumerate(summaries) if item.estimate]
-    if not known:
+    of_success = {item.method: item.estimate for item in summaries if item.metric == "success" and item.estimate}
+    if not of_success:
         return None
-    names = unique_labels([item.method for _, item, _ in known])
-    ends = [
-        (share.value, share.value) if share.interval is None else (share.interval.low, share.interval.high)
-        for _, _, share in known
-    ]
-    figure = go.Figure(
-        go.Bar(
-            x=[share.value for _, _, share in known], y=names, orientation="h", width=0.55,
-            marker={"color": [color_of(index) for index, _, _ in known], "opacity": 0.85},
-            text=[f" {share_text(share.value)} of {count_text(item.counts.counted)}" for _, item, share in known],
-            textposition="inside", insidetextanchor="start", textfont={"color": "white", "size": 13},
-            error_x={
-                "type": "data", "symmetric": False, "color": INK, "thickness": 1.6, "width": 7,
-                "array": [high - share.value for (_, high), (_, _, share) in zip(ends, known, strict=True)],
-                "arrayminus": [share.value - low for (low, _), (_, _, share) in zip(ends, known, strict=True)],
-            },
-            hovertemplate="%{y}: %{x:.1%}<extra></extra>",
-        )
-    )  # fmt: skip
-    styled(figure, height=110 + 58 * len(known))
+    values = {item.method: item.estimate for item in summaries if main and item.metric == main.name and item.estimate}
+    sign = -1.0 if main and main.better is Direction.HIGHER else 1.0
+
+    def place(method: str) -> tuple[float, float]:
+        return -of_success[method].value, sign * values[method].value if method in values else math.inf
+
+    ranked = sorted(of_success, key=place)
+    drawn = [estimate for estimate in values.values() if math.isfinite(estimate.value)]
+    figure = make_subplots(cols=2 if drawn else 1, shared_yaxes=True, horizontal_spacing=0.06)
+    names = unique_labels(ranked)
+    figure.add_trace(_dots(names, [of_success[method] for method in ranked], 100.0), row=1, col=1)
+    styled(figure, height=110 + 34 * len(ranked))
+    figure.update_xaxes(range=[-2, 102], title_text="success [%]", row=1, col=1)
+    if main and drawn:
+        figure.add_trace(_dots(names, [values.get(method) for method in ranked], 1.0), row=1, col=2)
+        figure.update_xaxes(title_text="median " + axis_title(main.name, main.unit), row=1, col=2)
     figure.update_layout(showlegend=False)
-    figure.update_xaxes(range=[0, 1.02], tickformat=".0%", title_text="success")
-    figure.update_yaxes(autorange="reversed", ticks="")
-    summary = f"Share of the episodes that succeeded. Whiskers: {interval_words(known[0][1])}."
-    return NamedFigure("success", "Success", summary, figure)
+    figure.update_yaxes(autorange="reversed", ticks="", categoryorder="array", categoryarray=names)
+    rank = "by success" + (f", then by {words(main.name)}" if main else "")
+    summary = (
+        f"Methods ranked {rank}. Whiskers: intervals of single methods; what is shown between methods is said above."
+    )
+    return NamedFigure("ranking", "Methods, the best first", summary, figure)
 
 
-def interval_words(summary: MethodSummary) -> str:
-    """Returns what the interval of a summary is: `95 % interval, Wilson`."""
-    interval = summary.estimate.interval if summary.estimate else None
-    if interval is None:
-        return "none"
-    return f"{share_text(interval.confidence, 0)} interval, {interval.method}"
+def _dots(names: Sequence[str], estimates: Sequence[Estimate | None], scale: float) -> go.Scatter:
+    """Returns a dot for each estimate, with whiskers where it has an interval; an infinite end is not drawn."""
+    known = [(name, part) for name, part in zip(names, estimates, strict=True) if part and math.isfinite(part.value)]
+    ends = [(part.interval.low, part.interval.high) if part.interval else (part.value,) * 2 for _, part in known]
+    reach = [
+        tuple(end if math.isfinite(end) else part.value for end in pair)
+        for pair, (_, part) in zip(ends, known, strict=True)
+    ]
+    return go.Scatter(
+        x=[scale * part.value for _, part in known], y=[name for name, _ in known], mode="markers",
+        marker={"color": INK, "size": 9},
+        error_x={
+            "type": "data", "symmetric": False, "color": INK, "thickness": 1.6, "width": 6,
+            "array": [scale * (high - part.value) for (_, high), (_, part) in zip(reach, known, strict=True)],
+            "arrayminus": [scale * (part.value - low) for (low, _), (_, part) in zip(reach, known, strict=True)],
+        },
+        hovertemplate="%{y}: %{x:.4g}<extra></extra>",
+    )  # fmt: skip
 
 
 def differences_figure(comparisons: Sequence[Comparison]) -> NamedFigure | None:
@@ -77,18 +91,7 @@ def differences_figure(comparisons: Sequence[Comparison]) -> NamedFigure | None:
     if not known:
         return None
     names = unique_labels([f"{item.first} − {item.second}" for item, _ in known], 56)
-    figure = go.Figure(
-        go.Scatter(
-            x=[100.0 * difference.value for _, difference in known], y=names, mode="markers",
-            marker={"color": INK, "size": 10, "symbol": "diamond"},
-            error_x={
-                "type": "data", "symmetric": False, "color": INK, "thickness": 1.6, "width": 7,
-                "array": [100.0 * (part.interval.high - part.value) for _, part in known if part.interval],
-                "arrayminus": [100.0 * (part.value - part.interval.low) for _, part in known if part.interval],
-            },
-            hovertemplate="%{y}: %{x:+.1f} points<extra></extra>",
-        )
-    )  # fmt: skip
+    figure = go.Figure(_dots(names, [difference for _, difference in known], 100.0))
     figure.add_vline(x=0.0, line={"color": MUTED, "width": 1})
     styled(figure, height=120 + 44 * len(known))
     figure.update_layout(showlegend=False)

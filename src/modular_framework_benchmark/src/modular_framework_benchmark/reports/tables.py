@@ -11,6 +11,7 @@ from modular_framework_benchmark.reports.figure_style import words
 from modular_framework_benchmark.reports.number_text import (
     NONE,
     count_text,
+    counted,
     interval_text,
     number_text,
     p_value_text,
@@ -18,7 +19,15 @@ from modular_framework_benchmark.reports.number_text import (
 )
 from modular_framework_benchmark.reports.report_content import SUCCESS, ReportContent
 from modular_framework_benchmark.reports.success_figures import level_words
-from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, MethodSummary, Verdict
+from modular_framework_benchmark.statistics.comparison import (
+    Comparison,
+    Estimate,
+    MethodSummary,
+    PairCounts,
+    Verdict,
+)
+from modular_framework_benchmark.statistics.observations import SUCCESS as SUCCESS_METRIC
+from modular_framework_benchmark.statistics.sentences import listed
 from modular_framework_ros.reported_figures import Source
 
 NO_BREAK = "\u00a0"
@@ -60,6 +69,20 @@ class Table:
     notes: tuple[str, ...] = ()
 
 
+def table_text(table: Table) -> str:
+    """Returns the titles and rows of a table as plain text."""
+    rows = [table.columns, *(tuple(cell.text for cell in row) for row in table.rows)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(table.columns))]
+    return "\n".join(
+        "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    )
+
+
+def answer_text(content: ReportContent) -> str:
+    """Returns the first screen of a report as plain text."""
+    return "\n".join([table_text(answer_table(content)), "", *answer_sentences(content), content.analysis.scope])
+
+
 def overview_table(content: ReportContent) -> Table:
     """Returns each metric of each method with its interval, and what is shown of their differences."""
     methods = content.analysis.methods
@@ -75,10 +98,77 @@ def overview_table(content: ReportContent) -> Table:
         rows.append((Cell(metric_title(metric)), *estimates, Cell(shown_text(of_metric))))
     confidence = share_text(content.description.confidence, 0)
     caption = (
-        "Each metric by method: rate, mean, or restricted mean of a metric with a limit, with its "
-        f"{confidence} interval. Bold: shown to be better than every other method."
+        "Each metric by method: rate, or median in which a failure is worse than any value, with its "
+        f"{confidence} interval; none below 6 {content.unit_noun}s. Bold: shown to be better than every other method."
     )
-    return Table("overview", caption, ("metric", *methods, "what is shown"), tuple(rows), (content.analysis.rule,))
+    notes = (content.analysis.rule, content.analysis.scope, _without_interval(content))
+    return Table("overview", caption, ("metric", *methods, "what is shown"), tuple(rows), notes)
+
+
+def _without_interval(content: ReportContent) -> str:
+    """Returns what fraction of the figures has no interval."""
+    estimates = [item.estimate for item in content.analysis.summaries if item.estimate]
+    estimates += [item.difference for item in content.analysis.comparisons if item.difference]
+    without = sum(estimate.interval is None for estimate in estimates)
+    return f"{without} of {counted(len(estimates), 'figure')} (rates, medians and differences) have no interval."
+
+
+def answer_table(content: ReportContent) -> Table:
+    """Returns the levels: episodes, success, the main metric, and where most failures were."""
+    main = next((item for item in content.description.metrics if item.name != SUCCESS), None)
+    found = {(item.metric, item.method): item for item in content.analysis.summaries}
+    success = next(metric for metric in content.metrics if metric.name == SUCCESS)
+    rows = []
+    for method in content.analysis.methods:
+        counts = found[SUCCESS, method].counts
+        row = [
+            Cell(method),
+            Cell(f"{counts.succeeded:,} of {counted(counts.episodes, 'episode')}", is_number=True),
+            Cell(estimate_text(found[SUCCESS, method].estimate, success), is_number=True),
+        ]
+        if main is not None:
+            row.append(Cell(estimate_text(found[main.name, method].estimate, main), is_number=True))
+        causes = [group for group in content.failures.groups if group.by_method.get(method)]
+        worst = max(causes, key=lambda group: group.by_method[method], default=None)
+        row.append(Cell(f"{worst.by_method[method]}: {worst.cause[:90]}" if worst else NONE))
+        rows.append(tuple(row))
+    columns = ["method", "succeeded", "success [%] (interval)"]
+    columns += [] if main is None else [f"median {metric_title(main)} (interval)"]
+    confidence = share_text(content.description.confidence, 0)
+    caption = f"Intervals of {confidence}. A failure is worse than any value."
+    return Table("answer", caption, (*columns, "most frequent failure"), tuple(rows))
+
+
+def answer_sentences(content: ReportContent) -> tuple[str, ...]:
+    """Returns what is shown, a line for each metric and better method, and one line for all that is not shown."""
+    comparisons = content.analysis.comparisons
+    wins: dict[tuple[str, str], list[Comparison]] = {}
+    for item in comparisons:
+        if item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER):
+            better = item.first if item.verdict is Verdict.FIRST_BETTER else item.second
+            wins.setdefault((item.metric, better), []).append(item)
+    lines = []
+    for (metric, better), items in wins.items():
+        others = [item.second if item.first == better else item.first for item in items]
+        text = f"{words(metric)}: {better} is better than {listed(others)}, each in more pairs than it is worse"
+        lines.append(items[0].sentence if len(items) == 1 else text)
+    counts = {verdict: sum(item.verdict is verdict for item in comparisons) for verdict in Verdict}
+    rest = [
+        (counts[Verdict.NOT_SHOWN], "no difference shown"),
+        (counts[Verdict.NOT_SHOWABLE], _not_showable(comparisons)),
+        (counts[Verdict.NO_DATA], "nothing to compare"),
+    ]
+    parts = [f"{text} in {number:,} of {counted(len(comparisons), 'comparison')}" for number, text in rest if number]
+    return (*lines, *(["; ".join(parts)] if parts else []), *([] if comparisons else content.analysis.sentences))
+
+
+def _not_showable(comparisons: Sequence[Comparison]) -> str:
+    units = {item.counts.units for item in comparisons if item.verdict is Verdict.NOT_SHOWABLE}
+    if not units:
+        return ""
+    span = f"{min(units)}" if len(units) == 1 else f"{min(units)} to {max(units)}"
+    noun = next(item.unit_noun for item in comparisons if item.verdict is Verdict.NOT_SHOWABLE)
+    return f"none could have been shown with {span} {noun}{'' if units == {1} else 's'}"
 
 
 def _better_than_all(comparisons: Sequence[Comparison], methods: Sequence[str]) -> str | None:
@@ -110,11 +200,23 @@ def estimate_text(estimate: Estimate | None, metric: Metric) -> str:
     if estimate is None:
         return NONE
     low, high = (None, None) if estimate.interval is None else (estimate.interval.low, estimate.interval.high)
-    if metric.kind is MetricKind.RATE:
-        if low is None or high is None:
-            return number_text(100.0 * estimate.value)
-        return interval_text(100.0 * estimate.value, 100.0 * low, 100.0 * high)
-    return interval_text(estimate.value, low, high)
+    if metric.kind is not MetricKind.RATE:
+        return interval_text(estimate.value, low, high, metric.unit)
+    ends = [None if end is None else 100.0 * end for end in (low, high)]
+    return interval_text(100.0 * estimate.value, *ends, "%")
+
+
+def wins_text(found: Comparison) -> str:
+    """Returns the win difference of a comparison in points, with its interval."""
+    return estimate_text(found.difference, SUCCESS_METRIC)
+
+
+def pairs_text(counts: PairCounts) -> str:
+    """Returns how many pairs were compared, and of how many units."""
+    if not counts.pairs:
+        return NONE
+    units = f" of {counts.units:,} units" if counts.units < counts.pairs else ""
+    return f"{counts.pairs:,}{units}{' at random' if counts.at_random else ''}"
 
 
 def shown_text(comparisons: Sequence[Comparison]) -> str:
@@ -126,11 +228,14 @@ def shown_text(comparisons: Sequence[Comparison]) -> str:
                 shown.append(f"{item.first} better than {item.second}")
             case Verdict.SECOND_BETTER:
                 shown.append(f"{item.second} better than {item.first}")
-            case Verdict.NOT_SHOWN | Verdict.NO_DATA:
+            case Verdict.NOT_SHOWN | Verdict.NOT_SHOWABLE | Verdict.NO_DATA:
                 continue
     if shown:
         return "; ".join(shown)
-    return "no difference shown" if any(item.verdict is Verdict.NOT_SHOWN for item in comparisons) else NONE
+    verdicts = {item.verdict for item in comparisons}
+    if Verdict.NOT_SHOWN in verdicts:
+        return "no difference shown"
+    return "could not be shown" if Verdict.NOT_SHOWABLE in verdicts else NONE
 
 
 def method_table(content: ReportContent, component: str) -> Table:
@@ -143,27 +248,25 @@ def method_table(content: ReportContent, component: str) -> Table:
             if item.metric == metric.name:
                 rows.append(_method_row(metric, item))
     columns = (
-        "metric", "method", "estimate (interval)", "median (quartiles)", "interquartile mean", "counted",
-        "at the limit", "missing",
+        "metric", "method", "rate or median (interval)", "quartiles", "mean", "counted", "units", "at the limit",
+        "missing",
     )  # fmt: skip
     return Table(f"methods_{component}", f"Methods by the metrics of {words(component)}.", columns, tuple(rows))
 
 
 def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:
-    middle = NONE
-    if item.median is not None:
-        low, high = item.quartiles or (None, None)
-        middle = f"{number_text(item.median)} ({number_text(low)} to {number_text(high)})"
-    return (
-        Cell(metric_title(metric)),
-        Cell(item.method),
-        Cell(estimate_text(item.estimate, metric), is_number=True),
-        Cell(middle, is_number=True),
-        Cell(estimate_text(item.interquartile_mean, metric), is_number=True),
-        Cell(count_text(item.counts.counted), is_number=True),
-        Cell(count_text(item.counts.censored) if metric.limit is not None else NONE, is_number=True),
-        Cell(count_text(item.counts.missing), is_number=True),
+    low, high = item.quartiles or (None, None)
+    ends = [number_text(end, unit=metric.unit) for end in (low, high)]
+    texts = (
+        estimate_text(item.estimate, metric),
+        f"{ends[0]} to {ends[1]}" if item.quartiles else NONE,
+        estimate_text(item.mean, metric),
+        count_text(item.counts.counted),
+        count_text(item.counts.units),
+        count_text(item.counts.censored) if metric.limit is not None else NONE,
+        count_text(item.counts.missing),
     )
+    return (Cell(metric_title(metric)), Cell(item.method), *(Cell(text, is_number=True) for text in texts))
 
 
 def comparison_table(content: ReportContent, component: str) -> Table:
@@ -171,17 +274,15 @@ def comparison_table(content: ReportContent, component: str) -> Table:
     metrics = {metric.name: metric for metric in content.metrics if metric.component == component}
     items = [item for item in content.analysis.comparisons if item.metric in metrics]
     rows = tuple(_comparison_row(metrics[item.metric], item) for item in items)
-    columns = ("metric", "methods", "difference (interval)", "p corrected", "effect", "pairs", "result")
+    columns = (
+        "metric", "methods", "won", "lost", "won − lost [points] (interval)", "p corrected", "mean difference", "pairs",
+        "result",
+    )  # fmt: skip
     tests = dict.fromkeys(f"{item.test}; {item.correction}" for item in items if item.p_value is not None)
-    effects = dict.fromkeys(item.effect.name for item in items if item.effect)
     intervals = dict.fromkeys(
         item.difference.interval.method for item in items if item.difference and item.difference.interval
     )
-    notes = [
-        f"{title}: {'; '.join(texts)}."
-        for title, texts in (("Tests", tests), ("Intervals", intervals), ("Effects", effects))
-        if texts
-    ]
+    notes = [f"{title}: {'; '.join(texts)}." for title, texts in (("Tests", tests), ("Intervals", intervals)) if texts]
     notes += dict.fromkeys(
         f"{words(item.metric)}, {item.first} and {item.second}: {note}" for item in items for note in item.notes
     )
@@ -202,16 +303,23 @@ def _comparison_row(metric: Metric, item: Comparison) -> tuple[Cell, ...]:
             result = Cell(f"{item.second} better", True)
         case Verdict.NOT_SHOWN:
             result = Cell("no difference shown" + (f"; {item.pairs_needed:,} pairs would" if item.pairs_needed else ""))
+        case Verdict.NOT_SHOWABLE:
+            needed = f"; {item.pairs_needed:,} pairs would" if item.pairs_needed else ""
+            result = Cell(f"could not be shown with {counted(item.counts.units, item.unit_noun)}{needed}")
         case Verdict.NO_DATA:
             result = Cell("nothing to compare")
-    pairs = count_text(item.counts.pairs) if item.counts.pairs else "unpaired" if item.difference else NONE
+    texts = (
+        count_text(item.counts.won),
+        count_text(item.counts.lost),
+        wins_text(item),
+        p_value_text(item.p_corrected),
+        estimate_text(item.mean_difference, metric),
+        pairs_text(item.counts),
+    )
     return (
-        Cell(metric_title(metric).replace("[%]", "[points]")),
-        Cell(f"{item.first} − {item.second}"),
-        Cell(estimate_text(item.difference, metric), is_number=True),
-        Cell(p_value_text(item.p_corrected), is_number=True),
-        Cell(number_text(item.effect.value, 2) if item.effect else NONE, is_number=True),
-        Cell(pairs, is_number=True),
+        Cell(metric_title(metric)),
+        Cell(f"{item.first}, {item.second}"),
+        *(Cell(text, is_number=True) for text in texts),
         result,
     )
 

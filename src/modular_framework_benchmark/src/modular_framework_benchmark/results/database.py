@@ -179,7 +179,7 @@ class ResultDatabase:
             StorageError: It cannot be written.
         """
         number = self._transact(lambda connection: store_experiment(connection, description, episodes))
-        self._descriptions[number] = description
+        self._descriptions.pop(number, None)
         return number
 
     def experiments(self) -> list[StoredExperiment]:

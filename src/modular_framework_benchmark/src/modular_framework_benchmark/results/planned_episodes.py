@@ -8,6 +8,7 @@ import json
 import platform
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from modular_framework_benchmark.results.columns import (
 )
 from modular_framework_benchmark.results.errors import DescriptionError, ExperimentChangedError
 from modular_framework_benchmark.results.json_records import description_from_json, description_to_json, to_json
-from modular_framework_benchmark.results.schema import DESCRIPTIONS, EPISODES, EXPERIMENTS, PLANNER_CONFIGS
+from modular_framework_benchmark.results.schema import DESCRIPTIONS, EPISODES, EXPERIMENTS, PLANNER_CONFIGS, RUNS
 
 MOST_NAMED = 6
 UNKNOWN_VERSION = "0.0.0"
@@ -52,6 +53,8 @@ def store_experiment(
         old = description_from_json(stored.content)
         _check_ran_with(old, description)
         new = {} if stored.digest == description.digest else _new_episodes(connection, number, old, description, specs)
+        looked = bool(new) or (old.sequential and not description.sequential)
+        description = replace(description, extended=old.extended or (looked and _any_finished(connection, number)))
     content = {"digest": description.digest, "content": description_to_json(description)}
     connection.execute(update(DESCRIPTIONS).where(DESCRIPTIONS.c.id == number).values(content))
     add_metric_columns(connection, description)
@@ -114,6 +117,11 @@ def _new_episodes(
             "the same with more repetitions or levels; give the changed one another name, or use another database"
         )
     return added
+
+
+def _any_finished(connection: Connection, number: int) -> bool:
+    of_experiment = select(RUNS.c.id).join_from(RUNS, EPISODES, RUNS.c.id == EPISODES.c.id)
+    return connection.execute(of_experiment.where(EPISODES.c.descriptionid == number).limit(1)).first() is not None
 
 
 def _stored_episodes(connection: Connection, number: int) -> dict[str, RowMapping]:

@@ -51,6 +51,8 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
         .where(planned.descriptionid == number)
         .order_by(planned.number)
     )
+    if description.mode == "planning":
+        statement = statement.add_columns(planned.settings)
     columns = _read_columns(connection, statement)
     names = {value: status.value for status, value in STATUS_VALUES.items()}
     frame = {name: pd.Series(columns[name], dtype="int64") for name in ("number", "trial", "seed")}
@@ -61,6 +63,8 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
     frame |= {name: pd.Series(columns[name], dtype="str") for name in ("folder", "worker")}
     frame |= _levels(columns["configuration"], description)
     frame |= {name: pd.Series(columns[name], dtype="float64") for name in metrics}
+    if "settings" in columns:
+        frame["drawn_problem"] = pd.Series([_problem(text) for text in columns["settings"]], dtype="str")
     return pd.DataFrame(frame)
 
 
@@ -159,6 +163,11 @@ def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, A
     names = list(result.keys())
     rows = result.all()
     return dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
+
+
+def _problem(settings: str) -> str:
+    """Returns what the settings of an episode say of the problem that was drawn for its trial."""
+    return json.dumps(json.loads(settings).get("problem"), sort_keys=True)
 
 
 def _levels(configurations: tuple[str, ...], description: ExperimentDescription) -> dict[str, Any]:

@@ -144,7 +144,7 @@ SNAPSHOT_VALUES = Table(
 SCHEMA = Table("schema_version", METADATA, Column("version", Integer, nullable=False))
 
 RESULT_COLUMNS = frozenset(
-    {"number", "trial", "seed", "status", "outcome", "cause", "begun", "wall_s", "simulated_s", "folder", "worker"}
+    "number trial seed status outcome cause begun wall_s simulated_s folder worker drawn_problem".split()
 )
 """Columns of the table of results that every experiment has: no factor and no metric may have these names."""
 ARENA_COLUMNS = frozenset({"id", "experimentid", "plannerid", "experiment", "planner", "version"})

@@ -9,13 +9,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-import numpy as np
-
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import sentences
 from modular_framework_benchmark.statistics.comparison import Analysis, Comparison, MethodSummary, Verdict
-from modular_framework_benchmark.statistics.corrections import corrected, families
-from modular_framework_benchmark.statistics.findings import Finding, compare_pair
+from modular_framework_benchmark.statistics.corrections import corrected
+from modular_framework_benchmark.statistics.findings import Finding, Settings, compare_pair
 from modular_framework_benchmark.statistics.observations import (
     SUCCESS,
     EpisodeTable,
@@ -26,37 +24,49 @@ from modular_framework_benchmark.statistics.observations import (
     restricted,
 )
 from modular_framework_benchmark.statistics.summaries import summarise_method
-from modular_framework_benchmark.statistics.verdicts import conclude
+from modular_framework_benchmark.statistics.verdicts import Correction, conclude
 
 
-def analyse(results: ExperimentResults, *, seed: int = 0) -> Analysis:
+def analyse(results: ExperimentResults, *, mean_intervals: bool = False) -> Analysis:
     """Returns the statistics of an experiment.
 
     Args:
         results: Its finished episodes.
-        seed: Of the bootstrap's resamples: the same results and seed give the same figures.
+        mean_intervals: Whether differences of the means of bounded metrics get an interval, a betting interval.
 
     Raises:
         ValueError: The compared factor is none of the experiment's, or an episode is there twice.
     """
-    comparisons = compare(results, seed=seed)
+    comparisons = compare(results, mean_intervals=mean_intervals)
     return Analysis(
         methods=methods_of(results),
         metrics=tuple(metric.name for metric in metrics_of(results)),
-        summaries=summarise(results, seed=seed),
+        summaries=summarise(results),
         comparisons=comparisons,
         sentences=_main_sentences(results, comparisons),
         rule=_rule(results, len(comparisons)),
+        scope=_scope(results),
     )
 
 
-def summarise(results: ExperimentResults, *, seed: int = 0) -> tuple[MethodSummary, ...]:
-    """Returns each method by each metric; the arguments are those of `analyse`."""
-    return _summarise(results, "", seed)
+def summarise(results: ExperimentResults, levels: str = "") -> tuple[MethodSummary, ...]:
+    """Returns each method by each metric.
+
+    Args:
+        results: The finished episodes.
+        levels: Levels of other factors that they are restricted to.
+    """
+    table = EpisodeTable(results)
+    return tuple(
+        dataclasses.replace(summary, levels=levels, sentence=sentences.join(levels, summary.sentence))
+        for metric in metrics_of(results)
+        for method in methods_of(results)
+        for summary in [summarise_method(table, metric, method)]
+    )
 
 
-def summarise_by_level(results: ExperimentResults, factor: str, *, seed: int = 0) -> tuple[MethodSummary, ...]:
-    """Returns each method by each metric at each level of another factor.
+def summarise_by_level(results: ExperimentResults, factor: str) -> tuple[MethodSummary, ...]:
+    """Returns each method by each metric at each level of another factor: a description, without comparisons.
 
     Raises:
         ValueError: The experiment has no such factor, or it is the compared one.
@@ -64,76 +74,55 @@ def summarise_by_level(results: ExperimentResults, factor: str, *, seed: int = 0
     return tuple(
         summary
         for level in _levels(results, factor)
-        for summary in _summarise(restricted(results, factor, level), f"{factor}={level}", seed)
+        for summary in summarise(restricted(results, factor, level), f"{factor}={level}")
     )
 
 
-def compare(results: ExperimentResults, *, seed: int = 0) -> tuple[Comparison, ...]:
-    """Returns each pair of methods by each metric, over all levels of the other factors.
-
-    Args:
-        results: The finished episodes.
-        seed: Of the bootstrap's resamples.
-
-    Raises:
-        ValueError: The compared factor is none of the experiment's, or an episode is there twice.
-    """
-    return _concluded(results, _findings(results, "", seed))
-
-
-def compare_by_level(results: ExperimentResults, factor: str, *, seed: int = 0) -> tuple[Comparison, ...]:
-    """Returns each pair of methods by each metric at each level of another factor.
-
-    They are corrected together, apart from those of `compare`.
-
-    Raises:
-        ValueError: The experiment has no such factor, or it is the compared one.
-    """
+def compare(results: ExperimentResults, *, mean_intervals: bool = False) -> tuple[Comparison, ...]:
+    """Returns each pair of methods by each metric; the arguments are those of `analyse`."""
+    description, table = results.description, EpisodeTable(results)
+    settings = Settings(description.confidence, description.holds_at_any_time, mean_intervals)
     findings = [
-        finding
-        for level in _levels(results, factor)
-        for finding in _findings(restricted(results, factor, level), f"{factor}={level}", seed)
-    ]
-    return _concluded(results, findings)
-
-
-def _summarise(results: ExperimentResults, levels: str, seed: int) -> tuple[MethodSummary, ...]:
-    generator, table = np.random.default_rng(seed), EpisodeTable(results)
-    return tuple(
-        dataclasses.replace(summary, levels=levels, sentence=sentences.join(levels, summary.sentence))
-        for metric in metrics_of(results)
-        for method in methods_of(results)
-        for summary in [summarise_method(table, metric, method, generator)]
-    )
-
-
-def _findings(results: ExperimentResults, levels: str, seed: int) -> list[Finding]:
-    generator, table = np.random.default_rng(seed), EpisodeTable(results)
-    return [
-        dataclasses.replace(compare_pair(table, metric, first, second, generator), levels=levels)
+        compare_pair(table, metric, first, second, settings)
         for metric in metrics_of(results)
         for first, second in pairs_of_methods(results)
     ]
+    corrections = _corrections(findings, 1.0 - description.confidence)
+    return tuple(conclude(results, *each) for each in zip(findings, corrections, strict=True))
 
 
-def _concluded(results: ExperimentResults, findings: Sequence[Finding]) -> tuple[Comparison, ...]:
-    """Corrects the p values of each family and draws the conclusions, in the order of the findings."""
-    shares = families([metric.name for metric in metrics_of(results)], SUCCESS.name)
-    comparisons: dict[int, Comparison] = {}
-    for of_success, share in zip((True, False), shares, strict=True):
-        family = [number for number, found in enumerate(findings) if (found.metric.name == SUCCESS.name) == of_success]
-        p_values = corrected([findings[number].p_value for number in family], share)
-        without = p_values
-        if any(findings[number].without_broken is not None for number in family):
-            without = corrected([_p_without_broken(findings[number]) for number in family], share)
-        size = sum(value is not None for value in p_values)
-        for number, p_value, p_without in zip(family, p_values, without, strict=True):
-            comparisons[number] = conclude(results, findings[number], p_value, p_without, share / max(size, 1))
-    return tuple(comparisons[number] for number in range(len(findings)))
+def _corrections(findings: Sequence[Finding], error_rate: float) -> list[Correction]:
+    """Returns what the correction for many makes of each comparison, in their order."""
+    of_success = [found.metric.name == SUCCESS.name for found in findings]
+    p_values, at_least = _corrected(findings, of_success, error_rate)
+    without = p_values
+    if any(found.without_broken for found in findings):
+        without, _ = _corrected([found.without_broken or found for found in findings], of_success, error_rate)
+    return [Correction(*each, error_rate, least) for *each, least in zip(p_values, without, at_least, strict=True)]
 
 
-def _p_without_broken(finding: Finding) -> float | None:
-    return finding.p_value if finding.without_broken is None else finding.without_broken.p_value
+def _corrected(
+    findings: Sequence[Finding], of_success: Sequence[bool], error_rate: float
+) -> tuple[list[float | None], list[float]]:
+    """Returns the corrected p value of each comparison, and the error rate that it has at the least."""
+    families = [
+        [place for place, found in enumerate(findings) if of_success[place] is which and found.p_value is not None]
+        for which in (True, False)
+    ]
+    smallest = [min((findings[place].smallest_p for place in family), default=1.0) for family in families]
+    p_values: list[float | None] = [None] * len(findings)
+    least = [error_rate / 2, error_rate / 2]
+    for which, family in enumerate(families):
+        if family:
+            # A family that cannot show anything with its share leaves it to the other, if that can use it.
+            bar = error_rate / 2 if smallest[which] <= error_rate / 2 else error_rate
+            alone = smallest[1 - which] > bar
+            tests = [(findings[place].p_value or 0.0, findings[place].smallest_p) for place in family]
+            found, count = corrected(*zip(*tests, strict=True), error_rate, share := 1.0 if alone else 0.5)
+            least[which] = error_rate * share / count
+            for place, p_value in zip(family, found, strict=True):
+                p_values[place] = p_value
+    return p_values, [least[0 if success else 1] for success in of_success]
 
 
 def _levels(results: ExperimentResults, name: str) -> tuple[str, ...]:
@@ -157,16 +146,30 @@ def _main_sentences(results: ExperimentResults, comparisons: Sequence[Comparison
 
 
 def _rule(results: ExperimentResults, comparisons: int) -> str:
-    error = f"{100 * (1 - results.description.confidence):g} %"
-    both = families([metric.name for metric in metrics_of(results)], SUCCESS.name) != (1.0, 1.0)
-    halves = ", half of it for success and half for all other metrics" if both else ""
-    when = (
-        "Tests and intervals hold at any time, because a stopping rule looked at the results."
-        if results.description.sequential
-        else "Tests hold for the planned number of episodes."
-    )
+    description = results.description
+    error = f"{100 * (1 - description.confidence):g} %"
+    when = "Tests hold for the planned number of episodes."
+    if description.sequential:
+        when = "Tests and intervals hold at any time, because a stopping rule looked at the results."
+    elif description.extended:
+        when = "Tests and intervals hold at any time, because episodes were added after results had been seen."
     return (
-        f"A difference is shown where the test and the interval both say so. {when} With identical methods the "
-        f"experiment shows any difference with at most {error}{halves} (Holm's correction, "
-        f"{comparisons} comparison{'' if comparisons == 1 else 's'})."
+        "A difference is shown where more pairs are won than lost and the test and the interval of that both say so; a "
+        f"failure is worse than any value, two failures are a tie. {when} With identical methods the experiment shows "
+        f"any difference with at most {error}, half of it for success and half for all other metrics (Holm's and "
+        f"Tarone's correction, {sentences.count(comparisons, 'comparison')})."
     )
+
+
+def _scope(results: ExperimentResults) -> str:
+    """Returns what the claims speak for: units like those that were drawn, and the levels that were run."""
+    if results.episodes.empty:
+        return ""
+    table = EpisodeTable(results)
+    units = sentences.count(table.unit_count, table.unit_noun)
+    levels = sentences.listed([factor.name.replace("_", " ") for factor in other_factors(results)])
+    fixed = f", at the levels of {levels} that were run" if levels else ""
+    share = (
+        f" for {table.trial_count} trials: those of one count as one" if table.unit_count < table.trial_count else ""
+    )
+    return f"The unit is the {table.unit_noun}: {units}{share}. Claims are about {table.unit_noun}s like these{fixed}."

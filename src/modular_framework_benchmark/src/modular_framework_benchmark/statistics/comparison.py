@@ -16,6 +16,7 @@ class Verdict(Enum):
     FIRST_BETTER = "first_better"
     SECOND_BETTER = "second_better"
     NOT_SHOWN = "not_shown"  # compared, and no difference was shown
+    NOT_SHOWABLE = "not_showable"  # too few units to show a difference, whatever they had given
     NO_DATA = "no_data"  # nothing to compare
 
 
@@ -27,7 +28,7 @@ class Interval:
         low: Lower end, in the unit of the figure.
         high: Upper end, in the unit of the figure.
         confidence: Its level, such as 0.95.
-        method: How it was computed, in words: `Wilson`.
+        method: How it was computed, in words: `Clopper-Pearson`.
     """
 
     low: float
@@ -41,8 +42,8 @@ class Estimate:
     """A figure with its interval.
 
     Attributes:
-        name: What is estimated: `rate`, `mean`, `restricted mean`, `median`, `interquartile mean`.
-        value: The figure, in the metric's unit; a rate from 0 to 1.
+        name: What is estimated: `rate`, `median`, `mean`, `restricted mean`, `win difference`.
+        value: The figure, in the metric's unit; a rate from 0 to 1. Infinite for a median that is a failure.
         interval: Its interval; None where it has none.
     """
 
@@ -65,6 +66,7 @@ class EpisodeCounts:
         counted: Those with a value of the metric, the ones at the limit included.
         censored: Those that count at the metric's limit.
         missing: Those without a value, which are in none of the figures.
+        units: Independent units of those that are counted: problems, scenes or seeds.
     """
 
     episodes: int
@@ -75,6 +77,7 @@ class EpisodeCounts:
     counted: int
     censored: int
     missing: int
+    units: int
 
     @property
     def unmeasured_share(self) -> float | None:
@@ -92,12 +95,10 @@ class MethodSummary:
         unit: Its unit; "" for none and for rates.
         levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
         counts: How the episodes ended.
-        estimate: Rate, mean, or restricted mean (of a metric with a limit); None without data.
-        without_broken: The same figure with the broken episodes left out; None where there are none, or no data.
-        median: Median; None for rates and without data.
-        interquartile_mean: Mean of the middle half; None for rates and without data.
-        quartiles: First and third quartile; None for rates and without data.
-        sentence: All of that in words.
+        estimate: Rate, or median with failures worse than any value; None without data.
+        mean: Mean, or restricted mean of a metric with a limit; None for rates and without data.
+        quartiles: First and third quartile of the values; None for rates and without data.
+        sentence: The estimate in words.
     """
 
     method: str
@@ -106,24 +107,9 @@ class MethodSummary:
     levels: str
     counts: EpisodeCounts
     estimate: Estimate | None
-    without_broken: Estimate | None
-    median: float | None
-    interquartile_mean: Estimate | None
+    mean: Estimate | None
     quartiles: tuple[float, float] | None
     sentence: str
-
-
-@dataclass(frozen=True, slots=True)
-class Effect:
-    """A size of an effect, which does not depend on the number of episodes.
-
-    Attributes:
-        name: Its name, such as `matched-pairs rank-biserial correlation`.
-        value: Its value; above 0 where the first method has the higher values.
-    """
-
-    name: str
-    value: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,28 +117,30 @@ class PairCounts:
     """What was compared.
 
     Attributes:
-        pairs: Pairs of episodes (same trial, same levels of the other factors); 0 when the comparison is unpaired.
-        units: Independent parts of them: pairs that share a seed are one unit.
-        first_episodes: Episodes of the first method that were compared.
-        second_episodes: Those of the second method.
-        unmatched: Finished episodes of either method whose partner is not finished or not planned.
-        censored: Compared episodes that count at the metric's limit.
+        pairs: Pairs of episodes: same trial, same levels of the other factors.
+        units: Independent parts of the pairs: pairs that share a problem or a seed are one unit.
+        won: Pairs in which the first method was better.
+        lost: Pairs in which the second was.
+        failed: Compared episodes that count as worse than any value.
         broken: Compared episodes that are broken.
         missing: Pairs left out because an episode has no value of the metric.
+        unmatched: Finished episodes of either method whose partner is not finished or not planned.
+        at_random: Whether the pairs share nothing but their levels, because no two episodes have the same trial.
     """
 
     pairs: int
     units: int
-    first_episodes: int
-    second_episodes: int
-    unmatched: int
-    censored: int
+    won: int
+    lost: int
+    failed: int
     broken: int
     missing: int
+    unmatched: int
+    at_random: bool
 
     @property
     def pairs_per_unit(self) -> float:
-        """Mean number of pairs that share a seed; 0 without pairs."""
+        """Mean number of pairs of a unit; 0 without pairs."""
         return self.pairs / self.units if self.units else 0.0
 
 
@@ -165,27 +153,29 @@ class PairFigures:
         second: The other level.
         counts: What was compared.
         levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
-        first_estimate: Figure of the first method over what was compared; None without data.
+        unit_noun: What a unit is: `problem`, `scene`, `seed`.
+        first_estimate: Rate or median of the first method over the pairs; None without data.
         second_estimate: That of the second.
-        difference: First minus second with its interval, in the metric's unit (0.12 for 12 points of a rate); None
-            without data.
-        p_value: P value of the test; None without data.
+        difference: Win difference, from -1 to 1, with its interval: the share of pairs in which the first is better
+            minus that in which the second is, one mean a unit. For a rate that is the difference of the rates, towards
+            the better one. None without data.
+        mean_difference: First minus second mean of the values of the pairs, in the metric's unit: a description
+            without a verdict. None for rates and without data.
+        p_value: P value of the test; None without data and with too few units.
         test: Name of the test.
-        effect: Size of the effect.
-        improvement: Probability that the first is better in a pair, ties counting half.
     """
 
     first: str
     second: str
     counts: PairCounts
     levels: str = ""
+    unit_noun: str = "seed"
     first_estimate: float | None = None
     second_estimate: float | None = None
     difference: Estimate | None = None
+    mean_difference: Estimate | None = None
     p_value: float | None = None
     test: str = ""
-    effect: Effect | None = None
-    improvement: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,7 +191,7 @@ class Comparison(PairFigures):
         verdict_without_broken: The same with the pairs of broken episodes left out; None where there are none.
         pairs_needed: How many pairs in all would show `difference_planned` with 80 % power; None if already there or
             unknown.
-        difference_planned: The difference which `pairs_needed` is for, in the metric's unit.
+        difference_planned: The win difference which `pairs_needed` is for.
         sentence: The result in words, one sentence.
         notes: What a reader must know beside it: censored, missing, broken, unfinished.
     """
@@ -229,6 +219,7 @@ class Analysis:
         comparisons: Each pair of methods by each metric, over all levels of the other factors.
         sentences: The main results in words, the most important first.
         rule: What the verdicts rest on, in words: test, correction, error rate, sequential or not.
+        scope: What the claims speak for: the units, their number, and the levels.
     """
 
     methods: tuple[str, ...]
@@ -237,3 +228,4 @@ class Analysis:
     comparisons: tuple[Comparison, ...]
     sentences: tuple[str, ...]
     rule: str
+    scope: str

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compares two methods by one metric: chooses the test and the interval that fit, before any correction."""
+"""Compares two methods by one metric, before any correction: won and lost pairs, their test and their interval.
+
+One statistic decides the direction, the p value and the interval of every metric: the win difference. Sources: S. J.
+Pocock and others, The win ratio, European Heart J. 33 (2012) 176-182; R. Agarwal and others, NeurIPS 2021.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from statsmodels.stats.proportion import proportion_effectsize
 
 from modular_framework_benchmark.records.experiment import Metric, MetricKind
-from modular_framework_benchmark.statistics import rates, sequential, values
-from modular_framework_benchmark.statistics.comparison import Effect, Estimate, Interval, PairCounts, PairFigures
-from modular_framework_benchmark.statistics.observations import EpisodeTable, Observations, Pairs
-
-Floats = NDArray[np.float64]
+from modular_framework_benchmark.statistics import rates, sequential
+from modular_framework_benchmark.statistics.comparison import Estimate, Interval, PairCounts, PairFigures
+from modular_framework_benchmark.statistics.observations import EpisodeTable, Floats, Integers, Pairs, unit_means
+from modular_framework_benchmark.statistics.values import MIN_UNITS, bounded_mean_interval, sign_flip_p_value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,13 +25,15 @@ class Finding(PairFigures):
 
     Attributes:
         metric: What is compared.
-        spread: What the number of pairs for a difference depends on: share of pairs that differ (rates with a seed for
-            each pair), else standard deviation of the differences of units. None where unpaired.
+        spread: Mean square of the units' win differences, which is the share of pairs that are decided where each unit
+            is one pair: the number of pairs for a difference depends on it. None without data.
+        smallest_p: Smallest p value that so many decided units could have; 0 for a test that holds at any time.
         without_broken: The same without the pairs of broken episodes; None where there are none.
     """
 
     metric: Metric
     spread: float | None = None
+    smallest_p: float = 1.0
     without_broken: Finding | None = None
 
 
@@ -39,142 +43,106 @@ class Settings:
 
     Attributes:
         confidence: Level of the intervals.
-        sequential: Whether tests and intervals must hold at any time.
-        generator: What resamples are drawn with.
+        at_any_time: Whether tests and intervals must hold however often one looks.
+        mean_intervals: Whether differences of the means of bounded metrics get a betting interval.
     """
 
     confidence: float
-    sequential: bool
-    generator: np.random.Generator
+    at_any_time: bool
+    mean_intervals: bool = False
 
 
-def figure_name(metric: Metric) -> str:
-    """Returns what is estimated of a metric."""
-    if metric.kind is MetricKind.RATE:
-        return "rate"
-    return "mean" if metric.limit is None else "restricted mean"
-
-
-def compare_pair(
-    table: EpisodeTable, metric: Metric, first: str, second: str, generator: np.random.Generator
-) -> Finding:
-    """Returns the comparison of two methods by a metric: paired where there are pairs, otherwise unpaired.
+def compare_pair(table: EpisodeTable, metric: Metric, first: str, second: str, settings: Settings) -> Finding:
+    """Returns the comparison of two methods by a metric.
 
     Args:
         table: The finished episodes.
         metric: What is compared.
         first: One method.
         second: The other.
-        generator: What resamples are drawn with.
+        settings: How they are compared.
     """
-    description = table.results.description
-    settings = Settings(description.confidence, description.sequential, generator)
     matched = table.pairs(metric, first, second)
-    if len(matched.first) or matched.missing:
-        return _paired(metric, first, second, matched, settings)
-    seen = [table.observations(metric, method) for method in (first, second)]
-    return _unpaired(metric, first, second, (seen[0], seen[1]), settings)
+    return _found(replace(_empty(first, second, metric), unit_noun=table.unit_noun), matched, settings)
 
 
-def _paired(metric: Metric, first: str, second: str, matched: Pairs, settings: Settings) -> Finding:
-    if settings.sequential:
+def _empty(first: str, second: str, metric: Metric) -> Finding:
+    return Finding(first, second, PairCounts(0, 0, 0, 0, 0, 0, 0, 0, False), metric=metric)
+
+
+def _found(empty: Finding, matched: Pairs, settings: Settings) -> Finding:
+    metric = empty.metric
+    if settings.at_any_time:
         matched = matched.of_complete_units()
-    count, differences = len(matched.first), matched.unit_differences()
-    counts = PairCounts(
-        pairs=count, units=len(differences), first_episodes=count, second_episodes=count,
-        unmatched=matched.unmatched, censored=matched.censored, broken=matched.broken_episodes, missing=matched.missing,
-    )  # fmt: skip
-    finding = Finding(first, second, counts, metric=metric)
-    if not count:
+    outcomes = matched.outcomes(metric.better)
+    means, sizes = unit_means(outcomes, _coarser_units(matched))
+    finding = replace(empty, counts=_counts(matched, outcomes, len(means)))
+    if not len(matched):
         return finding
-    p_value, test, interval = _test(metric, matched, differences, settings)
+    p_value, test, interval = _test(means, sizes, settings)
     finding = replace(
         finding,
-        first_estimate=float(matched.first.mean()),
-        second_estimate=float(matched.second.mean()),
-        difference=Estimate(figure_name(metric), float(np.mean(matched.first - matched.second)), interval),
+        first_estimate=_typical(matched.first.scores, metric),
+        second_estimate=_typical(matched.second.scores, metric),
+        difference=Estimate("win difference", float(np.mean(means)), interval),
+        mean_difference=_mean_difference(matched, metric, settings),
         p_value=p_value,
         test=test,
-        effect=_effect(metric, matched.first, matched.second),
-        improvement=values.improvement(matched.first, matched.second, metric.better),
-        spread=_spread(metric, matched, differences),
+        spread=float(np.mean(means**2)),
+        smallest_p=0.0 if settings.at_any_time else 2.0 ** (1.0 - np.count_nonzero(means)),
     )
     if not matched.broken.any():
         return finding
-    return replace(finding, without_broken=_paired(metric, first, second, matched.without_broken(), settings))
+    return replace(finding, without_broken=_found(empty, matched.kept(~matched.broken), settings))
 
 
-def _test(
-    metric: Metric, matched: Pairs, differences: Floats, settings: Settings
-) -> tuple[float, str, Interval | None]:
-    """Returns the p value, the test's name and the interval of a paired difference."""
-    rate, alone = metric.kind is MetricKind.RATE, len(differences) == len(matched.first)
-    if settings.sequential:
-        return _test_at_any_time(metric, matched, differences, settings)
-    if rate and alone:
-        outcomes = rates.Discordance.of(matched.first, matched.second)
-        found = rates.paired_interval(outcomes, settings.confidence)
-        return rates.paired_p_value(outcomes), "McNemar's exact test", found
-    interval = values.mean_interval(differences, matched.unit_strata(), settings.confidence, settings.generator)
-    if rate:
-        interval = interval and replace(interval, low=max(interval.low, -1.0), high=min(interval.high, 1.0))
-        return values.sign_flip_p_value(differences, settings.generator), "sign flip test of seeds", interval
-    return values.paired_p_value(differences), "Wilcoxon signed rank test", interval
+def _coarser_units(matched: Pairs) -> Integers:
+    """Returns the units of the pairs; partners at random have units of their own, of which the fewer count."""
+    return min(matched.first.units, matched.second.units, key=lambda units: len(np.unique(units)))
 
 
-def _test_at_any_time(
-    metric: Metric, matched: Pairs, differences: Floats, settings: Settings
-) -> tuple[float, str, Interval | None]:
-    if metric.kind is MetricKind.RATE:
-        p_value = sequential.anytime_p_value(differences)
-        return p_value, "betting test, valid at any time", sequential.anytime_interval(differences, settings.confidence)
-    p_value = sequential.anytime_p_value(np.sign(differences))
-    test = "betting sign test, valid at any time"
-    if len(differences) < 2:
-        return p_value, test, None
-    return p_value, test, sequential.asymptotic_interval(differences, settings.confidence)
-
-
-def _unpaired(
-    metric: Metric, first: str, second: str, seen: tuple[Observations, Observations], settings: Settings
-) -> Finding:
-    kept = [each.values[~np.isnan(each.values)] for each in seen]
-    counts = PairCounts(
-        pairs=0, units=0, first_episodes=len(kept[0]), second_episodes=len(kept[1]), unmatched=0,
-        censored=int(sum(each.censored.sum() for each in seen)), broken=int(sum(each.broken.sum() for each in seen)),
-        missing=0,
-    )  # fmt: skip
-    finding = Finding(first, second, counts, metric=metric)
-    if not len(kept[0]) or not len(kept[1]):
-        return finding
-    interval: Interval | None
-    if metric.kind is MetricKind.RATE:
-        one, other = ((int(each.sum()), len(each)) for each in kept)
-        p_value, test = rates.unpaired_p_value(one, other), rates.unpaired_test_name(len(kept[0]) + len(kept[1]))
-        interval = rates.unpaired_interval(one, other, settings.confidence)
-    else:
-        p_value, test = values.unpaired_p_value(*kept), "Mann-Whitney U test"
-        interval = values.unpaired_interval(kept[0], kept[1], settings.confidence)
-    return replace(
-        finding,
-        first_estimate=float(kept[0].mean()),
-        second_estimate=float(kept[1].mean()),
-        difference=Estimate(figure_name(metric), float(kept[0].mean() - kept[1].mean()), interval),
-        p_value=None if settings.sequential else p_value,
-        test="none holds at any time without pairs" if settings.sequential else test,
-        improvement=values.unpaired_improvement(kept[0], kept[1], metric.better),
+def _counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
+    sides = (matched.first, matched.second)
+    return PairCounts(
+        pairs=len(matched),
+        units=units,
+        won=int(np.sum(outcomes > 0)),
+        lost=int(np.sum(outcomes < 0)),
+        failed=int(sum(np.isinf(side.scores).sum() for side in sides)),
+        broken=int(sum(side.broken.sum() for side in sides)),
+        missing=matched.missing,
+        unmatched=matched.unmatched,
+        at_random=matched.at_random,
     )
 
 
-def _effect(metric: Metric, first: Floats, second: Floats) -> Effect:
-    if metric.kind is MetricKind.RATE:
-        return Effect("Cohen's h", float(proportion_effectsize(first.mean(), second.mean())))
-    return values.rank_biserial(first - second)
+def _test(means: Floats, sizes: Integers, settings: Settings) -> tuple[float | None, str, Interval | None]:
+    """Returns the p value, the test's name and the interval of the units' mean win difference."""
+    if len(means) < MIN_UNITS:
+        return None, f"none: fewer than {MIN_UNITS} units", None
+    if settings.at_any_time:
+        p_value = sequential.anytime_p_value(means)
+        return p_value, "betting test, valid at any time", sequential.anytime_interval(means, settings.confidence)
+    if np.isin(means, (-1.0, 0.0, 1.0)).all():
+        pairs = rates.PairOutcomes(int(np.sum(means > 0)), int(np.sum(means < 0)), len(means))
+        return rates.paired_p_value(pairs), "McNemar's exact test", rates.paired_interval(pairs, settings.confidence)
+    interval = bounded_mean_interval(means, (-1.0, 1.0), settings.confidence)
+    return sign_flip_p_value(means, sizes), "sign flip test of the units", interval
 
 
-def _spread(metric: Metric, matched: Pairs, differences: Floats) -> float | None:
-    count = len(differences)
-    if metric.kind is MetricKind.RATE and count == len(matched.first):
-        # Half a pair that differs is added, so that a few equal pairs do not promise that no pair ever differs.
-        return (float(np.sum(matched.first != matched.second)) + 0.5) / (count + 1)
-    return float(np.std(differences, ddof=1)) if count > 1 else None
+def _typical(scores: Floats, metric: Metric) -> float:
+    return float(np.mean(scores) if metric.kind is MetricKind.RATE else np.median(scores))
+
+
+def _mean_difference(matched: Pairs, metric: Metric, settings: Settings) -> Estimate | None:
+    """Returns the difference of the means of the pairs that have both values: a description."""
+    differences = matched.first.values - matched.second.values
+    known = ~np.isnan(differences)
+    if metric.kind is MetricKind.RATE or not known.any():
+        return None
+    means, _ = unit_means(differences[known], _coarser_units(matched)[known])
+    reach = metric.bounds[1] - metric.bounds[0]
+    interval = None
+    if settings.mean_intervals and math.isfinite(reach) and len(means) >= MIN_UNITS:
+        interval = sequential.anytime_interval(means, settings.confidence, reach)
+    return Estimate("mean difference", float(np.mean(means)), interval)

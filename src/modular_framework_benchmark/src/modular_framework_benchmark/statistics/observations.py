@@ -4,11 +4,14 @@
 The one place that decides what an episode counts for that failed, timed out, broke or has no value:
 
 - success: every episode that is not a success is a failure, a broken one too;
-- a metric with a limit: an episode without success and without a value counts at the limit, a value beyond the limit
-  does too, and so does every episode without success if the metric is one of the whole task (outside the mode `task`:
-  whatever the metric);
-- any other metric, one that no episode has a value of, and a success without a value: missing. It is left out of the
-  figures, and counted.
+- any other metric that is no rate: an episode without success counts as worse than any value if the metric is one of
+  the whole task (outside the mode `task`: whatever the metric), or if it has no value. In a mean it counts at the
+  metric's limit, where the metric has one, and so does a value beyond the limit;
+- a rate without a value, a metric that no episode has a value of, and a success without a value: missing. It is left
+  out of the figures, and counted.
+
+It also decides which episodes are independent: those that share what was drawn for a trial, a problem or a seed, are
+one unit.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ SUCCESS = Metric("success", "task", MetricKind.RATE, Direction.HIGHER, descripti
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,78 +41,73 @@ class Observations:
     """A metric in a number of episodes.
 
     Attributes:
-        values: Value in each episode, NaN where it has none, shape (n,).
+        values: Value in each episode for a mean, NaN where it has none, shape (n,).
+        scores: Value in each episode for a rank: infinitely bad for a failure, NaN where it is missing, shape (n,).
         censored: Whether it counts at the limit, shape (n,).
         broken: Whether the episode is broken, shape (n,).
+        units: Number of the independent unit of each episode, shape (n,).
     """
 
     values: Floats
+    scores: Floats
     censored: Flags
     broken: Flags
+    units: Integers
+
+    def of(self, rows: Integers) -> Observations:
+        """Returns the metric in some of the episodes, by their places."""
+        return Observations(*(getattr(self, field.name)[rows] for field in dataclasses.fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """A metric in pairs of episodes with the same scene and seed.
+    """A metric in pairs of episodes, none of them missing.
 
     Attributes:
-        first: Values of the first method, shape (n,), none NaN.
-        second: Those of the second.
-        units: Number of the independent unit each pair belongs to, from 0, shape (n,): pairs of one seed are one unit.
-        strata: Number of the combination of other factors' levels of each pair, shape (n,).
-        broken: Whether an episode of the pair is broken, shape (n,).
-        censored: How many of the episodes count at the limit.
-        broken_episodes: How many of the episodes are broken.
+        first: The first method's episodes.
+        second: Those of the second, in the order of their partners.
         missing: How many pairs were left out because a value is missing.
         unmatched: How many episodes of either method have no partner.
+        at_random: Whether the partners share nothing but the levels of the other factors.
     """
 
-    first: Floats
-    second: Floats
-    units: NDArray[np.int64]
-    strata: NDArray[np.int64]
-    broken: Flags
-    censored: int
-    broken_episodes: int
+    first: Observations
+    second: Observations
     missing: int
     unmatched: int
+    at_random: bool
 
-    def without_broken(self) -> Pairs:
-        """Returns the pairs of which neither episode is broken."""
-        return dataclasses.replace(self._kept(~self.broken), broken_episodes=0)
+    def __len__(self) -> int:
+        return len(self.first.values)
+
+    @property
+    def broken(self) -> Flags:
+        """Returns whether an episode of each pair is broken."""
+        return np.asarray(self.first.broken | self.second.broken)
+
+    def kept(self, which: Flags) -> Pairs:
+        """Returns some of the pairs."""
+        places = np.flatnonzero(which)
+        return dataclasses.replace(self, first=self.first.of(places), second=self.second.of(places))
 
     def of_complete_units(self) -> Pairs:
         """Returns the pairs of units that are finished: those with as many pairs as any unit has."""
-        if not len(self.units):
+        if not len(self):
             return self
-        sizes = np.bincount(self.units)
-        return self._kept(sizes[self.units] == sizes.max())
+        _, units, sizes = np.unique(self.first.units, return_inverse=True, return_counts=True)
+        return self.kept(sizes[units] == sizes.max())
 
-    def unit_differences(self) -> Floats:
-        """Returns the mean difference of the pairs of each unit, first minus second, shape (units,)."""
-        if not len(self.units):
-            return np.zeros(0)
-        return np.asarray(np.bincount(self.units, self.first - self.second) / np.bincount(self.units))
+    def outcomes(self, better: Direction) -> Floats:
+        """Returns 1 for each pair in which the first is better, -1 for the second, 0 for a tie; two failures tie."""
+        sign = 1.0 if better is Direction.HIGHER else -1.0
+        first, second = self.first.scores, self.second.scores
+        return sign * ((first > second).astype(float) - (first < second))
 
-    def unit_strata(self) -> NDArray[np.int64]:
-        """Returns the stratum of each unit, shape (units,); 0 where a unit has pairs of several strata."""
-        count = len(np.unique(self.units))
-        if count < len(self.units):
-            return np.zeros(count, dtype=np.int64)
-        strata = np.empty(count, dtype=np.int64)
-        strata[self.units] = self.strata
-        return strata
 
-    def _kept(self, kept: Flags) -> Pairs:
-        _, units = np.unique(self.units[kept], return_inverse=True)
-        return dataclasses.replace(
-            self,
-            first=self.first[kept],
-            second=self.second[kept],
-            units=units.astype(np.int64),
-            strata=self.strata[kept],
-            broken=self.broken[kept],
-        )
+def unit_means(values: Floats, units: Integers) -> tuple[Floats, Integers]:
+    """Returns the mean value and the number of values of each unit."""
+    _, places, sizes = np.unique(units, return_inverse=True, return_counts=True)
+    return np.asarray(np.bincount(places, values) / sizes), sizes
 
 
 def metrics_of(results: ExperimentResults) -> tuple[Metric, ...]:
@@ -163,27 +162,26 @@ class EpisodeTable:
         self._succeeded = episodes["success"].to_numpy(bool)
         self._statuses = episodes["status"].to_numpy()
         self._broken = np.asarray(self._statuses == EpisodeStatus.BROKEN.value, dtype=bool)
-        self._seeds = episodes["seed"].to_numpy()
         self._strata = _strata(results)
+        self._units, self.unit_noun = _units(results, self._strata)
         trials = episodes["trial"].to_numpy(np.int64)
         self._keys = self._strata * (int(trials.max(initial=0)) + 1) + trials
+        self.unit_count, self.trial_count = len(np.unique(self._units)), len(np.unique(self._keys))
         of_method = episodes[results.description.compared].to_numpy()
         self._rows = {method: np.flatnonzero(of_method == method) for method in methods_of(results)}
         for method, rows in self._rows.items():
             self._check_unique(method, rows)
-        self._values: dict[str, tuple[Floats, Flags]] = {}
+        self._columns: dict[str, Observations] = {}
 
     def observations(self, metric: Metric, method: str) -> Observations:
         """Returns a metric in every finished episode of a method."""
-        values, censored = self._column(metric)
-        rows = self._rows[method]
-        return Observations(values[rows], censored[rows], self._broken[rows])
+        return self._column(metric).of(self._rows[method])
 
     def counts(self, metric: Metric, method: str) -> EpisodeCounts:
         """Returns how the episodes of a method ended and what became of them in the figures of a metric."""
         statuses = self._statuses[self._rows[method]]
         seen = self.observations(metric, method)
-        missing = int(np.isnan(seen.values).sum())
+        present = ~np.isnan(seen.scores)
 
         def ended(status: EpisodeStatus) -> int:
             return int(np.sum(statuses == status.value))
@@ -194,49 +192,59 @@ class EpisodeTable:
             failed=ended(EpisodeStatus.FAILED) + ended(EpisodeStatus.INVALID),
             timed_out=ended(EpisodeStatus.TIMED_OUT),
             broken=ended(EpisodeStatus.BROKEN),
-            counted=len(seen.values) - missing,
+            counted=int(present.sum()),
             censored=int(seen.censored.sum()),
-            missing=missing,
+            missing=int((~present).sum()),
+            units=len(np.unique(seen.units[present])),
         )
 
     def pairs(self, metric: Metric, first: str, second: str) -> Pairs:
-        """Returns a metric in the pairs of two methods: same trial, same levels of the other factors."""
+        """Returns a metric in the pairs of two methods: same trial, same levels of the other factors.
+
+        Where no two episodes have the same trial and levels, those with the same levels are paired in their order.
+        """
         rows = self._rows[first], self._rows[second]
-        _, *places = np.intersect1d(self._keys[rows[0]], self._keys[rows[1]], assume_unique=True, return_indices=True)
-        one, other = (side[place] for side, place in zip(rows, places, strict=True))
-        values, censored = self._column(metric)
-        complete = ~np.isnan(values[one]) & ~np.isnan(values[other])
-        kept, kept_other = one[complete], other[complete]
-        broken = np.stack([self._broken[kept], self._broken[kept_other]])
-        return Pairs(
-            first=values[kept],
-            second=values[kept_other],
-            units=np.unique(self._seeds[kept], return_inverse=True)[1].astype(np.int64),
-            strata=self._strata[kept],
-            broken=np.asarray(broken.any(axis=0)),
-            censored=int(censored[kept].sum() + censored[kept_other].sum()),
-            broken_episodes=int(broken.sum()),
-            missing=len(one) - len(kept),
-            unmatched=len(rows[0]) + len(rows[1]) - 2 * len(one),
-        )
+        keys = [self._keys[of_method] for of_method in rows]
+        at_random = not np.isin(*keys).any()
+        if at_random:
+            keys = [_order_within(self._strata[of_method]) for of_method in rows]
+        _, *places = np.intersect1d(*keys, assume_unique=True, return_indices=True)
+        column = self._column(metric)
+        sides = [column.of(of_method[place]) for of_method, place in zip(rows, places, strict=True)]
+        count = len(sides[0].scores)
+        found = Pairs(sides[0], sides[1], 0, len(rows[0]) + len(rows[1]) - 2 * count, at_random)
+        found = found.kept(~np.isnan(sides[0].scores) & ~np.isnan(sides[1].scores))
+        return dataclasses.replace(found, missing=count - len(found))
 
-    def _column(self, metric: Metric) -> tuple[Floats, Flags]:
-        """Returns the value of a metric in every episode, and whether it counts at the limit, shape (episodes,)."""
-        if metric.name not in self._values:
-            self._values[metric.name] = self._read(metric)
-        return self._values[metric.name]
+    def _column(self, metric: Metric) -> Observations:
+        """Returns a metric in every episode."""
+        if metric.name not in self._columns:
+            self._columns[metric.name] = self._read(metric)
+        return self._columns[metric.name]
 
-    def _read(self, metric: Metric) -> tuple[Floats, Flags]:
+    def _read(self, metric: Metric) -> Observations:
+        count = len(self._succeeded)
         if metric.name == SUCCESS.name:
-            return self._succeeded.astype(float), np.zeros(len(self._succeeded), dtype=bool)
-        values = np.full(len(self._succeeded), np.nan)
+            values = self._succeeded.astype(float)
+            return Observations(values, values, np.zeros(count, dtype=bool), self._broken, self._units)
+        values = np.full(count, np.nan)
         if metric.name in self.results.episodes:
             values = pd.to_numeric(self.results.episodes[metric.name]).to_numpy(float).copy()
         values[~np.isfinite(values) | self._broken] = np.nan
-        censored = _censored(values, self._succeeded, metric, self.results.description.mode)
+        scores, failed = values.copy(), self._failed(values, metric)
+        scores[failed] = -np.inf if metric.better is Direction.HIGHER else np.inf
+        censored = np.zeros(count, dtype=bool)
         if metric.limit is not None:
+            censored = failed | (values >= metric.limit if metric.better is Direction.LOWER else values <= metric.limit)
             values[censored] = metric.limit
-        return values, censored
+        return Observations(values, scores, censored, self._broken, self._units)
+
+    def _failed(self, values: Floats, metric: Metric) -> Flags:
+        """Returns which episodes count as worse than any value."""
+        if metric.kind is MetricKind.RATE or np.isnan(values).all():  # nothing reports it: the hold time, unshaken
+            return np.zeros(len(values), dtype=bool)
+        whole_episode = metric.component == "task" or self.results.description.mode != "task"
+        return np.asarray(~self._succeeded & (whole_episode | np.isnan(values)))
 
     def _check_unique(self, method: str, rows: NDArray[np.int64]) -> None:
         _, places = np.unique(self._keys[rows], return_index=True)
@@ -263,16 +271,6 @@ def _factor(results: ExperimentResults, name: str) -> Factor:
     raise ValueError(f"experiment '{results.description.name}' has no factor '{name}'; its factors are: {known}")
 
 
-def _censored(values: Floats, succeeded: Flags, metric: Metric, mode: str) -> Flags:
-    """Returns which episodes count at the metric's limit."""
-    if metric.limit is None:
-        return np.zeros(len(values), dtype=bool)
-    beyond = values >= metric.limit if metric.better is Direction.LOWER else values <= metric.limit
-    whole_episode = metric.component == "task" or mode != "task"
-    measured = not np.isnan(values).all()  # else nothing reports it, such as the hold time without a shake
-    return beyond | (~succeeded & (whole_episode | (np.isnan(values) & measured)))
-
-
 def _strata(results: ExperimentResults) -> NDArray[np.int64]:
     """Returns the number of the combination of other factors' levels of each episode, shape (episodes,)."""
     strata = np.zeros(len(results.episodes), dtype=np.int64)
@@ -280,3 +278,25 @@ def _strata(results: ExperimentResults) -> NDArray[np.int64]:
         codes, levels = pd.factorize(results.episodes[factor.name])
         strata = strata * (len(levels) + 1) + codes
     return strata
+
+
+def _units(results: ExperimentResults, strata: Integers) -> tuple[Integers, str]:
+    """Returns the number of the independent unit of each episode, and what a unit is.
+
+    A unit is what was drawn for a trial. Problems and seeds that are crossed: the coarser of the two. A problem that is
+    the only one at its levels was not drawn.
+    """
+    episodes = results.episodes
+    seeds = pd.factorize(episodes["seed"])[0].astype(np.int64)
+    if "drawn_problem" in episodes:
+        problems = pd.factorize(episodes["drawn_problem"])[0].astype(np.int64)
+        of_levels = len(np.unique(np.stack([strata, problems]), axis=1).T)
+        if of_levels > len(np.unique(strata)) and len(np.unique(problems)) <= len(np.unique(seeds)):
+            return problems, "problem"
+    return seeds, "scene" if results.description.mode in ("task", "grasps") else "seed"
+
+
+def _order_within(strata: Integers) -> Integers:
+    """Returns a key of each episode's levels and its place among those with the same levels."""
+    places = pd.Series(strata).groupby(strata).cumcount().to_numpy(np.int64)
+    return np.asarray(strata * (len(strata) + 1_000_000_000) + places)

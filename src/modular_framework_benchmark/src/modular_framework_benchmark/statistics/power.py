@@ -8,24 +8,25 @@ from functools import lru_cache
 
 import numpy as np
 from scipy import stats
-from statsmodels.stats.power import TTestPower
+
+from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval
+from modular_framework_benchmark.statistics.sequential import anytime_p_value
+from modular_framework_benchmark.statistics.values import MIN_UNITS
 
 POWER = 0.8
 """Share of experiments that would show the difference, the usual one."""
 MOST_PAIRS = 1_000_000
-SIGNED_RANK_EFFICIENCY = 3.0 / math.pi
-"""Pairs that a t test needs for each pair of Wilcoxon's signed rank test, for normal differences."""
 
 
 @lru_cache(maxsize=4096)
 def rate_power(pairs: int, difference: float, discordance: float, error_rate: float = 0.05) -> float:
-    """Returns how likely McNemar's exact test shows a paired difference of rates, on the right side.
+    """Returns how likely McNemar's exact test shows a win difference, which for a rate is that of the rates.
 
     Exact: summed over how many of the pairs differ, and how many of those the first method wins.
 
     Args:
         pairs: Paired episodes.
-        difference: Difference of the rates, such as 0.05 for 5 points.
+        difference: Win difference, such as 0.05 for 5 points.
         discordance: Share of pairs in which the methods differ, at least the difference.
         error_rate: Two-sided, that of this comparison after the correction for many.
     """
@@ -70,32 +71,34 @@ def pairs_for_rate(difference: float, discordance: float, error_rate: float = 0.
     return high
 
 
-def pairs_for_value(difference: float, deviation: float, error_rate: float = 0.05, power: float = POWER) -> int | None:
-    """Returns how many paired episodes show a difference of values by Wilcoxon's test; None above a million.
-
-    That of a paired t test, for the efficiency of the signed rank test with normal differences.
+def smallest_difference(units: int, error_rate: float, decided: float = 1.0) -> float | None:
+    """Returns the smallest win difference that a number of units shows with 80 % power; None where none is shown.
 
     Args:
-        difference: Mean difference, above 0, in the metric's unit.
-        deviation: Standard deviation of the paired differences, in the metric's unit, above 0.
+        units: Independent pairs.
         error_rate: Two-sided, that of this comparison after the correction for many.
-        power: Share of experiments that are to show it.
+        decided: Share of the pairs in which the methods differ, where the difference is no larger.
     """
-    size = float(f"{difference / deviation:.3g}")
-    return _pairs_for_size(size, error_rate, power)
+    for points in range(1, 101):
+        if rate_power(units, points / 100, decided, error_rate) >= POWER and units >= fewest_units(error_rate):
+            return points / 100
+    return None
 
 
-SMALLEST_SIGNED_RANK = 6
-"""Fewest pairs with which the signed rank test can have a p value below 0.05."""
+@lru_cache(maxsize=1024)
+def fewest_units(error_rate: float, at_any_time: bool = False) -> int:
+    """Returns with how many units a difference can be shown if the first method wins all of them.
 
-
-@lru_cache(maxsize=4096)
-def _pairs_for_size(size: float, error_rate: float, power: float) -> int | None:
-    """Returns the number of pairs for a difference in standard deviations; rounded sizes are asked for repeatedly."""
-    if size < 1e-3:
-        return None
-    if size > 5.0:
-        return SMALLEST_SIGNED_RANK
-    pairs = TTestPower().solve_power(effect_size=size, alpha=error_rate, power=power)
-    needed = math.ceil(float(np.squeeze(pairs)) / SIGNED_RANK_EFFICIENCY)
-    return max(needed, SMALLEST_SIGNED_RANK) if needed <= MOST_PAIRS else None
+    Args:
+        error_rate: Two-sided, that of this comparison after the correction for many.
+        at_any_time: Whether the test holds however often one looks.
+    """
+    units = MIN_UNITS
+    while True:
+        if at_any_time:
+            p_value, outside = anytime_p_value(np.ones(units)), True
+        else:
+            p_value, outside = 2.0 ** (1 - units), paired_interval(PairOutcomes(units, 0, units)).low > 0.0
+        if p_value <= error_rate and outside:
+            return units
+        units += 1

@@ -7,27 +7,33 @@ import math
 from collections.abc import Sequence
 
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
-from modular_framework_benchmark.statistics.comparison import EpisodeCounts, Estimate, Interval, PairCounts
+from modular_framework_benchmark.statistics.comparison import EpisodeCounts, Estimate, Interval, PairCounts, PairFigures
 
 
-def claim(metric: Metric, better: str, worse: str, difference: Estimate, counts: PairCounts) -> str:
+def claim(metric: Metric, better: str, worse: str, figures_text: str) -> str:
     """Returns the sentence of a difference that is shown.
 
     Args:
         metric: What was compared.
         better: Method that is better.
         worse: The other one.
-        difference: Better minus worse.
-        counts: What was compared.
+        figures_text: The figures behind it, those of `figures`.
     """
-    return f"{better} {_comparative(metric, difference.value)} {worse} ({figures(metric, difference, counts)})"
+    return f"{better} {_comparative(metric)} {worse} ({figures_text})"
 
 
-def no_claim(metric: Metric, first: str, second: str, difference: Estimate, counts: PairCounts) -> str:
+def no_claim(metric: Metric, first: str, second: str, figures_text: str) -> str:
     """Returns the sentence of a difference that is not shown; the arguments are those of `claim`."""
-    corrected = ", corrected for all comparisons" if ends_outside_zero(difference.interval) else ""
-    between = f"{first} and {second}{corrected}"
-    return f"no difference in {words(metric)} shown between {between} ({figures(metric, difference, counts)})"
+    return f"no difference in {words(metric)} shown between {first} and {second} ({figures_text})"
+
+
+def not_showable(metric: Metric, first: str, second: str, counts: PairCounts, noun: str) -> str:
+    """Returns the sentence of a comparison with too few units to show anything."""
+    units = count(counts.units, "pair" if counts.units == counts.pairs else noun)
+    return (
+        f"a difference in {words(metric)} between {first} and {second} could not have been shown with {units} "
+        f"({counts.won} won, {counts.lost} lost)"
+    )
 
 
 def nothing_to_compare(metric: Metric, first: str, second: str, reason: str) -> str:
@@ -35,26 +41,40 @@ def nothing_to_compare(metric: Metric, first: str, second: str, reason: str) -> 
     return f"nothing to compare between {first} and {second} in {words(metric)}: {reason}"
 
 
-def planned(metric: Metric, pairs: int, difference: float) -> str:
-    """Returns the end of a sentence on how many pairs would show a difference."""
-    rate = metric.kind is MetricKind.RATE
-    of_value = f"{difference:g} {metric.unit}" if metric.unit else f"a difference of {difference:g}"
-    text = f"{100 * difference:g} points" if rate else of_value
-    return f"; {pairs} paired episodes would show {text}"
+def planned(pairs: int, difference: float) -> str:
+    """Returns the end of a sentence on how many pairs would show a win difference."""
+    return f"; {pairs} paired episodes would show {100 * difference:g} points"
 
 
-def figures(metric: Metric, difference: Estimate, counts: PairCounts) -> str:
-    """Returns a difference, its interval and the number of episodes, as in brackets behind a statement."""
-    interval = difference.interval
-    if interval is None:
-        return f"{amount(metric, difference.value, signed=True)}, no interval, {_episodes(counts)}"
-    scale = 100.0 if metric.kind is MetricKind.RATE else 1.0
-    digits = _digits(scale * interval.low, scale * interval.high)
-    low, high = (_number(scale * end, digits) for end in (interval.low, interval.high))
-    return (
-        f"{amount(metric, difference.value, signed=True, digits=digits)}, {100 * interval.confidence:.3g} % interval "
-        f"{low} to {high}, {_episodes(counts)}"
-    )
+def figures(metric: Metric, found: PairFigures, swapped: bool = False) -> str:
+    """Returns the win difference, its interval and the number of episodes, as in brackets behind a statement.
+
+    Args:
+        metric: What was compared.
+        found: The figures of the comparison.
+        swapped: Whether the second method comes first in the sentence.
+    """
+    if found.difference is None:
+        return "no data"
+    sign, counts, interval = -1.0 if swapped else 1.0, found.counts, found.difference.interval
+    # the difference of rates of which lower ones are better has the other sign than its wins
+    if metric.kind is MetricKind.RATE and metric.better is Direction.LOWER:
+        sign = -sign
+    parts = []
+    if metric.kind is not MetricKind.RATE:
+        won, lost = (counts.lost, counts.won) if swapped else (counts.won, counts.lost)
+        parts = [f"{won} pairs won, {lost} lost"]
+    digits = 0 if interval is None else max(_digits(100 * interval.low, 100 * interval.high) - 1, 0)
+    parts.append(_points(100 * sign * found.difference.value, digits))
+    if interval is not None:
+        ends = sorted(100 * sign * end for end in (interval.low, interval.high))
+        low, high = (_number(end, digits) for end in ends)
+        parts.append(f"{100 * interval.confidence:.3g} % interval {low} to {high}")
+    parts.append(_episodes(counts, found.unit_noun))
+    if found.mean_difference is not None:
+        value = (-1.0 if swapped else 1.0) * found.mean_difference.value
+        parts.append(f"mean difference {amount(metric, value)}")
+    return ", ".join(parts)
 
 
 def summary(metric: Metric, method: str, estimate: Estimate | None, counts: EpisodeCounts) -> str:
@@ -73,7 +93,7 @@ def summary(metric: Metric, method: str, estimate: Estimate | None, counts: Epis
     of = "" if metric.kind is MetricKind.RATE else f" {estimate.name} of"
     return (
         f"{method}:{of} {words(metric)} {_number(scale * estimate.value, digits)}{unit} ({spread}, "
-        f"{count(counts.counted, 'episode')}{_remarks(metric, counts)})"
+        f"{count(counts.counted, 'episode')}{_remarks(counts)})"
     )
 
 
@@ -82,19 +102,17 @@ def words(metric: Metric) -> str:
     return metric.name.replace("_", " ")
 
 
-def amount(metric: Metric, value: float, *, signed: bool = False, digits: int | None = None) -> str:
-    """Returns a difference with its unit: `+12 points`, `-0.31 s`."""
-    rate = metric.kind is MetricKind.RATE
-    scaled = 100.0 * value if rate else value
-    text = _number(scaled, _digits(0.0, scaled) if digits is None else digits)
-    sign = "+" if signed and not text.startswith("-") and float(text) != 0.0 else ""
-    unit = ("point" if text in ("1", "-1") else "points") if rate else metric.unit
-    return f"{sign}{text} {unit}".rstrip()
+def amount(metric: Metric, value: float) -> str:
+    """Returns a signed difference with its unit: `-0.31 s`."""
+    text = _number(value, _digits(0.0, value))
+    sign = "+" if not text.startswith("-") and float(text) != 0.0 else ""
+    return f"{sign}{text} {metric.unit}".rstrip()
 
 
-def limit(metric: Metric) -> str:
-    """Returns the limit of a metric in words: `the limit of 60 s`."""
-    return "the limit" if metric.limit is None else f"the limit of {metric.limit:g} {metric.unit}".rstrip()
+def _points(value: float, digits: int) -> str:
+    text = _number(value, digits)
+    sign = "+" if not text.startswith("-") and float(text) != 0.0 else ""
+    return f"{sign}{text} {'point' if text in ('1', '-1') else 'points'}"
 
 
 def ends_outside_zero(interval: Interval | None) -> bool:
@@ -112,28 +130,25 @@ def listed(parts: Sequence[str]) -> str:
     return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1] if parts else ""
 
 
-def _comparative(metric: Metric, difference: float) -> str:
+def _comparative(metric: Metric) -> str:
+    """Returns what a claim says: which of two episodes is better more often."""
+    higher = metric.better is Direction.HIGHER
     if metric.name == "success":
         return "succeeds more often than"
     if metric.kind is MetricKind.RATE:
-        return f"has a {'higher' if difference > 0 else 'lower'} rate of {words(metric)} than"
-    if metric.kind is MetricKind.COUNT:
-        return f"has {'more' if difference > 0 else 'fewer'} {words(metric)} than"
-    if metric.kind is MetricKind.TIME:
-        return f"has a {'longer' if difference > 0 else 'shorter'} {words(metric)} than"
-    return f"has a {'higher' if metric.better is Direction.HIGHER else 'lower'} {words(metric)} than"
+        return f"has a {'higher' if higher else 'lower'} rate of {words(metric)} than"
+    adjectives = {MetricKind.COUNT: ("more", "fewer"), MetricKind.TIME: ("the longer", "the shorter")}
+    better, worse = adjectives.get(metric.kind, ("the higher", "the lower"))
+    return f"more often has {better if higher else worse} {words(metric)} than"
 
 
-def _episodes(counts: PairCounts) -> str:
-    if not counts.pairs:
-        return f"{counts.first_episodes} and {counts.second_episodes} unpaired episodes"
-    of_seeds = f" of {count(counts.units, 'seed')}" if counts.units < counts.pairs else ""
-    return f"{count(counts.pairs, 'paired episode')}{of_seeds}"
+def _episodes(counts: PairCounts, noun: str) -> str:
+    pairs = count(counts.pairs, "pair of any two episodes" if counts.at_random else "paired episode")
+    return f"{pairs} of {count(counts.units, noun)}" if counts.units < counts.pairs else pairs
 
 
-def _remarks(metric: Metric, counts: EpisodeCounts) -> str:
+def _remarks(counts: EpisodeCounts) -> str:
     parts = [
-        f"{counts.censored} at {limit(metric)}" if counts.censored else "",
         f"{counts.missing} without a value" if counts.missing else "",
         f"{counts.broken} broken" if counts.broken else "",
     ]
@@ -141,8 +156,9 @@ def _remarks(metric: Metric, counts: EpisodeCounts) -> str:
 
 
 def count(number: int, noun: str) -> str:
-    """Returns a number of things in words."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    """Returns a number of things in words; of several words the first one gets the plural."""
+    first, space, rest = noun.partition(" of ")
+    return f"{number} {first}{'' if number == 1 else 's'}{space}{rest}"
 
 
 def _digits(low: float, high: float) -> int:
@@ -158,5 +174,7 @@ def _digits(low: float, high: float) -> int:
 
 
 def _number(value: float, digits: int) -> str:
+    if math.isinf(value):
+        return "a failure"
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0.0 else text

@@ -99,24 +99,3 @@ def _log_capitals(differences: Floats, counts: Floats, candidates: Floats) -> Fl
     return np.concatenate(
         [special.logsumexp(_gains(differences, part[:, None, None]) @ counts + _LOG_WEIGHTS, axis=-1) for part in parts]
     )
-
-
-def asymptotic_interval(differences: Floats, confidence: float, planned: int = 100) -> Interval:
-    """Returns an interval of a mean without known bounds that holds at any time, once there are many values.
-
-    Source: I. Waudby-Smith, D. Arbour, R. Sinha, E. Kennedy, A. Ramdas, Time-uniform central limit theory and
-    asymptotic confidence sequences, Annals of Statistics 52 (2024) 2613-2640.
-
-    Args:
-        differences: Independent differences, shape (n,), n at least 2.
-        confidence: Level of the interval.
-        planned: Number of values for which it is made narrowest.
-    """
-    count, error_rate = len(differences), 1.0 - confidence
-    squared = (-2 * np.log(error_rate) + np.log(1 - 2 * np.log(error_rate))) / planned
-    scale = count * squared + 1
-    half = float(np.std(differences, ddof=1)) * np.sqrt(
-        2 * scale / (count**2 * squared) * np.log(np.sqrt(scale) / error_rate)
-    )
-    mean = float(np.mean(differences))
-    return Interval(mean - float(half), mean + float(half), confidence, "asymptotic, valid at any time")

@@ -45,29 +45,26 @@ class AnytimeValid:
     """Stops when the comparisons of a metric are decided, by tests that hold at any time.
 
     It needs an experiment whose description is `sequential`, so that its report uses the same tests. A comparison is
-    decided when a difference is shown, with the correction for many comparisons, or when its interval is within the
-    smallest difference that matters.
+    decided when a difference is shown, with the correction for many comparisons, or when its betting interval is within
+    the smallest win difference that matters.
 
     Attributes:
         metric: Name of the metric it looks at.
-        smallest_difference: Difference below which the methods count as alike, such as 0.05 for 5 points; None: it goes
-            on until a difference is shown or the planned episodes are finished.
-        max_pairs: Pairs of episodes of two methods after which it stops in any case; None: as many as planned.
+        smallest_difference: Win difference below which the methods count as alike, such as 0.05 for 5 points; for a
+            rate that is the difference of the rates. None: it goes on until a difference is shown or the planned
+            episodes are finished.
     """
 
     metric: str = SUCCESS.name
     smallest_difference: float | None = None
-    max_pairs: int | None = None
 
     def __post_init__(self) -> None:
         """Checks the numbers."""
-        if self.smallest_difference is not None and not self.smallest_difference > 0.0:
-            raise ValueError(f"smallest_difference is {self.smallest_difference}; it must be above 0")
-        if self.max_pairs is not None and self.max_pairs < 1:
-            raise ValueError(f"max_pairs is {self.max_pairs}; it must be at least 1")
+        if self.smallest_difference is not None and not 0.0 < self.smallest_difference <= 1.0:
+            raise ValueError(f"smallest_difference is {self.smallest_difference}; it must be above 0 and at most 1")
 
     def decide(self, results: ExperimentResults) -> StoppingDecision:
-        """Returns a stop once every comparison is decided or the pairs are used up.
+        """Returns a stop once every comparison is decided or all episodes are finished.
 
         Raises:
             ValueError: The experiment is not sequential or does not measure the metric.
@@ -87,8 +84,6 @@ class AnytimeValid:
         if not open_ones:
             return StoppingDecision(True, self._outcome(metric, comparisons))
         fewest = min(comparison.counts.pairs for comparison in comparisons)
-        if self.max_pairs is not None and fewest >= self.max_pairs:
-            return StoppingDecision(True, f"{fewest} pairs are finished, the most that were allowed")
         waiting = sentences.listed([f"{comparison.first} and {comparison.second}" for comparison in open_ones])
         return StoppingDecision(False, f"not decided yet after {fewest} pairs: {waiting}")
 
@@ -109,12 +104,12 @@ class AnytimeValid:
         return -self.smallest_difference < interval.low and interval.high < self.smallest_difference
 
     def _outcome(self, metric: Metric, comparisons: Sequence[Comparison]) -> str:
-        rate = metric.kind is MetricKind.RATE
-        said = [
-            f"{comparison.first} and {comparison.second} differ by less than "
-            f"{100 * (self.smallest_difference or 0.0):g} points"
-            if rate and self._alike(comparison)
-            else comparison.sentence
-            for comparison in comparisons
+        points = f"{100 * (self.smallest_difference or 0.0):g} points"
+        noun = "" if metric.kind is MetricKind.RATE else " of pairs won"
+        parts = [
+            f"{found.first} and {found.second} differ by less than {points}{noun}"
+            if self._alike(found)
+            else found.sentence
+            for found in comparisons
         ]
-        return f"every comparison of {sentences.words(metric)} is decided: {'; '.join(said)}"
+        return f"every comparison of {sentences.words(metric)} is decided: {'; '.join(parts)}"

@@ -3,77 +3,81 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import math
 
-from modular_framework_benchmark.records.experiment import Metric, MetricKind
+import numpy as np
+
+from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_benchmark.statistics import sentences
 from modular_framework_benchmark.statistics.comparison import Estimate, Interval, MethodSummary
-from modular_framework_benchmark.statistics.findings import figure_name
-from modular_framework_benchmark.statistics.observations import EpisodeTable
+from modular_framework_benchmark.statistics.observations import EpisodeTable, Floats, Integers, Observations, unit_means
 from modular_framework_benchmark.statistics.rates import rate_interval
 from modular_framework_benchmark.statistics.values import (
-    interquartile_mean,
-    interquartile_mean_interval,
-    mean_interval,
-    within_bounds,
+    MIN_UNITS,
+    bounded_mean_interval,
+    median_interval,
+    restricted_mean_interval,
 )
 
-Floats = NDArray[np.float64]
 
-
-def summarise_method(table: EpisodeTable, metric: Metric, method: str, generator: np.random.Generator) -> MethodSummary:
+def summarise_method(table: EpisodeTable, metric: Metric, method: str) -> MethodSummary:
     """Returns the summary of a method by a metric.
 
     Args:
         table: The finished episodes.
         metric: What is summarised.
         method: Level of the compared factor.
-        generator: What resamples are drawn with.
     """
     seen = table.observations(metric, method)
-    present = ~np.isnan(seen.values)
-    confidence = table.results.description.confidence
-    estimate = _estimate(metric, seen.values[present], confidence, generator)
-    unbroken = seen.values[present & ~seen.broken]
-    counts = table.counts(metric, method)
-    summary = MethodSummary(
-        method=method,
-        metric=metric.name,
-        unit=metric.unit,
-        levels="",
-        counts=counts,
-        estimate=estimate,
-        without_broken=_estimate(metric, unbroken, confidence, generator) if seen.broken.any() else None,
-        median=None,
-        interquartile_mean=None,
-        quartiles=None,
-        sentence=sentences.summary(metric, method, estimate, counts),
-    )
-    if metric.kind is MetricKind.RATE or estimate is None:
-        return summary
-    return _with_quartiles(summary, metric, seen.values[present], confidence, generator)
-
-
-def _with_quartiles(
-    summary: MethodSummary, metric: Metric, values: Floats, confidence: float, generator: np.random.Generator
-) -> MethodSummary:
-    first, median, third = (float(value) for value in np.quantile(values, [0.25, 0.5, 0.75]))
-    interval = interquartile_mean_interval(values, np.zeros(len(values), dtype=np.int64), confidence, generator)
-    middle = Estimate("interquartile mean", interquartile_mean(values), within_bounds(interval, metric, values))
+    counts, confidence = table.counts(metric, method), table.results.description.confidence
+    present = seen.of(np.flatnonzero(~np.isnan(seen.scores)))
+    is_rate = metric.kind is MetricKind.RATE
+    estimate = mean = quartiles = None
+    if len(present.scores):
+        estimate = _rate(present, confidence) if is_rate else _median(present, confidence)
+    known = present.of(np.flatnonzero(~np.isnan(present.values)))
+    if len(known.values) and not is_rate:
+        mean = _mean(known, metric, confidence)
+        first, third = np.quantile(known.values, [0.25, 0.75])
+        quartiles = float(first), float(third)
     return MethodSummary(
-        summary.method, summary.metric, summary.unit, summary.levels, summary.counts, summary.estimate,
-        summary.without_broken, median, middle, (first, third), summary.sentence,
+        method=method, metric=metric.name, unit=metric.unit, levels="", counts=counts, estimate=estimate, mean=mean,
+        quartiles=quartiles, sentence=sentences.summary(metric, method, estimate, counts),
     )  # fmt: skip
 
 
-def _estimate(metric: Metric, values: Floats, confidence: float, generator: np.random.Generator) -> Estimate | None:
-    if not len(values):
-        return None
-    interval: Interval | None
-    if metric.kind is MetricKind.RATE:
-        interval = rate_interval(int(values.sum()), len(values), confidence)
+def _rate(seen: Observations, confidence: float) -> Estimate:
+    means, _ = unit_means(seen.values, seen.units)
+    interval: Interval | None = None
+    if len(means) == len(seen.values) and len(means) >= MIN_UNITS:
+        interval = rate_interval(int(means.sum()), len(means), confidence)
     else:
-        interval = mean_interval(values, np.zeros(len(values), dtype=np.int64), confidence, generator)
-        interval = interval and within_bounds(interval, metric, values)
-    return Estimate(figure_name(metric), float(values.mean()), interval)
+        interval = bounded_mean_interval(means, (0.0, 1.0), confidence)
+    return Estimate("rate", float(np.mean(means)), interval)
+
+
+def _median(seen: Observations, confidence: float) -> Estimate:
+    medians = _unit_medians(seen.scores, seen.units)
+    return Estimate("median", float(np.median(medians)), median_interval(medians, confidence))
+
+
+def _unit_medians(scores: Floats, units: Integers) -> Floats:
+    order = np.argsort(units, kind="stable")
+    starts = np.unique(units[order], return_index=True)[1]
+    if len(starts) == len(scores):
+        return scores
+    return np.array([np.median(part) for part in np.split(scores[order], starts[1:])])
+
+
+def _mean(seen: Observations, metric: Metric, confidence: float) -> Estimate:
+    """Returns the mean, or restricted mean, of the units; with an interval where the metric's bounds allow one."""
+    means, sizes = unit_means(seen.values, seen.units)
+    mean, single = float(np.mean(means)), len(means) == len(seen.values)
+    low, high = metric.bounds
+    if metric.limit is not None:
+        limits = (metric.limit, low if metric.better is Direction.LOWER else high)
+        interval = restricted_mean_interval(seen.values, seen.censored, limits, confidence) if single else None
+        return Estimate("restricted mean", mean, interval)
+    inside = low <= seen.values.min() and seen.values.max() <= high
+    bounded = math.isfinite(low) and math.isfinite(high) and inside
+    return Estimate("mean", mean, bounded_mean_interval(means, (low, high), confidence) if bounded else None)
