@@ -51,7 +51,7 @@ def test_the_first_screen_says_how_many_succeeded_who_is_better_and_where_they_f
     assert [row[0] for row in rows] == ["rrt_connect", "bitstar", "stomp"]
     for row, summary in zip(rows, page.claims["analysis"]["summaries"], strict=False):
         counts = summary["counts"]
-        assert row[1] == f"{counts['succeeded']} of {counts['episodes']} episodes"
+        assert row[1] == f"{counts['succeeded']} of {counts['episodes']}"
         assert re.fullmatch(r"[\d.]+ \([\d.]+ to [\d.]+\)", row[2])
         assert re.match(r"\d+: ", row[4])
     paragraphs = [element.text_content() for element in page.tree.xpath("//section[@class='answer']/p")]
@@ -72,7 +72,7 @@ def test_many_methods_are_ranked_in_one_figure_and_not_paired_in_prose(tmp_path:
     assert "differences" not in figures
     paragraphs = page.tree.xpath("//section[@class='answer']/p")
     assert len(paragraphs) < 25
-    assert "success: planner_4 is better than planner_0" in page.words
+    assert re.search(r"success: planner_\d(, planner_\d)*( and planner_\d)? (is|are) better than planner_0", page.words)
 
 
 def test_two_trials_print_values_and_one_line_for_all_that_could_not_be_shown(
@@ -84,7 +84,7 @@ def test_two_trials_print_values_and_one_line_for_all_that_could_not_be_shown(
     printed = capsys.readouterr().out
     lines = printed.splitlines()
     assert len(lines) == 1 + 10 + 1 + 2
-    assert re.search(r"planner_3 +\d of 2 episodes +[\d.]+ ", printed)
+    assert re.search(r"planner_3 +\d of 2 +[\d.]+ ", printed)
     assert "(interval)" in lines[0] and " to " not in "".join(lines[1:11])
     assert re.match(r"none could have been shown with 1?.*2 scenes in \d+ of 315 comparisons", lines[12])
 

@@ -63,7 +63,7 @@ def interval_text(estimate: float | None, low: float | None, high: float | None,
         high: upper end.
         unit: of the numbers.
     """
-    if estimate is None or math.isnan(estimate) or low is None or high is None:
+    if estimate is None or math.isnan(estimate) or low is None or high is None or (low == high and math.isinf(low)):
         return number_text(estimate, unit=unit)
     finite = [end for end in (low, estimate, high) if math.isfinite(end)]
     decimals = decimals_for((max(finite) - min(finite)) / 2.0) if finite and max(finite) > min(finite) else None

@@ -17,7 +17,7 @@ from modular_framework_benchmark.reports.number_text import (
     p_value_text,
     share_text,
 )
-from modular_framework_benchmark.reports.report_content import SUCCESS, ReportContent
+from modular_framework_benchmark.reports.report_content import MOST_PAIRED, SUCCESS, ReportContent
 from modular_framework_benchmark.reports.success_figures import level_words
 from modular_framework_benchmark.statistics.comparison import (
     Comparison,
@@ -123,7 +123,7 @@ def answer_table(content: ReportContent) -> Table:
         counts = found[SUCCESS, method].counts
         row = [
             Cell(method),
-            Cell(f"{counts.succeeded:,} of {counted(counts.episodes, 'episode')}", is_number=True),
+            Cell(f"{counts.succeeded:,} of {counts.episodes:,}", is_number=True),
             Cell(estimate_text(found[SUCCESS, method].estimate, success), is_number=True),
         ]
         if main is not None:
@@ -132,7 +132,7 @@ def answer_table(content: ReportContent) -> Table:
         worst = max(causes, key=lambda group: group.by_method[method], default=None)
         row.append(Cell(f"{worst.by_method[method]}: {worst.cause[:90]}" if worst else NONE))
         rows.append(tuple(row))
-    columns = ["method", "succeeded", "success [%] (interval)"]
+    columns = ["method", "succeeded of episodes", "success [%] (interval)"]
     columns += [] if main is None else [f"median {metric_title(main)} (interval)"]
     confidence = share_text(content.description.confidence, 0)
     caption = f"Intervals of {confidence}. A failure is worse than any value."
@@ -140,18 +140,14 @@ def answer_table(content: ReportContent) -> Table:
 
 
 def answer_sentences(content: ReportContent) -> tuple[str, ...]:
-    """Returns what is shown, a line for each metric and better method, and one line for all that is not shown."""
+    """Returns what is shown, and one line for all that is not; with more than three methods a line for each metric."""
     comparisons = content.analysis.comparisons
-    wins: dict[tuple[str, str], list[Comparison]] = {}
-    for item in comparisons:
-        if item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER):
-            better = item.first if item.verdict is Verdict.FIRST_BETTER else item.second
-            wins.setdefault((item.metric, better), []).append(item)
-    lines = []
-    for (metric, better), items in wins.items():
-        others = [item.second if item.first == better else item.first for item in items]
-        text = f"{words(metric)}: {better} is better than {listed(others)}, each in more pairs than it is worse"
-        lines.append(items[0].sentence if len(items) == 1 else text)
+    if not comparisons:
+        return content.analysis.sentences
+    won = [item for item in comparisons if item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)]
+    lines = [item.sentence for item in won]
+    if len(content.analysis.methods) > MOST_PAIRED:
+        lines = [line for metric in content.metrics for line in _grouped([i for i in won if i.metric == metric.name])]
     counts = {verdict: sum(item.verdict is verdict for item in comparisons) for verdict in Verdict}
     rest = [
         (counts[Verdict.NOT_SHOWN], "no difference shown"),
@@ -159,7 +155,28 @@ def answer_sentences(content: ReportContent) -> tuple[str, ...]:
         (counts[Verdict.NO_DATA], "nothing to compare"),
     ]
     parts = [f"{text} in {number:,} of {counted(len(comparisons), 'comparison')}" for number, text in rest if number]
-    return (*lines, *(["; ".join(parts)] if parts else []), *([] if comparisons else content.analysis.sentences))
+    return (*lines, *(["; ".join(parts)] if parts else []))
+
+
+def _grouped(items: Sequence[Comparison]) -> list[str]:
+    """Returns what is shown by one metric: the methods that are better than the same others in one line."""
+    wins: dict[str, dict[str, float]] = {}
+    for item in items:
+        pair = (item.first, item.second) if item.verdict is Verdict.FIRST_BETTER else (item.second, item.first)
+        wins.setdefault(pair[0], {})[pair[1]] = 100.0 * abs(item.difference.value if item.difference else 0.0)
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for better, others in wins.items():
+        groups.setdefault(tuple(others), []).append(better)
+    lines = []
+    for others, methods in groups.items():
+        points = [wins[better][other] for better in methods for other in others]
+        span = f"{min(points):.0f} to {max(points):.0f}" if len(points) > 1 else f"{points[0]:.0f}"
+        verb = "is" if len(methods) == 1 else "are"
+        lines.append(
+            f"{words(items[0].metric)}: {listed(methods)} {verb} better than {listed(others)} in more pairs than worse "
+            f"(+{span} points)"
+        )
+    return lines
 
 
 def _not_showable(comparisons: Sequence[Comparison]) -> str:
