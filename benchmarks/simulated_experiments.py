@@ -1,21 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulates experiments to see whether the statistics keep what they say.
+"""Simulates experiments whose truth is known: worlds that draw episodes, and the true figures of each world.
 
-Scenes differ in difficulty, so that the episodes of a pair go together as those of real pairs do.
-Each simulation runs a number of experiments and returns how many of them claim a difference, cover the true figure, or
-show the difference that they were planned for.
+A world draws success and values of a number of trials for each method. The truth of a claim or an interval is the
+figure that its sentence names, taken from a very large draw of the same world by code of this module alone; a world may
+state that no method wins more pairs than another.
 """
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable
-from dataclasses import replace
-from unittest import mock
+from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from numpy.typing import NDArray
 
 from modular_framework_benchmark.records.experiment import (
     Direction,
@@ -25,230 +24,269 @@ from modular_framework_benchmark.records.experiment import (
     MetricKind,
 )
 from modular_framework_benchmark.records.results import ExperimentResults
-from modular_framework_benchmark.statistics import power, rates, sequential, values, verdicts
-from modular_framework_benchmark.statistics.analysis import compare
-from modular_framework_benchmark.statistics.comparison import Verdict
 
-SHOWN = (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
-METRICS = (
-    Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", limit=60.0),
-    Metric("planning_time", "planning", MetricKind.TIME, Direction.LOWER, "s"),
-    Metric("path_length", "planning", MetricKind.VALUE, Direction.LOWER, "rad"),
-    Metric("clearance", "planning", MetricKind.VALUE, Direction.HIGHER, "m"),
-)
-DIFFERENCE, ODDS = np.array([-1.0, 0.0, 1.0]), 0.95
+Floats = NDArray[np.float64]
+Generator = np.random.Generator
+LIMIT_S = 120.0
+TRUTH_TRIALS = 200_000
+"""Trials of the draw that the truth is taken from: its error is far below the width of any interval."""
 
 
-Simulation = Callable[[np.random.Generator, int], int]
-"""Runs a number of experiments and returns how many of them claim, cover or show."""
+@dataclass(frozen=True)
+class Draw:
+    """The episodes of a number of trials.
 
-
-def leave_out_what_decides_nothing() -> None:
-    """Leaves out, in this process, what takes most of the time and changes no verdict.
-
-    That is the number of pairs to plan next, which only a sentence has, and the collection of garbage that statsmodels
-    does in each of Holm's corrections.
+    Attributes:
+        success: Whether each method succeeded, shape (pairs, methods).
+        values: By metric, the value of each episode, shape (pairs, methods); NaN where it has none.
+        unit: Number of the independent unit of each pair, shape (pairs,).
+        level: Number of the level of the other factor, shape (pairs,).
+        broken: Whether each episode broke, shape (pairs, methods).
     """
-    verdicts.pairs_for_rate = verdicts.pairs_for_value = lambda *_: None  # type: ignore[assignment]
-    gc.collect = lambda *_: 0  # type: ignore[assignment]
+
+    success: NDArray[np.bool_]
+    values: dict[str, Floats] = field(default_factory=dict)
+    unit: NDArray[np.int64] | None = None
+    level: NDArray[np.int64] | None = None
+    broken: NDArray[np.bool_] | None = None
 
 
-def results(generator: np.random.Generator, pairs: int, methods: int, metrics: int, objects: int = 1,
-            sequential: bool = False, broken: float = 0.01, easier: float = 0.0) -> ExperimentResults:  # fmt: skip
-    """Returns an experiment with methods that are identical, or of which the first succeeds more often.
+@dataclass(frozen=True)
+class World:
+    """What draws episodes.
 
-    Args:
-        generator: What outcomes are drawn with.
-        pairs: Episodes of each method.
-        methods: How many methods.
-        metrics: How many metrics beside success.
-        objects: Objects that share the seeds, and so the difficulty, of a trial.
-        sequential: Whether a stopping rule looks at the results.
-        broken: Share of episodes that break.
-        easier: What the first method's rate is above the others'.
+    Attributes:
+        draw: Draws a number of pairs.
+        metrics: The metrics beside success.
+        no_winner: Whether no method wins more pairs than another, in any metric.
+        mode: Mode of the experiment; in `planning` a unit is a problem, otherwise a seed.
     """
-    trials = pairs // objects
-    ease = np.repeat(generator.beta(3.0, 1.0, trials), objects)[:, None]
-    better = np.where(np.arange(methods) == 0, easier, 0.0)
-    success = generator.random((pairs, methods)) < np.clip(ease + better, 0.0, 1.0)
-    dead = generator.random((pairs, methods)) < broken
-    names = tuple("abcdef"[:methods])
-    table = {
+
+    draw: Callable[[Generator, int], Draw]
+    metrics: tuple[Metric, ...] = ()
+    no_winner: bool = True
+    mode: str = "task"
+
+    def __hash__(self) -> int:
+        return id(self)
+
+
+def results(world: World, drawn: Draw, **description: object) -> ExperimentResults:
+    """Returns the table that the product reads of drawn episodes."""
+    pairs, methods = drawn.success.shape
+    names = tuple("abcdefghij"[:methods])
+    unit = np.arange(pairs) if drawn.unit is None else drawn.unit
+    level = np.zeros(pairs, dtype=np.int64) if drawn.level is None else drawn.level
+    broken = np.zeros(drawn.success.shape, dtype=bool) if drawn.broken is None else drawn.broken
+    success = (drawn.success & ~broken).ravel()
+    table: dict[str, object] = {
         "number": np.arange(pairs * methods),
-        "trial": np.repeat(np.arange(pairs) // objects, methods),
-        "seed": np.repeat(np.arange(pairs) // objects, methods),
-        "object": np.repeat(np.arange(pairs) % objects, methods).astype(str),
+        "trial": np.repeat(np.arange(pairs), methods),
+        "seed": np.repeat(np.arange(pairs) if world.mode == "planning" else unit, methods),
+        "object": np.repeat(level, methods).astype(str),
         "method": np.tile(names, pairs),
-        "success": (success & ~dead).ravel(),
-        "status": np.where(dead, "broken", np.where(success, "succeeded", "failed")).ravel(),
-        "simulated_s": np.full(pairs * methods, 10.0),
+        "success": success,
+        "status": np.where(broken.ravel(), "broken", np.where(success, "succeeded", "failed")),
     }
-    for number, metric in enumerate(METRICS[:metrics]):
-        drawn = np.exp(generator.normal(2.0 - ease, 0.5 + 0.25 * number, (pairs, methods)))
-        table[metric.name] = np.where(success, drawn, np.nan).ravel()
-    factors = (Factor("method", names), Factor("object", tuple(str(number) for number in range(objects))))
-    description = ExperimentDescription(
-        "simulated", "task", "", "", factors, "method", METRICS[:metrics], 60.0, sequential=sequential
-    )
-    return ExperimentResults(description, pd.DataFrame(table), pd.DataFrame(), pairs * methods)
+    if world.mode == "planning":
+        table["drawn_problem"] = np.repeat(unit, methods).astype(str)
+    table |= {name: values.ravel() for name, values in drawn.values.items()}
+    levels = tuple(str(each) for each in range(int(level.max()) + 1))
+    factors = (Factor("method", names), Factor("object", levels))
+    described = ExperimentDescription(
+        "simulated", world.mode, "", "", factors, "method", world.metrics, LIMIT_S, **description  # type: ignore[arg-type]
+    )  # fmt: skip
+    return ExperimentResults(described, pd.DataFrame(table), pd.DataFrame(), pairs * methods)
 
 
-def claims(generator: np.random.Generator, count: int, **layout: int) -> int:
-    """Returns how many experiments with identical methods claim a difference in anything.
-
-    The bootstrap has fewer resamples than in a report: a claim needs a corrected p value that is small enough, and the
-    interval can only take a claim back.
-    """
-    with mock.patch.object(values, "RESAMPLES", 399):
-        return sum(
-            any(found.verdict in SHOWN for found in compare(results(generator, **layout)))  # type: ignore[arg-type]
-            for _ in range(count)
-        )
+# --- the truth, by code that shares nothing with the product
 
 
-def looking(generator: np.random.Generator, count: int, pairs: int, methods: int) -> int:
-    """Returns how many experiments ever claim a difference in success with a look after every pair."""
-    ever = 0
-    for _ in range(count):
-        ease = generator.beta(3.0, 1.0, (pairs, 1))
-        success = (generator.random((pairs, methods)) < ease).astype(int)
-        of_pairs = [
-            np.exp(-sequential.log_capital(DIFFERENCE, _running_counts(success[:, one] - success[:, other])))
-            for one in range(methods)
-            for other in range(one + 1, methods)
-        ]
-        # Holm's least corrected p value is the least p value times their number: it decides whether anything is shown.
-        ever += bool(np.min(of_pairs) * len(of_pairs) <= 1 - ODDS)
-    return ever
+def scores(world: World, drawn: Draw, metric: Metric | None) -> Floats:
+    """Returns what each episode counts in a comparison, higher is better; None is success."""
+    success = drawn.success if drawn.broken is None else drawn.success & ~drawn.broken
+    if metric is None:
+        return success.astype(float)
+    sign = 1.0 if metric.better is Direction.HIGHER else -1.0
+    failed = ~success & (metric.component == "task" or world.mode != "task" or np.isnan(drawn.values[metric.name]))
+    return np.where(failed, -np.inf, sign * drawn.values[metric.name])
 
 
-def stopping(generator: np.random.Generator, count: int, pairs: int, step: int) -> int:
-    """Returns how many experiments ever claim a difference in anything, when all of it is looked at again and again."""
-    ever = 0
-    for _ in range(count):
-        whole = results(generator, pairs, 3, 2, sequential=True)
-        ever += any(
-            found.verdict in SHOWN
-            for looked in range(step, pairs + 1, step)
-            for found in compare(replace(whole, episodes=whole.episodes.iloc[: 3 * looked]))
-        )
-    return ever
+@cache
+def large_draw(world: World) -> Draw:
+    """Returns the draw that the truth of a world is taken from."""
+    return world.draw(np.random.default_rng(99), TRUTH_TRIALS)
 
 
-def peeking(generator: np.random.Generator, count: int, pairs: int) -> int:
-    """Returns how many experiments ever have p <= 0.05 by McNemar's test after some pair: why looking needs a rule."""
-    ever = 0
-    for _ in range(count):
-        ease = generator.beta(3.0, 1.0, (pairs, 1))
-        success = (generator.random((pairs, 2)) < ease).astype(int)
-        counts = _running_counts(success[:, 0] - success[:, 1]).astype(int)
-        different = np.unique(counts[:, [0, 2]], axis=0)
-        ever += any(_mcnemar(int(one), int(other)) <= 0.05 for other, one in different)
-    return ever
+@cache
+def true_wins(world: World, metric: Metric | None, first: int, second: int) -> float:
+    """Returns the true win difference of two methods."""
+    if world.no_winner:
+        return 0.0
+    found = scores(world, large_draw(world), metric)
+    return float(np.mean((found[:, first] > found[:, second]).astype(float) - (found[:, first] < found[:, second])))
 
 
-def pooling(generator: np.random.Generator, count: int, seeds: int, objects: int) -> int:
-    """Returns how many experiments McNemar's test claims a difference in if pairs of one seed count as independent."""
-    ever = 0
-    for _ in range(count):
-        # The seed decides the outcome for each method, whatever the object: the worst case.
-        success = np.repeat((generator.random((seeds, 2)) < 0.8).astype(int), objects, axis=0)
-        differences = success[:, 0] - success[:, 1]
-        ever += _mcnemar(int(np.sum(differences > 0)), int(np.sum(differences < 0))) <= 0.05
-    return ever
+@cache
+def true_middle(world: World, metric: Metric | None, method: int) -> tuple[float, float]:
+    """Returns the true rate of success, or between which values a true median of the units lies (ties: a range)."""
+    drawn = large_draw(world)
+    found = scores(world, drawn, metric)[:, method]
+    if metric is None:
+        return (float(np.mean(found)),) * 2
+    sign = 1.0 if metric.better is Direction.HIGHER else -1.0
+    if drawn.unit is not None:
+        found = pd.Series(found).groupby(drawn.unit).median().to_numpy()
+    ends = sorted(sign * np.quantile(found, [0.498, 0.502], method="nearest"))
+    return float(ends[0]), float(ends[1])
 
 
-_P_VALUES: dict[tuple[int, int], float] = {}
+@cache
+def true_mean(world: World, metric: Metric, method: int) -> float:
+    """Returns the true mean; failures and values beyond the limit count at the limit."""
+    drawn = large_draw(world)
+    values = drawn.values[metric.name][:, method].copy()
+    if metric.limit is not None:
+        values[np.isinf(scores(world, drawn, metric)[:, method])] = metric.limit
+        values = np.minimum(values, metric.limit)
+    return float(np.nanmean(values))
 
 
-def _mcnemar(one: int, other: int) -> float:
-    if (one, other) not in _P_VALUES:
-        _P_VALUES[one, other] = rates.paired_p_value(rates.Discordance(one, other, one + other))
-    return _P_VALUES[one, other]
+# --- worlds
 
 
-def _running_counts(differences: np.ndarray) -> np.ndarray:
-    """Returns how often -1, 0 and 1 were seen after each pair, shape (pairs, 3)."""
-    return np.cumsum(differences[:, None] == DIFFERENCE[None, :], axis=0).astype(float)
+def value(name: str, better: Direction = Direction.LOWER, **bounds: float) -> Metric:
+    """Returns a metric of planning, in rad."""
+    return Metric(name, "planning", MetricKind.VALUE, better, "rad", **bounds)  # type: ignore[arg-type]
 
 
-def covers_rate(generator: np.random.Generator, count: int, episodes: int, method: str) -> int:
-    """Returns how many intervals hold the true rate; rates from 30 to 98 %."""
-    true = generator.uniform(0.3, 0.98, count)
-    found = [rates.rate_interval(int(generator.binomial(episodes, rate)), episodes, ODDS, method) for rate in true]  # type: ignore[arg-type]
-    return sum(each.low <= rate <= each.high for each, rate in zip(found, true, strict=True))
+TIME = Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", LIMIT_S)
+SHARE = value("share", Direction.HIGHER, lowest=0.0, highest=1.0)
+COUNT = Metric("count", "planning", MetricKind.COUNT, Direction.LOWER)
 
 
-def covers_paired_rate(generator: np.random.Generator, count: int, pairs: int, easier: float) -> int:
-    """Returns how many of Tango's intervals hold the true difference of paired rates."""
-    covered = 0
-    for _ in range(count):
-        ease = generator.beta(3.0, 1.0, pairs)
-        first = generator.random(pairs) < ease + easier * (1 - ease)
-        second = generator.random(pairs) < ease
-        interval = rates.paired_interval(rates.Discordance.of(first.astype(float), second.astype(float)))
-        covered += interval.low <= easier * 0.25 <= interval.high  # the mean of 1 - ease is a quarter
-    return covered
+def shape(generator: Generator, name: str, size: tuple[int, ...]) -> Floats:
+    """Returns values of a distribution."""
+    match name:
+        case "normal":
+            return generator.normal(0.0, 1.0, size)
+        case "lognormal":
+            return generator.lognormal(0.0, 1.0, size)
+        case "two-point":
+            return np.where(generator.random(size) < 0.05, 20.0, 1.0)
+        case "zero-inflated":
+            return np.where(generator.random(size) < 0.6, 0.0, generator.lognormal(0.0, 1.0, size))
+        case "tied":
+            return generator.poisson(1.5, size).astype(float)
+        case "rare count":
+            return generator.poisson(0.05, size).astype(float)
+        case "share":
+            return np.where(generator.random(size) < 0.85, 1.0, generator.beta(8.0, 1.5, size))
+    raise ValueError(f"no shape {name!r}")
 
 
-def covers_sequence(generator: np.random.Generator, count: int, pairs: int, easier: float) -> int:
-    """Returns how many anytime intervals of paired rates hold the true difference at every look."""
-    covered = 0
-    for _ in range(count):
-        ease = generator.beta(3.0, 1.0, pairs)
-        first = generator.random(pairs) < ease + easier * (1 - ease)
-        second = generator.random(pairs) < ease
-        counts = _running_counts(first.astype(int) - second.astype(int))
-        capital = sequential.log_capital(DIFFERENCE, counts, easier * 0.25)
-        covered += bool(np.max(capital) < -np.log(1 - ODDS))
-    return covered
+def successes(rate: float, methods: int = 2, advantage: float = 0.0, broken: float = 0.0) -> World:
+    """Returns a world of scenes that differ in difficulty; the first method's rate may be higher."""
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        ease = np.full((pairs, 1), rate) if rate in (0.0, 1.0) else generator.beta(4 * rate, 4 * (1 - rate), (pairs, 1))
+        better = np.where(np.arange(methods) == 0, advantage, 0.0)
+        success = generator.random((pairs, methods)) < np.clip(ease + better, 0.0, 1.0)
+        return Draw(success, broken=generator.random((pairs, methods)) < broken)
+
+    return World(draw, no_winner=advantage == 0.0)
 
 
-def covers_mean(generator: np.random.Generator, count: int, pairs: int, shift: float, strata: int = 1) -> int:
-    """Returns how many intervals hold the true mean difference of two log-normal times, cut off at a limit."""
-    which = np.arange(pairs) % strata
-    true = _mean_of_times(0.5 * shift) - _mean_of_times(-0.5 * shift)
-    covered = 0
-    for _ in range(count):
-        scene = generator.normal(0.0, 0.5, pairs)
-        first, second = (np.minimum(np.exp(generator.normal(scene + side * shift, 0.8)), 5.0) for side in (0.5, -0.5))
-        interval = values.mean_interval(first - second, which, ODDS, generator)
-        covered += interval is not None and interval.low <= true <= interval.high
-    return covered
+def decided(difference: float, share: float) -> World:
+    """Returns a world in which two methods differ in a share of the pairs, and by a difference of their rates."""
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        kinds = generator.choice(3, pairs, p=[(share + difference) / 2, (share - difference) / 2, 1 - share])
+        return Draw(np.stack([kinds != 1, kinds != 0], axis=1))
+
+    return World(draw, no_winner=False)
 
 
-def _mean_of_times(centre: float, limit: float = 5.0) -> float:
-    """Returns the mean of a log-normal time that is cut off at a limit: scene and method spread it by 0.5 and 0.8."""
-    spread, end = np.hypot(0.5, 0.8), np.log(limit)
-    below = np.exp(centre + spread**2 / 2) * stats.norm.cdf((end - centre) / spread - spread)
-    return float(below + limit * stats.norm.sf((end - centre) / spread))
+def shapes(name: str, metrics: int = 1, methods: int = 2, shift: float = 0.0) -> World:
+    """Returns a world of methods that always succeed and have values of one distribution, or a shifted one."""
+    kinds = {"rare count": COUNT, "tied": COUNT, "share": SHARE}
+    if name in kinds:
+        described: tuple[Metric, ...] = (kinds[name],)
+    else:
+        described = tuple(value(f"value_{number}") for number in range(metrics))
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        better = np.where(np.arange(methods) == 0, -shift, 0.0)
+        drawn = {metric.name: shape(generator, name, (pairs, methods)) + better for metric in described}
+        return Draw(np.ones((pairs, methods), dtype=bool), drawn)
+
+    return World(draw, described, no_winner=shift == 0.0)
 
 
-def covers_interquartile_mean(generator: np.random.Generator, count: int, episodes: int) -> int:
-    """Returns how many intervals hold the true interquartile mean of a log-normal value."""
-    ends = stats.norm.ppf([0.25, 0.75]) - 0.8
-    true = np.exp(0.8**2 / 2) * np.diff(stats.norm.cdf(ends))[0] / 0.5
-    covered = 0
-    for _ in range(count):
-        drawn = np.exp(generator.normal(0.0, 0.8, episodes))
-        interval = values.interquartile_mean_interval(drawn, np.zeros(episodes, dtype=np.int64), ODDS, generator)
-        covered += interval.low <= true <= interval.high
-    return covered
+def spreads(metrics: int, equal: str) -> World:
+    """Returns a world of two methods with equal medians, or equal means, and different shapes."""
+    described = tuple(value(f"value_{number}") for number in range(metrics))
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        drawn = {}
+        for metric in described:
+            narrow, wide = generator.lognormal(0.0, 0.2, pairs), generator.lognormal(0.0, 1.2, pairs)
+            if equal == "mean":
+                narrow *= np.exp((1.2**2 - 0.2**2) / 2)
+            drawn[metric.name] = np.stack([narrow, wide], axis=1)
+        return Draw(np.ones((pairs, 2), dtype=bool), drawn)
+
+    return World(draw, described, no_winner=equal == "median")
 
 
-def shows_rate(generator: np.random.Generator, count: int, difference: float, discordance: float) -> int:
-    """Returns how many experiments with the planned number of pairs show a difference of rates."""
-    pairs = power.pairs_for_rate(difference, discordance)
-    assert pairs is not None
-    shares = [(discordance - difference) / 2, 1 - discordance, (discordance + difference) / 2]
-    return sum(
-        _mcnemar(int(one), int(other)) <= 0.05 and one > other
-        for other, _, one in generator.multinomial(pairs, shares, count)
-    )
+def times(rates: tuple[float, ...], centres: tuple[float, ...], spread: float = 0.5, limit: float = LIMIT_S) -> World:
+    """Returns a world of times that are censored in failures; scenes are harder for all methods or easier."""
+    metric = Metric("task_time", "task", MetricKind.TIME, Direction.LOWER, "s", limit)
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        scene = generator.normal(0.0, 0.3, (pairs, 1))
+        success = generator.random((pairs, len(rates))) < np.array(rates)
+        drawn = np.array(centres) * np.exp(scene + generator.normal(0.0, spread, (pairs, len(rates))))
+        return Draw(success, {"task_time": np.where(success, drawn, np.nan)})
+
+    return World(draw, (metric,), no_winner=len(set(zip(rates, centres, strict=True))) == 1)
 
 
-def shows_value(generator: np.random.Generator, count: int, difference: float) -> int:
-    """Returns how many experiments with the planned number of pairs show a difference of normal values."""
-    pairs = power.pairs_for_value(difference, 1.0)
-    assert pairs is not None
-    return sum(values.paired_p_value(generator.normal(difference, 1.0, pairs)) <= 0.05 for _ in range(count))
+def problems(count: int, skewed: bool = False, mode: str = "planning") -> World:
+    """Returns a world of problems that repeat, each of them better for one of the two methods by chance."""
+    length = value("path_length")
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        units = count if pairs < TRUTH_TRIALS else pairs // 5
+        unit = np.arange(pairs) % units
+        if skewed:  # a tenth of the problems is much worse for the first, the others a little better
+            liking = np.where(generator.random(units) < 0.1, -0.45, 0.05)
+        else:
+            liking = generator.choice([-0.35, 0.35], units)
+        success = generator.random((pairs, 2)) < 0.5 + np.stack([liking[unit], -liking[unit]], axis=1)
+        lengths = np.exp(generator.normal(0.0, 0.3, (pairs, 2)) - np.stack([liking[unit], -liking[unit]], axis=1))
+        return Draw(success, {"path_length": np.where(success, lengths, np.nan)} if not skewed else {}, unit)
+
+    return World(draw, () if skewed else (length,), True, mode)
+
+
+def shared_seeds(objects: int) -> World:
+    """Returns a world whose seed decides the outcome of each method, whatever the object."""
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        unit = np.arange(pairs) // objects
+        of_seed = generator.random((int(unit.max()) + 1, 2)) < 0.8
+        return Draw(of_seed[unit], unit=unit, level=np.arange(pairs) % objects)
+
+    return World(draw)
+
+
+def opposite_levels() -> World:
+    """Returns a world of two objects, each better for one of two methods: together neither is better."""
+
+    def draw(generator: Generator, pairs: int) -> Draw:
+        level = np.arange(pairs) % 2
+        rates = np.where(level[:, None] == np.arange(2), 0.9, 0.5)
+        return Draw(generator.random((pairs, 2)) < rates, level=level)
+
+    return World(draw)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -174,6 +175,14 @@ def test_a_sequential_rule_is_read(tmp_path: Path) -> None:
     assert (stopping.kind, stopping.metric, stopping.smallest_difference) == (StoppingKind.SEQUENTIAL, "success", 0.1)
 
 
+def test_the_rule_of_the_readme_is_accepted_and_a_difference_is_a_share(tmp_path: Path) -> None:
+    readme = Path(__file__).parents[3] / "src" / "modular_framework_benchmark" / "README.md"
+    (rule,) = re.findall(r"`(\{rule: sequential.*?\})`", readme.read_text())
+    assert read(PICK + f"stopping: {rule}\n", tmp_path).stopping.kind is StoppingKind.SEQUENTIAL
+    (fault,) = faults_of(PICK + "stopping: {rule: sequential, smallest_difference: 5}\n", tmp_path)
+    assert "smallest_difference must be a number from 1e-09 to 1" in fault
+
+
 def test_a_planning_experiment_takes_its_problems_in_turn(tmp_path: Path) -> None:
     from modular_framework_benchmark.experiments.design import lay_out
 
@@ -196,5 +205,8 @@ trials: 5
     names = {one.trial: one.settings["problem"]["name"] for one in episodes}
     assert [names[trial] for trial in range(5)] == ["box/0001", "box/0002", "cage/0001", "box/0001", "box/0002"]
     assert len({one.seed for one in episodes if one.settings["problem"]["name"] == "box/0001"}) == 2
+    (fault,) = faults_of(text + "stopping: {rule: sequential}\n", tmp_path)
+    assert "a sequential rule needs a problem for each trial: 3 problems, 5 trials" in fault
+    assert read(text.replace("trials: 5", "trials: 3") + "stopping: {rule: sequential}\n", tmp_path).trials == 3
     (tmp_path / "problems" / "box" / "request0002.yaml").unlink()
     assert "has no request0002.yaml beside it" in faults_of(text, tmp_path)[0]

@@ -152,6 +152,40 @@ def test_the_same_experiment_resumes_and_new_words_of_its_file_are_taken_over(pa
         assert len(database.pending(number)) == 11
 
 
+@pytest.mark.parametrize("finished", [0, 1])
+def test_an_extension_after_an_episode_has_run_is_kept_as_a_look_at_the_results(path: Path, finished: int) -> None:
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(sample_description(), sample_episodes(trials=3))
+        for spec in sample_episodes()[:finished]:
+            database.write(number, sample_record(spec))
+        database.add_experiment(sample_description(digest="d2"), sample_episodes(trials=6))
+        assert database.load(number).description.extended is bool(finished)
+        database.add_experiment(sample_description(digest="d2"), sample_episodes(trials=6))  # a run that resumes
+    with open_database(path) as database:
+        assert database.load(number).description.extended is bool(finished)
+
+
+def test_a_sequential_experiment_that_becomes_a_fixed_one_has_been_looked_at(path: Path) -> None:
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(sample_description(sequential=True), sample_episodes())
+        database.write(number, sample_record(sample_episodes()[0]))
+        database.add_experiment(sample_description(), sample_episodes())
+        assert database.load(number).description.extended
+
+
+def test_episodes_of_planning_say_which_problem_they_had(path: Path) -> None:
+    episodes = [
+        replace(spec, settings={**spec.settings, "problem": {"name": f"box/{spec.trial % 2}"}})
+        for spec in sample_episodes(trials=4)
+    ]
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(sample_description(mode="planning"), episodes)
+        for spec in episodes:
+            database.write(number, sample_record(spec))
+        table = database.load(number).episodes
+    assert [table["drawn_problem"][row] == table["drawn_problem"][0] for row in (0, 4, 8)] == [True, False, True]
+
+
 def test_more_repetitions_and_levels_extend_an_experiment(path: Path) -> None:
     with open_database(path, create=True) as database:
         number = database.add_experiment(sample_description(), sample_episodes(2))

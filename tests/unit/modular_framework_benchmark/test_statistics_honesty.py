@@ -1,44 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Small simulated experiments, from results to verdicts: identical methods are told apart in at most 5 % of them.
-
-`benchmarks/statistics` does the same with 2,000 experiments, and for more kinds of them.
-"""
+"""The quick part of `benchmarks/statistics`: simulated experiments keep the bars of claims, intervals and power."""
 
 from __future__ import annotations
 
+import sys
+from collections import Counter
+from pathlib import Path
+
 import numpy as np
 import pytest
-from statistics_results import TIME, outcomes, results_of
 
-from modular_framework_benchmark.records.results import ExperimentResults
-from modular_framework_benchmark.statistics.analysis import compare
-from modular_framework_benchmark.statistics.comparison import Verdict
+sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
+import statistics_conditions as conditions  # noqa: E402
 
-EXPERIMENTS = 200
-MOST = 20  # of 200; with a true share of 5 % more are seen once in 1,000 simulations
+EXPERIMENTS = 40
+QUICK = [each for each in conditions.CONDITIONS if each.quick]
 
 
-def experiment(random: np.random.Generator, methods: str, pairs: int, advantage: float = 0.0) -> ExperimentResults:
-    """Returns an experiment with methods that are identical, or of which A fails less often."""
-    ease = random.beta(3.0, 1.0, pairs)
-    statuses, times = {}, {}
-    for method in methods:
-        success = random.random(pairs) < ease + (advantage if method == "A" else 0.0) * (1 - ease)
-        statuses[method] = outcomes(success)
-        times[method] = np.exp(random.normal(2.0 - ease, 0.5))
-    return results_of(statuses, (TIME,), {"task_time": times})
+def test_there_are_at_most_60_conditions_each_with_a_name_of_its_own() -> None:
+    names = [(each.kind, each.name) for each in conditions.CONDITIONS]
+    assert len(names) == len(set(names)) <= 60
 
 
-def shown(results: ExperimentResults) -> bool:
-    return any(each.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER) for each in compare(results))
+@pytest.mark.parametrize("condition", QUICK, ids=lambda each: f"{each.kind}-{each.name}")
+def test_simulated_experiments_keep_their_bar(condition: conditions.Condition, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("modular_framework_benchmark.statistics.verdicts.pairs_for_rate", lambda *_: None)
+    generator = np.random.default_rng(5)
+    found = sum((condition.count(generator) for _ in range(EXPERIMENTS)), Counter())
+    rows = list(conditions.rows_of(condition, found))
+    assert rows
+    assert [row.text() for row in rows if not row.passed] == []
 
 
-@pytest.mark.parametrize("methods", ["AB", "ABC"])
-def test_identical_methods_are_told_apart_in_at_most_5_percent_of_experiments(methods: str) -> None:
-    random = np.random.default_rng(5)
-    assert sum(shown(experiment(random, methods, 40)) for _ in range(EXPERIMENTS)) <= MOST
-
-
-def test_a_method_that_fails_much_less_is_told_apart_in_most_experiments() -> None:
-    random = np.random.default_rng(5)
-    assert sum(shown(experiment(random, "AB", 60, advantage=0.9)) for _ in range(40)) >= 32
+def test_a_rule_that_claims_too_much_and_an_interval_that_holds_too_little_are_found() -> None:
+    claims = conditions.Condition("claims", "", lambda _: Counter())
+    assert [each.passed for each in conditions.rows_of(claims, Counter(hit=32, no=368))] == [False]
+    assert [each.passed for each in conditions.rows_of(claims, Counter(hit=31, no=369))] == [True]
+    coverage = conditions.Condition("coverage", "", lambda _: Counter())
+    assert [each.passed for each in conditions.rows_of(coverage, Counter({"rate/held": 350, "rate/missed": 50}))] == [
+        False
+    ]
