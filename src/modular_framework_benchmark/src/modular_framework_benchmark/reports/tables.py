@@ -165,8 +165,8 @@ def _grouped(items: Sequence[Comparison]) -> list[str]:
         pair = (item.first, item.second) if item.verdict is Verdict.FIRST_BETTER else (item.second, item.first)
         wins.setdefault(pair[0], {})[pair[1]] = 100.0 * abs(item.difference.value if item.difference else 0.0)
     groups: dict[tuple[str, ...], list[str]] = {}
-    for better, others in wins.items():
-        groups.setdefault(tuple(others), []).append(better)
+    for better, beaten in wins.items():
+        groups.setdefault(tuple(beaten), []).append(better)
     lines = []
     for others, methods in groups.items():
         points = [wins[better][other] for better in methods for other in others]
@@ -216,11 +216,10 @@ def estimate_text(estimate: Estimate | None, metric: Metric) -> str:
     """Returns an estimate with its interval, a rate in percent; without the unit."""
     if estimate is None:
         return NONE
-    low, high = (None, None) if estimate.interval is None else (estimate.interval.low, estimate.interval.high)
-    if metric.kind is not MetricKind.RATE:
-        return interval_text(estimate.value, low, high, metric.unit)
-    ends = [None if end is None else 100.0 * end for end in (low, high)]
-    return interval_text(100.0 * estimate.value, *ends, "%")
+    scale, unit = (100.0, "%") if metric.kind is MetricKind.RATE else (1.0, metric.unit)
+    if estimate.interval is None:
+        return number_text(scale * estimate.value, unit=unit)
+    return interval_text(scale * estimate.value, scale * estimate.interval.low, scale * estimate.interval.high, unit)
 
 
 def wins_text(found: Comparison) -> str:

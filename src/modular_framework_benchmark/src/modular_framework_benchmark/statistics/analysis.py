@@ -98,7 +98,10 @@ def _corrections(findings: Sequence[Finding], error_rate: float) -> list[Correct
     without = p_values
     if any(found.without_broken for found in findings):
         without, _ = _corrected([found.without_broken or found for found in findings], of_success, error_rate)
-    return [Correction(*each, error_rate, least) for *each, least in zip(p_values, without, at_least, strict=True)]
+    return [
+        Correction(p_value, p_without, error_rate, least)
+        for p_value, p_without, least in zip(p_values, without, at_least, strict=True)
+    ]
 
 
 def _corrected(
@@ -116,9 +119,9 @@ def _corrected(
         if family:
             # A family that cannot show anything with its share leaves it to the other, if that can use it.
             bar = error_rate / 2 if smallest[which] <= error_rate / 2 else error_rate
-            alone = smallest[1 - which] > bar
-            tests = [(findings[place].p_value or 0.0, findings[place].smallest_p) for place in family]
-            found, count = corrected(*zip(*tests, strict=True), error_rate, share := 1.0 if alone else 0.5)
+            share = 1.0 if smallest[1 - which] > bar else 0.5
+            tested = [findings[place].p_value or 0.0 for place in family]
+            found, count = corrected(tested, [findings[place].smallest_p for place in family], error_rate, share)
             least[which] = error_rate * share / count
             for place, p_value in zip(family, found, strict=True):
                 p_values[place] = p_value

@@ -201,14 +201,15 @@ class EpisodeTable:
     def pairs(self, metric: Metric, first: str, second: str) -> Pairs:
         """Returns a metric in the pairs of two methods: same trial, same levels of the other factors.
 
-        Where no two episodes have the same trial and levels, those with the same levels are paired in their order.
+        Where in the end no two episodes have the same trial and levels, those with the same levels are paired in order.
         """
         rows = self._rows[first], self._rows[second]
         keys = [self._keys[of_method] for of_method in rows]
-        at_random = not np.isin(*keys).any()
+        finished = len(self._succeeded) >= self.results.planned
+        at_random = finished and not np.isin(keys[0], keys[1]).any()
         if at_random:
             keys = [_order_within(self._strata[of_method]) for of_method in rows]
-        _, *places = np.intersect1d(*keys, assume_unique=True, return_indices=True)
+        _, *places = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
         column = self._column(metric)
         sides = [column.of(of_method[place]) for of_method, place in zip(rows, places, strict=True)]
         count = len(sides[0].scores)

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 _SIZES, _WEIGHTS = special.roots_legendre(64)
 _LOG_WEIGHTS = np.log(_WEIGHTS / _WEIGHTS.sum())
-GRID = 401
+GRID = 101
 """Candidates for the true difference from -1 to 1, between which an end of the interval is then refined."""
 LARGEST_PART = 1_000_000
 """Numbers that are held at once to compute the capital against all candidates: 8 MB."""

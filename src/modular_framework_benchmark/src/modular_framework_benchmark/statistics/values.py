@@ -65,8 +65,8 @@ def bounded_mean_interval(means: Floats, bounds: tuple[float, float], confidence
         return None
     if np.all(means == means[0]) and means[0] in bounds:
         end = (highest - lowest) * ((1 - confidence) / 2) ** (1 / count)
-        ends = (lowest, highest - end) if means[0] == lowest else (lowest + end, highest)
-        return Interval(*ends, confidence, "exact, all values at the bound")
+        low, high = (lowest, highest - end) if means[0] == lowest else (lowest + end, highest)
+        return Interval(low, high, confidence, "exact, all values at the bound")
     if count - np.unique(means, return_counts=True)[1].max() <= MAX_OUTSIDE:
         middle = (highest + lowest) / 2
         found = anytime_interval(means - middle, confidence, (highest - lowest) / 2)
@@ -94,9 +94,10 @@ def restricted_mean_interval(
         return None
     rate = rate_interval(int(failed.sum()), len(values), (1 + confidence) / 2)
     half = float(stats.t.isf((1 - confidence) / 4, len(kept) - 1) * stats.sem(kept))
-    ends = np.clip(np.mean(kept) + np.array([-half, half]), *sorted((limit, other)))
+    lowest, highest = sorted((limit, other))
+    ends = [min(max(float(np.mean(kept)) + side * half, lowest), highest) for side in (-1, 1)]
     corners = [share * limit + (1 - share) * end for share in (rate.low, rate.high) for end in ends]
-    return Interval(float(min(corners)), float(max(corners)), confidence, "Clopper-Pearson of failures, Student's t")
+    return Interval(min(corners), max(corners), confidence, "Clopper-Pearson of failures, Student's t")
 
 
 @lru_cache(maxsize=4096)
