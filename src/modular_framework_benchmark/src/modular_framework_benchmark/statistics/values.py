@@ -52,7 +52,7 @@ def bounded_mean_interval(means: Floats, bounds: tuple[float, float], confidence
     """Returns the interval of the mean of bounded values; None of fewer units than `MIN_UNITS`.
 
     Student's t with units - 1 degrees of freedom (R. Ibragimov, U. K. Müller, J. Business and Economic Statistics 28
-    (2010) 453-468). It is too narrow where nearly all units are equal: then a betting interval, and if all are at a
+    (2010) 453-468). It is too narrow where most units are equal: then a betting interval, and if all are at a
     bound the exact end: a true mean below `((1 - confidence) / 2) ** (1 / units)` would give that less often.
 
     Args:
@@ -67,7 +67,8 @@ def bounded_mean_interval(means: Floats, bounds: tuple[float, float], confidence
         end = (highest - lowest) * ((1 - confidence) / 2) ** (1 / count)
         low, high = (lowest, highest - end) if means[0] == lowest else (lowest + end, highest)
         return Interval(low, high, confidence, "exact, all values at the bound")
-    if count - np.unique(means, return_counts=True)[1].max() <= MAX_OUTSIDE:
+    most_frequent = np.unique(means, return_counts=True)[1].max()
+    if 2 * most_frequent > count or count - most_frequent <= MAX_OUTSIDE:
         middle = (highest + lowest) / 2
         found = anytime_interval(means - middle, confidence, (highest - lowest) / 2)
         return Interval(found.low + middle, found.high + middle, confidence, "betting")
