@@ -6,12 +6,15 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import socket
 import threading
 from pathlib import Path
 from xmlrpc.client import Transport
 
 import pytest
+import rosgraph
 import rospy
+import rosservice
 from gazebo_msgs.srv import GetModelProperties, GetModelPropertiesResponse
 from geometry_msgs.msg import PoseStamped
 from moveit_msgs.msg import (
@@ -112,7 +115,7 @@ def test_trajectories_of_the_file_are_timed_and_a_bad_one_is_dropped(managers):
 
 def test_anonymous_messages_come_out_oldest_first_and_only_once(managers):
     for value in (1.0, 2.0, 3.0):
-        assert call("add_joint_state", srv.AddJointState, JointState(position=[value]), "").success
+        assert call("add_joint_state", srv.AddJointState, JointState(name=["a"], position=[value]), "").success
     got = [call("get_joint_state", srv.GetJointState, "").joint_state.position[0] for _ in range(3)]
     assert got == [1.0, 2.0, 3.0]
     empty = call("get_joint_state", srv.GetJointState, "")
@@ -358,6 +361,8 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers):
             "kind: plan\nnamed: {p: {joint_trajectory: {points: [{positions: [.nan]}]}}}",
             "positions[0] is nan",
         ),
+        ("empty_name.yaml", 'kind: plan\nnamed: {"": {}}\n', "the name is empty"),
+        ("surrogate.yaml", '{"kind": "plan", "named": {"\\ud800": {}}}', "the name '\\ud800' has half of a character"),
         ("type.yaml", "kind: plan\nanonymous:\n- {joint_trajectory: {joint_names: 5}}\n", "anonymous message 1 is no"),
     ],
 )
@@ -379,6 +384,27 @@ def test_a_pipe_is_refused_at_once_and_positions_that_are_not_finite_are_not_tak
     nowhere = JointState(name=["a"], position=[math.nan])
     assert not call("add_joint_state", srv.AddJointState, nowhere, "nowhere").success
     assert "nowhere" not in lists("joint_states")[0]
+
+
+@pytest.mark.parametrize("wrong", [{"position": [0.0] * 3}, {"position": [0.0], "effort": [1.0, 2.0]}])
+def test_a_joint_state_without_one_value_for_each_name_is_not_taken(managers, wrong):
+    assert not call("add_joint_state", srv.AddJointState, JointState(name=["a"], **wrong), "uneven").success
+    assert "uneven" not in lists("joint_states")[0]
+    for right in ({"position": [0.0]}, {"position": [0.0], "effort": [1.0]}):
+        assert call("add_joint_state", srv.AddJointState, JointState(name=["a"], **right), "even").success
+    call("remove_joint_state", srv.RemoveMessage, "even")
+
+
+def test_many_clients_at_the_same_moment_are_answered_without_a_second_try_to_connect(managers):
+    """Beyond the backlog of a socket Linux drops a connection, and its client tries again after a second."""
+    uri = rosservice.get_service_uri("list_poses")
+    host, port = rosgraph.network.parse_http_host_and_port(uri.replace("rosrpc", "http"))
+    waiting = [socket.socket() for _ in range(64)]
+    for item in waiting:
+        item.settimeout(0.9)
+        item.connect((host, port))
+    for item in waiting:
+        item.close()
 
 
 def test_reloading_forgets_what_was_added_and_reads_the_file_again(managers):

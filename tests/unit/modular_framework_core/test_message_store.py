@@ -43,6 +43,15 @@ def test_an_unknown_name_is_answered_with_the_names_there_are() -> None:
         store.get("other")
 
 
+def test_of_many_long_names_only_the_nearest_are_listed() -> None:
+    store: MessageStore[str] = MessageStore("word")
+    for number in range(300):
+        store.add("x", f"{number:03d}" + "y" * 300)
+    with pytest.raises(MessageNotFoundError, match=r"'150x' is stored.* 150yyy.*nearest of 300") as refused:
+        store.get("150x")
+    assert len(str(refused.value)) < 1500
+
+
 def test_no_anonymous_message_is_lost_or_doubled_between_threads() -> None:
     store: MessageStore[int] = MessageStore("number")
     for number in range(2000):

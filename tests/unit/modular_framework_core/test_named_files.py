@@ -54,6 +54,7 @@ def test_positions_keep_double_precision_and_file_order(tmp_path: Path) -> None:
         ("good: {a: 1}\nbad: {a: 1, a: 2}\n", 2, "twice"),
         ("good: {a: 1}\ngood: {a: 2}\n", 2, "further up"),
         ("good: {a: 1}\nbad: {a: '1'}\n", 2, "finite number"),
+        ('good: {a: 1}\n"": {a: 1}\n', 2, "the name is empty"),
     ],
 )
 def test_a_bad_joint_state_is_named_and_the_others_stay(tmp_path: Path, text: str, line: int, hint: str) -> None:

@@ -154,6 +154,15 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
         yield entry
 
 
+def name_fault(name: str) -> str:
+    """Describes why a name cannot be sent in a message; "" if it can."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return f"the name {name!r} has half of a character (a lone surrogate); leave it out"
+    return "" if name else "the name is empty; write one"
+
+
 def read_each_entry(path: Path, handle: Callable[[Entry], None]) -> list[EntryError]:
     """Calls a function with every entry of a file, and continues after one that is not usable.
 
@@ -170,6 +179,8 @@ def read_each_entry(path: Path, handle: Callable[[Entry], None]) -> list[EntryEr
             try:
                 if isinstance(entry, EntryError):
                     raise entry
+                if fault := name_fault(entry.key):
+                    raise EntryError(entry.path, entry.line, fault)
                 handle(entry)
             except EntryError as error:
                 faults.append(error)

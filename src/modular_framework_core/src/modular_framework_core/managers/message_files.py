@@ -23,6 +23,7 @@ import yaml
 
 from modular_framework_core.files import shallow_yaml
 from modular_framework_core.files.atomic_files import read_text, write_atomically
+from modular_framework_core.files.yaml_entries import name_fault
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -121,7 +122,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
     given, waiting = content.get("named") or {}, content.get("anonymous") or []
     if not isinstance(given, dict) or not isinstance(waiting, list):
         raise MessageFileError(f"{path}: 'named' must be a mapping of names to messages and 'anonymous' a list")
-    faults: list[str] = []
+    faults = [f"{path}: {fault}" for name in given if (fault := name_fault(str(name)))]
     named = {str(name): _filled(message_type, value, f"{path}: '{name}'", faults) for name, value in given.items()}
     anonymous = [
         _filled(message_type, value, f"{path}: anonymous message {number}", faults)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds positions in a message that are not finite numbers, which no robot can reach and planners refuse."""
+"""Finds positions in a message that are not finite, or not one for each joint: planners and controllers refuse them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ _COORDINATES = ("geometry_msgs/Point", "geometry_msgs/Quaternion")
 
 
 def unusable_position(message: Any, where: str = "") -> str:
-    """Describes the first position of a message that is not finite; "" when all are.
+    """Describes the first position of a message that is not finite, or has no joint; "" when there is none.
 
     Args:
         message: Any message; its joint positions, points and orientations are checked at any depth.
         where: Its own field, for the text.
     """
+    if message._type == "sensor_msgs/JointState":
+        for name in ("position", "velocity", "effort"):
+            if (count := len(getattr(message, name))) not in (0, len(message.name)):
+                return f"{where}.{name}".lstrip(".") + f" has {count} values for {len(message.name)} names"
     is_place = message._type in _COORDINATES
     for name, part, is_list in fields_of(message.__class__):
         value = getattr(message, name)

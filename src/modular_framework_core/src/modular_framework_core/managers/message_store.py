@@ -7,6 +7,7 @@ the oldest is handed out first and leaves the queue for good.
 
 from __future__ import annotations
 
+import bisect
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
@@ -15,6 +16,8 @@ from enum import Enum
 from typing import Generic, TypeVar
 
 MessageT = TypeVar("MessageT")
+LISTED_NAMES = 10
+"""Names in the text of an error; a line of the log is written to every listener of the log."""
 
 
 class Action(Enum):
@@ -51,12 +54,16 @@ class MessageNotFoundError(LookupError):
     Args:
         kind: Noun of the stored messages, for example ``joint state``.
         name: Name that was asked for; empty for the anonymous queue.
-        known_names: Names the store does hold.
+        known_names: Names the store does hold, sorted.
     """
 
     def __init__(self, kind: str, name: str, known_names: tuple[str, ...]) -> None:
         self.kind, self.name, self.known_names = kind, name, known_names
-        allowed = ", ".join(known_names) if known_names else "none"
+        place = max(0, bisect.bisect(known_names, name) - LISTED_NAMES // 2) if name else 0
+        listed = [shown if len(shown) <= 80 else f"{shown[:80]}..." for shown in known_names[place:][:LISTED_NAMES]]
+        allowed = ", ".join(listed) or "none"
+        if len(listed) < len(known_names):
+            allowed += f" (the nearest of {len(known_names)} in the alphabet)"
         if name:
             text = f"No {kind} named '{name}' is stored. Stored names: {allowed}. Add it first or correct the name."
         else:

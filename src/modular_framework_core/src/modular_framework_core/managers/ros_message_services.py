@@ -164,7 +164,9 @@ class MessageServices(ManagerServices):
         name = getattr(request, self.kind.name_field)
         wrong = unusable_position(getattr(request, self.kind.message_field))
         if wrong:
-            rospy.logerr("The %s '%s' is not stored: %s; give finite positions.", self.kind.noun, name, wrong)
+            rospy.logerr(
+                "The %s '%s' is not stored: %s; give one finite position for each joint.", self.kind.noun, name, wrong
+            )
             return self.kind.add_type._response_class(success=False)
         if self.store.add(getattr(request, self.kind.message_field), name):
             rospy.loginfo_throttle(OVERWRITTEN_PERIOD_S, f"The {self.kind.noun} '{name}' was overwritten.")
@@ -218,7 +220,7 @@ class MessageServices(ManagerServices):
             *((f"anonymous message {number}", item) for number, item in enumerate(anonymous, start=1)),
         ]
         wrong = [
-            f"{path}: {what}: {found}; give finite positions"
+            f"{path}: {what}: {found}; give one finite position for each joint"
             for what, item in messages
             if (found := unusable_position(item))
         ]

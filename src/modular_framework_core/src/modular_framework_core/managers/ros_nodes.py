@@ -23,6 +23,7 @@ from modular_framework_core.managers.ros_named_files import (
     trajectory_reader,
 )
 from modular_framework_core.managers.ros_object_type_services import ObjectTypeServices
+from modular_framework_ros.service_backlog import widen_backlog
 from modular_framework_ros.start_up import start_timeout
 
 TOPICS_IN_LOG_PARAMETER = "/rosout_disable_topics_generation"
@@ -36,6 +37,7 @@ def start(node_name: str) -> list[str]:
     request's time. Where it is not set it gets the value that has the same meaning.
     """
     rospy.init_node(node_name)
+    widen_backlog()
     if not rospy.has_param(TOPICS_IN_LOG_PARAMETER):
         rospy.set_param(TOPICS_IN_LOG_PARAMETER, False)
     gc.freeze()  # looking for cycles among the modules, at every tenth file loaded, took 20 ms
