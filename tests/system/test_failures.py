@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -126,6 +128,16 @@ def test_killed_node_ends_the_launch_and_is_named(session: RosSession, node: str
     assert launch.wait(STOP_TIMEOUT_S) == 3, launch.log()
     assert time.monotonic() - killed < STOP_TIMEOUT_S
     assert re.search(rf"[Nn]ode '{node}'.* (died|ended)", launch.log()), launch.log()
+
+
+@pytest.mark.parametrize("node", ["move_group", "gazebo"])
+def test_a_frozen_node_is_named_within_ten_seconds_and_ends_the_task(session: RosSession, node: str) -> None:
+    launch = session.run_framework(**HEADLESS)
+    _wait_for_text(launch, "state MovePregrasp ended", TASK_TIMEOUT_S)
+    os.kill(_pid_of(session, node), signal.SIGSTOP)
+    _wait_for_text(launch, f"node '/{node}' is frozen", 10.0)
+    assert launch.wait(STOP_TIMEOUT_S) == 1, launch.log()
+    assert "Task 'simulation_pick' ended with outcome 'preempted': FAILED" in launch.log()
 
 
 def test_manipulator_node_ends_with_the_spawner_that_started_it(session: RosSession) -> None:

@@ -4,18 +4,27 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import pytest
+import rosgraph
 import rospy
 from ros_session import RosSession, executable
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
+
+from modular_framework_core.srv import ListMessages, ListMessagesRequest
+from modular_framework_ros.calls import CallError, call_service
+
+FROZEN_WITHIN_S = 10.0
+"""From the stop of a node's process to the end of what waits for it [s]."""
 
 STOPPED_WITHIN_S = 1.0
 """From the signal to the last line [s]."""
@@ -216,6 +225,52 @@ def test_the_outcome_and_the_states_are_published(run, status: Heard) -> None:
     assert events[1]["outcome"] == "fail"
     assert events[1]["reason"] == "the door is locked"
     assert events[2]["succeeded"] is False
+
+
+@pytest.fixture()
+def frozen(ros_session: RosSession) -> Iterator[Callable[[], int]]:
+    """A node of a launch, and its process, which `frozen()` stops."""
+    launch = ros_session.launch('<launch><node name="managers" pkg="modular_framework_core" type="managers"/></launch>')
+    ros_session.wait_for_service("/list_grasps", 60.0)
+    pid = int(ServerProxy(rosgraph.Master("/test").lookupNode("/managers")).getPid("/test")[2])
+
+    def freeze() -> int:
+        os.kill(pid, signal.SIGSTOP)
+        return pid
+
+    yield freeze
+    os.kill(pid, signal.SIGCONT)
+    launch.stop()
+
+
+def test_a_frozen_node_ends_the_task_and_is_named(run, status: Heard, frozen) -> None:
+    process = run(LONG)
+    wait_for_start(status)
+    begun_s, pid = time.monotonic(), frozen()
+    code, output = process.end()
+    assert code == 1, output
+    assert f"node '/managers' is frozen: its process {pid} was stopped" in output
+    assert process.ended_at() - begun_s < FROZEN_WITHIN_S
+
+
+def test_a_call_of_a_frozen_node_fails_long_before_its_timeout(frozen) -> None:
+    proxy = rospy.ServiceProxy("/list_grasps", ListMessages)
+    assert call_service(proxy, ListMessagesRequest(), 60.0).anonymous == 0
+    begun_s = time.monotonic()
+    frozen()
+    with pytest.raises(CallError, match="service '/list_grasps' does not answer: node '/managers' is frozen"):
+        call_service(proxy, ListMessagesRequest(), 60.0)
+    assert time.monotonic() - begun_s < FROZEN_WITHIN_S
+
+
+def test_a_short_stop_of_a_node_ends_nothing(run, status: Heard, frozen) -> None:
+    process = run(LONG)
+    wait_for_start(status)
+    for _ in range(5):
+        os.kill(frozen(), signal.SIGCONT)
+    seen = len(status.messages)
+    status.wait_for(lambda messages: len(messages) > seen + 12)  # one every half second
+    assert process.process.poll() is None
 
 
 def test_the_generated_module_is_written_below_ros_home(run, ros_session: RosSession) -> None:

@@ -17,11 +17,15 @@ from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
 from modular_framework_ros.action_client import is_connected
+from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.start_up import WaitReport, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested
 
 POLL_PERIOD_S = 0.01
 STOP_PERIOD_S = 0.05
+
+WATCHED_AFTER_S = 2.0
+"""Wait after which a call looks for frozen nodes [s]."""
 
 CANCEL_WAIT_S = 0.5
 """Longest wait for the result of a cancelled goal [s]; a task has to end within a second of a request to stop."""
@@ -95,11 +99,14 @@ def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> A
         finally:
             done.set()
 
-    deadline = time.monotonic() + timeout_s
+    begun_s = time.monotonic()
+    deadline = begun_s + timeout_s
     threading.Thread(target=call, daemon=True, name=f"call {proxy.resolved_name}").start()
     while not done.wait(max(0.0, min(STOP_PERIOD_S, deadline - time.monotonic()))) and time.monotonic() < deadline:
         if stop_requested():
             raise _given_up(f"service '{proxy.resolved_name}'")
+        if time.monotonic() > begun_s + WATCHED_AFTER_S and (frozen := frozen_nodes()):
+            raise CallError(f"service '{proxy.resolved_name}' does not answer: {frozen}")
     if answers:
         return answers[0]
     if errors:
@@ -156,9 +163,9 @@ def wait_for_result(
         stop_requested: Asked all the time; True cancels the goal.
 
     Returns:
-        The final goal status, PREEMPTED after a stop, LOST out of time.
+        The final goal status, PREEMPTED after a stop, LOST out of time or when a node is frozen.
     """
-    stopped = False
+    stopped, watched_from_s = False, time.monotonic() + WATCHED_AFTER_S
 
     def ended() -> bool:
         # The status of the goal is final some time before its result is here; DONE means that both are. The goal
@@ -168,9 +175,9 @@ def wait_for_result(
     def finished() -> bool:
         nonlocal stopped
         stopped = stopped or stop_requested()
-        return stopped or ended()
+        return stopped or ended() or (time.monotonic() > watched_from_s and bool(frozen_nodes()))
 
-    if wait_until(finished, timeout_s) and not stopped:
+    if wait_until(finished, timeout_s) and not stopped and ended():
         return int(client.get_state())
     client.cancel_goal()
     wait_until(ended, CANCEL_WAIT_S)

@@ -56,6 +56,7 @@ from modular_framework_ros.calls import (
     wait_for_service,
     wait_until,
 )
+from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.seeds import seed_parameter
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested
@@ -396,7 +397,10 @@ class ArmCommander:
         if status == GoalStatus.PREEMPTED:
             return ExecutionResult(False, MoveItErrorCodes.PREEMPTED, "the motion was stopped on request")
         if status == GoalStatus.LOST:
-            reason = f"action '{rospy.resolve_name(EXECUTE_ACTION)}' did not end within {timeout_s:.1f} s"
+            frozen = frozen_nodes()
+            reason = f"action '{rospy.resolve_name(EXECUTE_ACTION)}' did not end " + (
+                frozen or f"within {timeout_s:.1f} s"
+            )
             now_s = rospy.get_time()
             if not wait_until(lambda: rospy.get_time() != now_s, CLOCK_WAIT_S):
                 reason += f": simulated time stands still at {now_s:.3f} s; is the simulation paused?"

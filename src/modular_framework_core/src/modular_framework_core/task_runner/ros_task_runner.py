@@ -48,6 +48,7 @@ from modular_framework_core.task_constructor.state_catalogue import StateCatalog
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder, write_record
 from modular_framework_core.task_runner.ros_introspection import shown
 from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, EXIT_SUCCEEDED, TaskResult, TaskRun
+from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import SimulatedTime
 
 STOP_GRACE_S = 0.6
@@ -215,6 +216,8 @@ def _wait(run: TaskRun, asked_by: list[str], report_status: Callable[[], None]) 
         if time.monotonic() > next_status:
             next_status = time.monotonic() + STATUS_PERIOD_S
             report_status()
+            if frozen := frozen_nodes():
+                asked_by.append(f"the watch of the nodes: {frozen}")
         if give_up is None and (asked_by or rospy.is_shutdown()):
             run.request_stop(asked_by[0] if asked_by else "the shutdown of ROS")
             give_up = time.monotonic() + STOP_GRACE_S
