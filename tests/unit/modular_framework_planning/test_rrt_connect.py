@@ -14,8 +14,11 @@ from plain_coal_checker import PlainCoalChecker
 from test_collision_checkers import SHAPES, SMALL_SRDF, SMALL_URDF
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
-from modular_framework_planning.collision_detection.sphere_covers import Layers
-from modular_framework_planning.collision_detection.sphere_layers import ALL_LAYERS, NO_LAYERS
+from modular_framework_planning.collision_detection.kernels.compiled_collision import (
+    ASKED,
+    FOUND_FREE,
+    FOUND_TOUCHING,
+)
 from modular_framework_planning.geometry.shapes import Box, Mesh, Plane, Shape
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planners.rrt_connect import compiled_rrt_connect, rrt_connect
@@ -62,12 +65,11 @@ def problem_in(
     cancelled: Callable[[], bool] = lambda: False,
     start: np.ndarray = START,
     goal: np.ndarray = GOAL,
-    layers: Layers | None = None,
 ) -> PlanningProblem:
     model, group = scene.model, scene.model.group("all")
     positions = model.merge(scene.positions, dict(zip(group.joints, start.tolist(), strict=True)))
     scene = scene.with_positions(positions)
-    checker = ExactCollisionChecker(scene, group.indices, layers=layers)
+    checker = ExactCollisionChecker(scene, group.indices)
     target = JointGoal(dict(zip(group.joints, goal.tolist(), strict=True)))
     now_s = time.monotonic()
     return PlanningProblem(
@@ -149,8 +151,8 @@ def test_of_searches_side_by_side_the_first_path_wins_whatever_the_threads_do(sm
     assert fewer > 0, "some search other than the first one found its path earlier"
 
 
-def cube_beside_a_wall(layers: Layers, seed: int) -> PlanningProblem:
-    """A cube slides in a plane, one corner 5 um away from a wall, past a pillar behind it."""
+def cube_beside_a_wall(gap: float, seed: int) -> PlanningProblem:
+    """A cube slides in a plane, one corner `gap` [m] away from a wall, past a pillar behind it."""
     half = 0.8
     turn = pin.Quaternion.FromTwoVectors(np.ones(3), np.array([1.0, 0.0, 0.0])).toRotationMatrix()
     roll, pitch, yaw = pin.rpy.matrixToRpy(turn)
@@ -166,21 +168,24 @@ def cube_beside_a_wall(layers: Layers, seed: int) -> PlanningProblem:
         '<robot name="slide"><group name="all"><joint name="y"/><joint name="z"/></group></robot>',
     )
     corner = np.sqrt(3.0) * half
-    wall = Box(1.0, 8.0, 8.0), np.array([corner + 5.0e-6 + 0.5, 0.0, 0.0])
+    wall = Box(1.0, 8.0, 8.0), np.array([corner + gap + 0.5, 0.0, 0.0])
     scene = scene_with(model, wall, (Box(0.02, 0.1, 0.3), np.array([0.05 - corner, 0.0, 0.0])))
-    return problem_in(scene, seed, start=np.array([-0.8, 0.0]), goal=np.array([0.8, 0.0]), layers=layers)
+    return problem_in(scene, seed, start=np.array([-0.8, 0.0]), goal=np.array([0.8, 0.0]))
 
 
 def test_of_searches_side_by_side_the_same_one_wins_whatever_edges_the_bounds_leave_open() -> None:
     for seed in range(8):
-        paths = []
-        for layers in (NO_LAYERS, ALL_LAYERS):  # spheres decide edges here that surfaces leave open
-            problem = cube_beside_a_wall(layers, seed)
+        paths, undecided = [], []
+        for gap in (5.0e-6, 5.0e-3):  # the bounds leave edges open beside the near wall only
+            problem = cube_beside_a_wall(gap, seed)
             searches = [
                 RrtConnect(replace(problem, rng=rng), np.array([[0.8, 0.0]]), 0.002, 0.02, None, False, number)
                 for number, rng in enumerate([problem.rng, *problem.rng.spawn(3)])
             ]
             paths.append(SideBySide(problem, searches).run())
+            counts = problem.checker.check_counts
+            undecided.append(int(counts[ASKED] - counts[FOUND_FREE] - counts[FOUND_TOUCHING]))
+        assert undecided[0] > 10 * undecided[1], "the near wall leaves far more edges open"
         assert paths[0] is not None and np.array_equal(paths[0], paths[1]), seed
 
 

@@ -17,8 +17,6 @@ class CheckCounts:
     Attributes:
         asked: checks that were asked for; one that was remembered does not count.
         free_by_bounds, touching_by_bounds: decided by the compiled check of spheres and surfaces.
-        by_spheres: of these, checks refused by a ball inside of a body, and straight motions with a free end on whose
-            way spheres leave no pair of bodies open.
         undecided: left to the exact check (Coal).
         touching_exactly: of these, those in which bodies touch.
         states: that the compiled check looked at, those of undecided edges of a compiled search twice.
@@ -27,7 +25,6 @@ class CheckCounts:
     asked: int
     free_by_bounds: int
     touching_by_bounds: int
-    by_spheres: int
     undecided: int
     touching_exactly: int
     states: int
@@ -42,7 +39,7 @@ class CheckCounts:
 class Refusals:
     """Two bodies by name, and in how many checks they touched; of links on one joint the first is named.
 
-    Where several pairs touch, the one that is found first counts; which one that is depends on the spheres in use.
+    Where several pairs touch, the first pair found counts.
     """
 
     first: str

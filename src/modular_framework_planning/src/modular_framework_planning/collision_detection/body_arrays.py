@@ -34,8 +34,6 @@ class BodyArrays(NamedTuple):
     Attributes:
         inflation: radius of a ball around each point of a body's surface that belongs to it [m]; shape (b,).
         surface_excess, solid_excess: how far surface and closed form lie outside of a body at most [m]; shape (b,).
-        inner_radii: of the largest ball around the origin of the closed form that lies inside [m], 0 where none is
-            known; shape (b,).
     """
 
     joints: NDArray[np.int64]
@@ -49,7 +47,6 @@ class BodyArrays(NamedTuple):
     surface_excess: Array
     solid_excess: Array
     closed: NDArray[np.bool_]
-    inner_radii: Array
 
 
 class SceneBodies(NamedTuple):
@@ -221,8 +218,8 @@ def link_groups(model: RobotModel, groups: Grouping) -> tuple[Surfaces, BodyArra
 
 def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_environment: bool) -> BodyArrays:
     """Returns bodies in the frames of their joints, without surfaces."""
-    columns = np.array([shape.numbers for shape in shapes], dtype=float).reshape(-1, 10).T.copy()
-    kinds, x, y, z, inflation, surface_excess, solid_excess, closed, radii, inner_radii = columns
+    columns = np.array([shape.numbers for shape in shapes], dtype=float).reshape(-1, 9).T.copy()
+    kinds, x, y, z, inflation, surface_excess, solid_excess, closed, radii = columns
     spheres = np.zeros((len(shapes), 4))
     spheres[:, 3] = radii
     return BodyArrays(
@@ -237,7 +234,6 @@ def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_e
         surface_excess=surface_excess,
         solid_excess=solid_excess,
         closed=closed > 0.0,
-        inner_radii=inner_radii,
     )
 
 

@@ -74,24 +74,9 @@ class BoundingGeometry:
 
     @cached_property
     def numbers(self) -> tuple[float, ...]:
-        """Kind, three sizes, inflation, excess of surface and closed form, is closed, radius, inner radius."""
+        """Kind, three sizes, inflation, excess of surface and closed form, is closed, radius."""
         excess = self.surface_excess, self.solid_excess
-        return (self.kind, *self.size, self.inflation_radius, *excess, self.is_closed, self.radius, self.inner_radius)
-
-    @property
-    def inner_radius(self) -> float:
-        """Radius of the largest ball around the closed form's origin that lies inside [m]; 0 where none is known."""
-        x, y, z = self.size
-        if self.solid_excess > 0.0:
-            return 0.0
-        match self.kind:
-            case _ if self.kind == BOX:
-                return min(x, y, z)
-            case _ if self.kind == CYLINDER:
-                return min(x, y)
-            case _ if self.kind in (SPHERE, CAPSULE):
-                return x
-        return 0.0
+        return (self.kind, *self.size, self.inflation_radius, *excess, self.is_closed, self.radius)
 
     @property
     def radius(self) -> float:

@@ -5,37 +5,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.body_arrays import (
-    KEPT_GROUPINGS,
-    Grouping,
-    SceneBodies,
-    link_groups,
     scene_bodies,
 )
 from modular_framework_planning.collision_detection.collision_bodies import PlacedGeometry, WatchedPairs
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     CHECK_COUNTS,
-    Covers,
     World,
     arguments,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance_field import KEPT, DistanceField
-from modular_framework_planning.collision_detection.kernels.compiled_reaches import joint_lengths
-from modular_framework_planning.collision_detection.kernels.compiled_spheres import boxes_around, extents_of, fill_heaps
 from modular_framework_planning.collision_detection.pair_arrays import Represented, pair_arrays
 from modular_framework_planning.collision_detection.reaches import farthest_end
-from modular_framework_planning.collision_detection.sphere_covers import (
-    Layers,
-    balls_inside,
-    empty_covers,
-    heap_of,
-)
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import whole_tree
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -68,7 +54,6 @@ def compile_world(
     model: RobotModel,
     parts: Sequence[PlacedGeometry],
     pairs: WatchedPairs,
-    layers: Layers,
     check_interrupt: Callable[[], None] = _never_interrupt,
 ) -> CompiledWorld:
     """Builds the arrays; what is built for a shape is cached as long as the shape exists.
@@ -77,7 +62,6 @@ def compile_world(
         model: the robot.
         parts: geometries of the scene, the model's links first.
         pairs: the pairs to watch; those that no joint moves should not be among them.
-        layers: the spheres to use.
         check_interrupt: called between shapes; raises an exception to stop.
     """
     bodies = scene_bodies(model, parts, pairs, check_interrupt)
@@ -106,46 +90,10 @@ def compile_world(
         represented=joined.represented,
         counts=np.zeros(CHECK_COUNTS, dtype=np.int64),
         refusals=np.zeros(len(joined.pairs), dtype=np.int64),
+        meets=joined.meets,
         field=field,
-        covers=_covers(model, bodies, layers, joined.meets, boxes_around(field.kinds, field.sizes, field.poses)),
     )
     return CompiledWorld(world, arguments(world), joined.members, joined.uncompiled)
-
-
-def _covers(model: RobotModel, bodies: SceneBodies, layers: Layers, meets: NDArray[np.int64], boxes: Array) -> Covers:
-    """Returns spheres around the moving bodies and balls inside of them."""
-    arrays, count, links = bodies.arrays, len(bodies.groups), _link_covers(model, bodies.groups, layers)
-    covers = empty_covers(layers, len(arrays.joints))
-    covers.spheres[:count], covers.balls[:count] = links.spheres, links.balls
-    moving = count + np.flatnonzero(arrays.joints[count:] >= 0)
-    if layers.balls:
-        covers.balls[moving, 0, :3], covers.balls[moving, 0, 3] = arrays.poses[moving, :, 3], arrays.inner_radii[moving]
-    if layers.nodes:
-        fill_heaps(bodies.scene, arrays.roots, arrays.poses, arrays.spheres, arrays.inflation, moving, covers.spheres)
-    return covers._replace(extents=extents_of(covers.spheres), lengths=links.lengths, meets=meets, boxes=boxes)
-
-
-@lru_cache(maxsize=KEPT_GROUPINGS)
-def _link_covers(model: RobotModel, groups: Grouping, layers: Layers) -> Covers:
-    """Spheres around groups of links and balls inside of them, and the lengths of the joints."""
-    surfaces, bodies, _ = link_groups(model, groups)
-    covers = empty_covers(layers, len(groups))
-    for number, root in enumerate(bodies.roots.tolist() if layers.nodes else ()):
-        covers.spheres[number] = heap_of(surfaces, root, layers.nodes)
-    if layers.balls:
-        covers.balls[:] = _link_balls(model, groups, layers.balls)
-    return covers._replace(lengths=joint_lengths(whole_tree(model).placements))
-
-
-@lru_cache(maxsize=KEPT_GROUPINGS)
-def _link_balls(model: RobotModel, groups: Grouping, most: int) -> Array:
-    """Balls inside of groups of links, shape (groups, most, 4)."""
-    surfaces, bodies, _ = link_groups(model, groups)
-    closed = [
-        balls_inside(surfaces, root, most) if is_closed else np.zeros((most, 4))
-        for root, is_closed in zip(bodies.roots.tolist(), bodies.closed, strict=True)
-    ]
-    return np.array(closed).reshape(-1, most, 4)
 
 
 def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:

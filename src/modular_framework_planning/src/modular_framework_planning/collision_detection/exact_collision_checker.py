@@ -35,8 +35,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
     sample_at,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_penetration import Cover, cover_of, penetrations
-from modular_framework_planning.collision_detection.sphere_covers import Layers
-from modular_framework_planning.collision_detection.sphere_layers import layers_for
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.plan_statistics import Refusals
@@ -59,7 +57,6 @@ class ExactCollisionChecker:
         scene: PlanningScene,
         moving: Joints = None,
         tolerated: Sequence[Contact] = (),
-        layers: Layers | None = None,
     ) -> None:
         """Builds the checker.
 
@@ -67,10 +64,8 @@ class ExactCollisionChecker:
             scene: the snapshot to check in.
             moving: joints that will move, as indices in a position vector; all by default.
             tolerated: contacts of held bodies that may stay but not deepen.
-            layers: the spheres to use; by default those that were chosen for the robot.
         """
         self.model: RobotModel = scene.model
-        self._layers = layers_for(scene.model) if layers is None else layers
         self._parts: list[PlacedGeometry] = placed_geometries(scene)
         self._pairs: WatchedPairs = watched_pairs(scene, self._parts, moving)
         depths = {frozenset((item.first.name, item.second.name)): item.depth for item in tolerated}
@@ -91,7 +86,7 @@ class ExactCollisionChecker:
 
     @cached_property
     def _compiled(self) -> CompiledWorld:
-        return compile_world(self.model, self._parts, self._moving_pairs, self._layers)
+        return compile_world(self.model, self._parts, self._moving_pairs)
 
     @property
     def compiled_world(self) -> World | None:
@@ -125,7 +120,7 @@ class ExactCollisionChecker:
         Args:
             check_interrupt: called between shapes; raises an exception to stop. What was built is kept.
         """
-        self._compiled = compile_world(self.model, self._parts, self._moving_pairs, self._layers, check_interrupt)
+        self._compiled = compile_world(self.model, self._parts, self._moving_pairs, check_interrupt)
 
     def is_free(self, positions: Array) -> bool:
         """Whether no pair that can move touches at these positions (of the whole robot)."""

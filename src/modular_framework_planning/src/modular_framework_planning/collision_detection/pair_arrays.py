@@ -22,7 +22,7 @@ from modular_framework_planning.collision_detection.body_arrays import (
 from modular_framework_planning.collision_detection.collision_bodies import KEPT_PAIRS, WatchedPairs
 from modular_framework_planning.collision_detection.kernels.compiled_collision import CELLS, FIELD, UNKNOWN
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
-from modular_framework_planning.collision_detection.kernels.compiled_spheres import meeting_joints
+from modular_framework_planning.collision_detection.kernels.compiled_reaches import meeting_joints
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import whole_tree
 from modular_framework_planning.kinematics.compiled_kinematics import Tree
@@ -31,7 +31,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairArrays:
-    """Pairs of bodies; what has the same name in World or Covers is explained there.
+    """Pairs of bodies; what has the same name in World is explained there.
 
     Attributes:
         solids: bodies of the world that the distance field holds.

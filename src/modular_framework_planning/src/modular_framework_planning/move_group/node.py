@@ -8,7 +8,6 @@ import time
 
 import rospy
 
-from modular_framework_planning.collision_detection.sphere_layers import choose_layers
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.move_group.capabilities.cartesian_path_service import CartesianPathService
@@ -140,10 +139,9 @@ def warm_up(context: MoveGroupContext) -> None:
     freeze_loaded_objects()
 
 
-def prepare_more(context: MoveGroupContext) -> None:
-    """Loads the compiled loops that no request has asked for yet, and measures which spheres make checks faster."""
+def prepare_more() -> None:
+    """Loads the compiled loops that no request has asked for yet."""
     compile_all()
-    choose_layers(context.model)
     freeze_loaded_objects()
 
 
@@ -169,7 +167,7 @@ def main() -> int:
         context.execution.describe(),
         time.monotonic() - begun,
     )
-    prepare_more(context)
+    prepare_more()
     rospy.spin()
     return 0
 

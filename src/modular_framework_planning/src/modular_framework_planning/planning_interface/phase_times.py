@@ -75,8 +75,8 @@ class PhaseTimes:
             return PlanStatistics(dict(self.seconds), run=self.run, processor_s=processor_s)
         counts = {}
         for phase, row in self._checks.items():
-            asked, free, touching, states, exactly, by_spheres = row.tolist()
+            asked, free, touching, states, exactly = row.tolist()
             if asked:
                 undecided = asked - free - touching
-                counts[phase] = CheckCounts(asked, free, touching, by_spheres, undecided, exactly, states)
+                counts[phase] = CheckCounts(asked, free, touching, undecided, exactly, states)
         return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals(), self.run, processor_s)

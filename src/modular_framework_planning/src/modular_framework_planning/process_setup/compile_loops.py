@@ -16,8 +16,7 @@ from pinocchio import SE3 as Transform
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.collision_detection.kernels.compiled_collision import arguments
 from modular_framework_planning.collision_detection.kernels.compiled_edges import GroupEdges, check_edges
-from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces, build_sphere_tree
-from modular_framework_planning.collision_detection.sphere_covers import balls_inside
+from modular_framework_planning.collision_detection.kernels.compiled_triangles import build_sphere_tree
 from modular_framework_planning.constraints import constrained_motion
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
 from modular_framework_planning.kinematics import compiled_kinematics
@@ -56,8 +55,7 @@ def compile_all() -> float:
     time_parameterization.warm_up()
     robot = _robot()
     constrained_motion.warm_up(robot)
-    spheres, boxes, children = build_sphere_tree(TETRAHEDRON)
-    balls_inside(Surfaces(spheres, boxes, children, TETRAHEDRON), 0, 1)
+    build_sphere_tree(TETRAHEDRON)
     _check_motions(_scene(robot, _voxels()))
     links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: a mesh needs an import of 0.3 s
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))

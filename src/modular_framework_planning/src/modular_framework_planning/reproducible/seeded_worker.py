@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from pinocchio import SE3 as Transform
 
-from modular_framework_planning.collision_detection.sphere_layers import choose_layers
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
@@ -109,9 +108,8 @@ def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> PlanningAnsw
 
 
 def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
-    """Does once for all children: loads loops and, with a motion of every group, meshes; measures which spheres pay."""
+    """Does once for all children: loads loops and, with a motion of every group, meshes."""
     compile_all()
-    choose_layers(model)
     far = Transform(np.eye(3), np.array([50.0, 0.0, 0.0]))
     scene = empty_scene(model).with_object(CollisionObject("far", far, ((Box(1.0, 1.0, 1.0), Transform.Identity()),)))
     straight = PlanningPipeline(model, kinematics, PipelineSettings(), _Straight(), make_adapters())

@@ -28,35 +28,11 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements
 
 CELLS = 128  # of a table along each joint, over a whole turn
-# checks asked for, found free, found touching; states looked at; checks that Coal found touching; checks that spheres
-# decided
-CHECK_COUNTS = 6
-ASKED, FOUND_FREE, FOUND_TOUCHING, LOOKED_AT, TOUCHING_EXACTLY, DECIDED_BY_SPHERES = range(CHECK_COUNTS)
+# checks asked for, found free, found touching; states looked at; checks that Coal found touching
+CHECK_COUNTS = 5
+ASKED, FOUND_FREE, FOUND_TOUCHING, LOOKED_AT, TOUCHING_EXACTLY = range(CHECK_COUNTS)
 FIELD = -1  # in place of a pair's second body: all solids of the field
 UNKNOWN, APART, NEAR = range(3)
-
-
-class Covers(NamedTuple):
-    """Spheres around the moving bodies, coarse to fine, and what a check with them needs besides.
-
-    Attributes:
-        spheres: a heap for each body, node i with the children 2 i + 1 and 2 i + 2: centre in the frame of the body's
-            joint and radius of a sphere around that part of the body, -1 for no such node; shape (b, nodes, 4). No
-            nodes: they are not used.
-        balls: inside of each body: centre in the frame of its joint and radius, 0 for none; shape (b, k, 4).
-        extents: how far the centres of each body are from the origin of its joint at most [m]; shape (b,).
-        lengths: how far each joint at zero is from the one it hangs on [m]; shape (joints,).
-        meets: the last joint that moves both bodies of each pair, -1 for none; shape (p,).
-        boxes: box around each solid of the field in the planning frame, least and largest corner, and half the distance
-            of two of its points [m]; endless and 0 for solids that are no box, cylinder or sphere; shape (n, 7).
-    """
-
-    spheres: Array
-    balls: Array
-    extents: Array
-    lengths: Array
-    meets: NDArray[np.int64]
-    boxes: Array
 
 
 class World(NamedTuple):
@@ -83,8 +59,8 @@ class World(NamedTuple):
         represented: the pairs for which each pair with FIELD stands, in the order of the field's solids; shape (f, n).
         counts: of checks, see CHECK_COUNTS; those of undecided checks that are asked again elsewhere are left out.
         refusals: in how many checks each pair touched, 0 for pairs with FIELD: those they stand for count; shape (p,).
+        meets: last joint that moves both bodies of each pair, -1 for none; shape (p,).
         field: the solids of the world that all bodies with such a pair are checked against.
-        covers: spheres around the bodies.
     """
 
     tree: Tree
@@ -108,8 +84,8 @@ class World(NamedTuple):
     represented: NDArray[np.int64]
     counts: NDArray[np.int64]
     refusals: NDArray[np.int64]
+    meets: NDArray[np.int64]
     field: DistanceField
-    covers: Covers
 
 
 @njit(cache=True, nogil=True)
@@ -245,7 +221,7 @@ def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
 
 def arguments(world: World) -> tuple[NDArray[Any], ...]:
     """Returns the arrays of a world one by one: numba takes 70 microseconds to recognise a tuple, 4 for these."""
-    return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:-2], *world.field, *world.covers)
+    return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:-1], *world.field)
 
 
 @njit(cache=True, nogil=True)
@@ -256,9 +232,9 @@ def world_of(arrays):  # type: ignore[no-untyped-def]
     """
     a = borrowed(arrays)
     tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
-    field, covers = DistanceField(*a[30:37]), Covers(*a[37:])
     bodies = (tree, a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], robot, scene)
-    return World(*bodies, a[20], a[21], a[22], a[23], a[24], a[25], a[26], a[27], a[28], a[29], field, covers)
+    pairs = (a[20], a[21], a[22], a[23], a[24], a[25], a[26], a[27], a[28], a[29], a[30])
+    return World(*bodies, *pairs, DistanceField(*a[31:]))
 
 
 @njit(cache=True, nogil=True)

@@ -19,7 +19,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_arrays impo
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
     APART,
     ASKED,
-    DECIDED_BY_SPHERES,
     FIELD,
     FOUND_FREE,
     FOUND_TOUCHING,
@@ -31,13 +30,6 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     solid_of,
     surrounded_pair,
     world_of,
-)
-from modular_framework_planning.collision_detection.kernels.compiled_covers import (
-    MOST_SOLIDS,
-    Batch,
-    find_open_pairs,
-    find_touching_pair,
-    new_batch,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import (
     CLEAR,
@@ -171,21 +163,20 @@ class Workspace(NamedTuple):
 
     stretch: Stretch
     memory: Memory
-    batch: Batch
     order: NDArray[np.int64]
 
 
 @njit(cache=True, nogil=True)
-def new_workspace(world, is_motion=True):  # type: ignore[no-untyped-def]
-    """Returns working memory for paths in a world; spheres are looked at on straight motions only."""
+def new_workspace(world):  # type: ignore[no-untyped-def]
+    """Returns working memory for path checks in a world."""
     joints, bodies = len(world.tree.parents), len(world.joints)
-    return Workspace(_new_stretch(joints, bodies), new_memory(), new_batch(world, is_motion), world.watched.copy())
+    return Workspace(_new_stretch(joints, bodies), new_memory(), world.watched.copy())
 
 
 @njit(cache=True, nogil=True)
 def release(workspace):  # type: ignore[no-untyped-def]
     """Marks where working memory was used last: until here it has an owner."""
-    workspace.stretch.motions[:], workspace.memory.bounds[0], workspace.batch.numbers[0] = 0.0, 0.0, 0
+    workspace.stretch.motions[:], workspace.memory.bounds[0] = 0.0, 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -359,7 +350,7 @@ def check_path(world, samples, first, undecided):  # type: ignore[no-untyped-def
         (status, number): TOUCHING with the number of a sample that touches; TOO_CLOSE with the number of undecided
         entries, more than n when they do not fit; CLEAR with the number of samples looked at.
     """
-    workspace = new_workspace(world, len(samples.numbers) == 2)
+    workspace = new_workspace(world)
     result = check_samples(world, borrowed(samples), first, undecided, borrowed(workspace))
     release(workspace)
     return result
@@ -381,7 +372,7 @@ def _move_to_front(order, pair):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def check_samples(world, samples, first, undecided, workspace):  # type: ignore[no-untyped-def]
     """Does what check_path does, in given working memory; none of the arrays should have an owner (see `borrowed`)."""
-    stretch, memory, batch, order = workspace
+    stretch, memory, order = workspace
     pairs, margins, spheres, kinds, sizes = world.pairs, world.margins, world.spheres, world.kinds, world.sizes
     tables, table_joints, table_of = world.tables, world.table_joints, world.table_of
     parents, prismatic, hangs_on, field = world.tree.parents, world.tree.prismatic, world.joints, world.field
@@ -392,31 +383,14 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
     active[:used] = order
     ranges[0], ranges[1] = (last, last, 0, used), (first, last - 1, 0, used)
     head, tail, looked_at, open_questions = 0, 2, 0, 0
-    covers, is_motion, few_solids = world.covers, len(samples.numbers) == 2, len(world.covers.boxes) <= MOST_SOLIDS
-    has_balls, has_spheres = covers.balls.shape[1] > 0 and few_solids, covers.spheres.shape[1] > 0 and few_solids
     while head < tail:
         low, high, begin, end = ranges[head, 0], ranges[head, 1], ranges[head, 2], ranges[head, 3]
         head += 1
         if low > high:
             continue
-        if has_spheres and is_motion and head == 2:  # the end is free
-            used = find_open_pairs(world, samples.vertices, last, batch)
-            if used == 0:
-                counts[DECIDED_BY_SPHERES] += open_questions == 0
-                break
-            active[:used] = batch.pairs[:used]
-            end = used
         middle, kept, share = (low + high) // 2, used, 1.0
         is_long = look_at(world, samples, low, high, looked_at == 0, stretch) > LONG_MOTION
         looked_at += 1
-        if head == 1 and has_balls:
-            pair, number = find_touching_pair(world, order, stretch.placements)
-            if pair >= 0:
-                counts[LOOKED_AT] += 1
-                counts[DECIDED_BY_SPHERES] += 1
-                refusals[represented[pair - len(pairs) + len(represented), number]] += 1
-                _move_to_front(order, pair)
-                return TOUCHING, middle
         moves = low < high and not is_long
         active = _with_room(active, used + end - begin)
         for index in range(begin, end):
@@ -438,7 +412,7 @@ def check_samples(world, samples, first, undecided, workspace):  # type: ignore[
                     continue
             else:
                 if moves:
-                    common = covers.meets[pair]
+                    common = world.meets[pair]
                     if common < 0:
                         needed += motions[one] + motions[two]
                     else:

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far the ends of what joints carry are from them, compiled."""
+"""Measures a kinematic tree: distances from joints to what they carry, and joints that two bodies share, compiled."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
+from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD
 
 
 @njit(cache=True, nogil=True)
@@ -40,3 +42,30 @@ def ways_to_ends(parents, placements, joints, poses, spheres):  # type: ignore[n
         if parents[joint] >= 0:
             result[parents[joint]] = max(result[parents[joint]], lengths[joint] + result[joint])
     return result
+
+
+@njit(cache=True, nogil=True)
+def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
+    """Returns the last joint that both joints depend on, -1 for none."""
+    while first != second:  # parents come before children
+        if first > second:
+            first = parents[first]
+        else:
+            second = parents[second]
+    return first
+
+
+@njit(cache=True, nogil=True)
+def meeting_joints(pairs, joints, parents):  # type: ignore[no-untyped-def]
+    """Returns the last joint that moves both bodies of each pair, see World.meets.
+
+    Args:
+        pairs: Body numbers, shape (p, 2); the second one is FIELD for solids of the world.
+        joints: Joint that moves each body, -1 for the world; shape (b,).
+        parents: Parent of each joint, see Tree.
+    """
+    meets = np.full(len(pairs), -1)
+    for pair in range(len(pairs)):
+        if pairs[pair, 1] != FIELD:
+            meets[pair] = _common_joint(parents, joints[pairs[pair, 0]], joints[pairs[pair, 1]])
+    return meets

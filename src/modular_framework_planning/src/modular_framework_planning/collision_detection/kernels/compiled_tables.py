@@ -101,39 +101,3 @@ def fill_cells(world, pair, reach):  # type: ignore[no-untyped-def]
         for j in range(column, column + columns):
             if world.tables[table, i % CELLS, j % CELLS] == UNKNOWN:
                 _fill_cell(world, table, pair, i % CELLS, j % CELLS)
-
-
-@njit(cache=True, nogil=True)
-def line_answer(tables, table, joints, first, last):  # type: ignore[no-untyped-def]
-    """Returns what a table says about its links all along the straight line between two positions.
-
-    The arguments are those of table_answer, positions of all joints in place of their reach, and so is the answer.
-    """
-    near, far, width = joints[table, 0], joints[table, 1], 2.0 * np.pi / CELLS
-    begin, change = first[near] / width, (last[near] - first[near]) / width
-    begin_far, change_far = 0.0, 0.0
-    if far >= 0:
-        begin_far, change_far = first[far] / width, (last[far] - first[far]) / width
-    pieces = int(max(abs(change), abs(change_far))) + 1  # none of them is longer than a cell
-    for piece in range(pieces):
-        one, two = begin + piece / pieces * change, begin + (piece + 1) / pieces * change
-        one_far, two_far = begin_far + piece / pieces * change_far, begin_far + (piece + 1) / pieces * change_far
-        for row in range(int(np.floor(min(one, two))), int(np.floor(max(one, two))) + 1):
-            for column in range(int(np.floor(min(one_far, two_far))), int(np.floor(max(one_far, two_far))) + 1):
-                if tables[table, row % CELLS, column % CELLS] != APART:
-                    return int(tables[table, row % CELLS, column % CELLS])
-    return APART
-
-
-@njit(cache=True, nogil=True)
-def fill_line(world, pair, first, last):  # type: ignore[no-untyped-def]
-    """Fills the cells of a pair's table along the straight line between two positions, see line_answer."""
-    table, reach = world.table_of[pair], np.empty((2, len(first)))
-    pieces = 1
-    for joint in world.table_joints[table]:
-        if joint >= 0:
-            pieces = max(pieces, int(abs(last[joint] - first[joint]) / (2.0 * np.pi / CELLS)) + 1)
-    for piece in range(pieces):
-        one, two = first + piece / pieces * (last - first), first + (piece + 1) / pieces * (last - first)
-        reach[0], reach[1] = np.minimum(one, two), np.maximum(one, two)
-        fill_cells(world, pair, reach)
