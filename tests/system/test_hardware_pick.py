@@ -105,6 +105,62 @@ def test_an_object_is_picked_and_held_by_arm_and_gripper(session: RosSession, tm
     assert np.max(np.abs(actual - commanded)) < 0.15  # the arm's lag
 
 
+# Runs as a node of its own and cuts the power of the gripper's servo a moment after the fingers are commanded to grasp.
+CUTTER = """
+import sys, threading, time
+import rosgraph, rospy
+from modular_framework_core.msg import GraspActionGoal, GraspCommand
+from modular_framework_drivers.emulators.command_port import send_command
+while not rosgraph.is_master_online():
+    time.sleep(0.05)
+rospy.init_node("cutter", anonymous=True, disable_signals=True)
+cut = threading.Event()
+def on_goal(message):
+    if message.goal.grasp_command.grasp_state == GraspCommand.GRASP_STATE and not cut.is_set():
+        time.sleep(0.25)
+        send_command(int(sys.argv[1]), "power_off")
+        print(time.time(), flush=True)
+        cut.set()
+rospy.Subscriber("/moveit_grasp_action_server/goal", GraspActionGoal, on_goal)
+cut.wait()
+"""
+
+
+def test_a_gripper_that_loses_its_power_as_it_closes_ends_the_task_and_the_arm_does_not_lift(
+    session: RosSession, tmp_path: Path
+) -> None:
+    draw = random.Random(os.urandom(8))
+    address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
+    port, path_log, command_port = tmp_path / "gripper", tmp_path / "path.csv", free_port()
+    cutter = subprocess.Popen(
+        [sys.executable, "-c", CUTTER, str(command_port)], env=session.env, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        emulators = session.launch_package(
+            "modular_framework_drivers",
+            "emulators.launch",
+            arm_address=address,
+            arm_log=path_log,
+            gripper_port=port,
+            gripper_object=1.3,
+            gripper_command_port=command_port,
+        )
+        framework = session.launch(WRAPPER, arm_address=address, port=port, own_server="false")
+        framework.wait(TASK_TIMEOUT_S)
+        cut_s = float(cutter.communicate(timeout=10)[0].splitlines()[-1])
+    finally:
+        cutter.kill()
+    log = framework.log()
+    assert "Task 'pick_and_hold' ended with outcome 'successful_pipeline'" not in log, log
+    assert "EzGripper: servo 1 on" in log and "does not answer" in log, log
+    assert "stopped on something" not in log, log
+    emulators.stop()
+    with path_log.open() as file:
+        after = [[float(value) for value in row[8:14]] for row in list(csv.reader(file))[1:] if float(row[0]) > cut_s]
+    assert len(after) > 20
+    assert np.abs(np.array(after) - after[0]).max() < 1e-3, "the arm moved"
+
+
 def read_path(log: Path) -> tuple[np.ndarray, np.ndarray]:
     """Commanded and actual joint positions of every cycle that the arm's controller logged, shape (cycles, 6)."""
     with log.open() as file:

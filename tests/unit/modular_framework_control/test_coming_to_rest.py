@@ -65,7 +65,7 @@ class Nothing:
     def connect(self) -> None:
         pass
 
-    def wait(self, timeout_s: float, ended: threading.Event) -> None:
+    def wait(self, timeout_s: float, ended: threading.Event, fault: object) -> None:
         ended.wait()
 
     def close(self) -> None:

@@ -24,7 +24,7 @@ class Noted:
     def connect(self) -> None:
         pass
 
-    def wait(self, timeout_s: float, ended: threading.Event) -> None:
+    def wait(self, timeout_s: float, ended: threading.Event, fault: object) -> None:
         ended.wait()
 
     def stop_all(self) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -31,6 +32,16 @@ def started_line(folder: Path) -> DynamixelLine:
     line = DynamixelLine([finger], folder / "gripper")
     line.connect()
     return line
+
+
+def calibrated(robot_hw: RobotHW) -> RobotHW:
+    """The hardware, once its gripper is calibrated and has been read."""
+    end_s = time.monotonic() + 15.0
+    while not robot_hw.initialised:
+        assert time.monotonic() < end_s, robot_hw.fault()
+        time.sleep(0.01)
+    robot_hw.read(0.0, 0.0)
+    return robot_hw
 
 
 class TestEzGripper(RobotHWConformance):
@@ -67,7 +78,7 @@ class TestEzGripper(RobotHWConformance):
         root = MappingNodeHandle({"hand": gripper, "joint_limits": {JOINT: KNUCKLE}})
         robot_hw = EzGripperRobotHW()
         assert robot_hw.init(root, root.child("hand"))
-        return robot_hw
+        return calibrated(robot_hw)
 
     def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> RobotHW:
         if positions is None:
@@ -97,7 +108,7 @@ class TestCombination(TestEzGripper):
         kinds: dict[str, type[RobotHW]] = {"lab/Mock": MockRobotHW, "lab/Hand": EzGripperRobotHW}
         robot_hw = CombinedRobotHW(lambda name: kinds[name]())
         assert robot_hw.init(root, root)
-        return robot_hw
+        return calibrated(robot_hw)
 
     def limits(self) -> Mapping[str, JointLimits]:
         return {**super().limits(), **dict.fromkeys(("shoulder", "elbow"), JointLimits(-1.0, 1.0, 2.0))}

@@ -8,6 +8,7 @@ import itertools
 import logging
 import math
 import os
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -347,6 +348,25 @@ def test_packages_that_come_late_or_not_at_all_do_not_move_the_arm_elsewhere(rig
     assert rig.arm.positions() == pytest.approx([position + 0.2 for position in start], abs=1e-3)
     rig.arm.command("restore")
     rig.run(1.0, start)
+
+
+def test_flipped_bits_are_endured_or_named_and_never_read_as_a_mode(rig: Rig) -> None:
+    start = rig.positions
+    rig.arm.command("corrupt", every=3)
+    for _ in range(250):
+        rig.cycle(start)
+        assert rig.hw.fault() == ""
+    rig.arm.command("corrupt", every=1)
+    rig.until(lambda: rig.hw.fault() != "")
+    assert "only damaged data from the arm" in rig.hw.fault() or "closed the connection" in rig.hw.fault()
+
+
+def test_a_slow_link_is_a_warning_and_one_slower_than_the_timeout_is_lost(rig: Rig) -> None:
+    rig.arm.command("delay", seconds=0.2)
+    rig.until(lambda: re.search(r"states of the arm at \S+ come 0\.[23]\d s late", rig.hw.warning()) is not None)
+    rig.arm.command("delay", seconds=1.2)
+    rig.until(lambda: "link to the arm" in rig.hw.fault())
+    rig.until(lambda: "s late, longer than link_timeout (1 s)" in rig.hw.fault())
 
 
 def test_closing_stops_the_arm_and_its_program(make_rig: Callable[..., Rig]) -> None:

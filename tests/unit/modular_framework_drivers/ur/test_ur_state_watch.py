@@ -57,6 +57,13 @@ def test_a_joint_that_turns_without_end_has_turned_often() -> None:
         {"positions": (math.nan, *SIX[1:])},
         {"positions": (101.0, *SIX[1:])},
         {"positions": (0.3, *SIX[1:])},
+        {"timestamp_s": 5.008 + 2.0**20},
+        {"velocities": (1e200, *SIX[1:])},
+        {"currents": (math.nan, *SIX[1:])},
+        {"wrench": (*SIX[1:], 1e9)},
+        {"safety_mode": 1048577},
+        {"robot_mode": 7 - 2**31},
+        {"runtime_state": 2 + 2**24},
     ],
 )
 def test_garbage_does_not_follow(changes: dict[str, object]) -> None:

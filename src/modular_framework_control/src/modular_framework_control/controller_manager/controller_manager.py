@@ -105,6 +105,10 @@ class ControllerManager:
 
     # ---- control loop ----
 
+    def watch_hardware(self) -> None:
+        """Reads the faults of hardware that is not ready for controllers; in each cycle until it is."""
+        self._watch.faults(log=False)
+
     @property
     def moving(self) -> bool:
         """Whether a running controller carries out a goal."""

@@ -23,8 +23,8 @@ class FaultWatch:
         self._robot_hw = robot_hw
         self.text = ""
 
-    def faults(self) -> Sequence[HardwareFault]:
-        """Returns the faults at the moment, with the joints they concern; never raises."""
+    def faults(self, log: bool = True) -> Sequence[HardwareFault]:
+        """Returns the faults at the moment, with the joints they concern, and logs a change; never raises."""
         try:
             faults = self._robot_hw.faults()
             if faults:  # user code may return values of any type
@@ -34,7 +34,10 @@ class FaultWatch:
                 HardwareFault(f"fault() raised {type(error).__name__}: {error}", self._robot_hw.commanded_joints),
             )
         if faults or self.text:
-            self._log_change("; ".join(fault.reason for fault in faults))
+            text = "; ".join(fault.reason for fault in faults)
+            if log:
+                self._log_change(text)
+            self.text = text
         return faults
 
     def _log_change(self, text: str) -> None:
@@ -42,4 +45,3 @@ class FaultWatch:
             LOGGER.error("hardware fault: %s; controllers of its joints hold until it is over", text)
         elif not text:
             LOGGER.info("the hardware follows again (it did not for: %s)", self.text)
-        self.text = text

@@ -384,7 +384,7 @@ class JointTrajectoryController(Controller):
                 self._finish(
                     GoalStatus.ABORTED,
                     TrajectoryErrorCode.PATH_TOLERANCE_VIOLATED,
-                    f"path tolerance violated: {outside}",
+                    f"path tolerance violated: {outside}{self._possible_cause()}",
                 )
             return bool(outside)
         outside = violations(error, tolerances.goal, self.joint_names)
@@ -395,10 +395,14 @@ class JointTrajectoryController(Controller):
                 GoalStatus.ABORTED,
                 TrajectoryErrorCode.GOAL_TOLERANCE_VIOLATED,
                 f"goal tolerance violated {late_s:.6g} s after the end of the trajectory (goal_time "
-                f"{tolerances.goal_time_s:.6g} s): {outside}",
+                f"{tolerances.goal_time_s:.6g} s): {outside}{self._possible_cause()}",
             )
             return True
         return False
+
+    def _possible_cause(self) -> str:
+        warning = self.robot_hw.warning()
+        return f"; {warning}" if warning else ""
 
     def _finish(self, status: GoalStatus, code: TrajectoryErrorCode, text: str) -> None:
         goal, self._active = self._active, None

@@ -98,6 +98,13 @@ class CombinedRobotHW(RobotHW):
             except Exception as error:  # a user's hardware may raise anything; the others must be closed all the same
                 LOGGER.exception("hardware '%s': close() raised %s: %s", part.name, type(error).__name__, error)
 
+    @property
+    def initialised(self) -> bool:
+        return all(part.hardware.initialised for part in self._parts)
+
+    def warning(self) -> str:
+        return "; ".join(filter(None, (part.hardware.warning() for part in self._parts)))
+
     def fault(self) -> str:
         return "; ".join(fault.reason for fault in self.faults())
 

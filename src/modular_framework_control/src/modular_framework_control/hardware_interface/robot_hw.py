@@ -136,6 +136,15 @@ class RobotHW:
         """
         return ""
 
+    @property
+    def initialised(self) -> bool:
+        """Whether what `init` began (a calibration) is done; controllers are loaded from then on."""
+        return True
+
+    def warning(self) -> str:
+        """Returns what may keep joints from following though they are commanded (a slow link); "" for nothing."""
+        return ""
+
     def faults(self) -> Sequence[HardwareFault]:
         """Returns the fault with its joints; hardware made of several parts has one entry per part with a fault."""
         reason = self.fault()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import rospy
@@ -14,6 +14,10 @@ from std_msgs.msg import Bool
 from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+
+WAIT_PERIOD_S = 0.05
+USUAL_START_S = 3.0
+"""A fault that a start takes longer than this to clear is logged [s]."""
 
 
 class HardwareNotReadyError(Exception):
@@ -61,10 +65,11 @@ class HardwareReadiness:
 
     Args:
         topics: of the hardware that is awaited and of the hardware to announce; all are std_msgs/Bool, latched.
+        robot_hw: the hardware.
     """
 
-    def __init__(self, topics: ReadyTopics) -> None:
-        self._topics = topics
+    def __init__(self, topics: ReadyTopics, robot_hw: RobotHW) -> None:
+        self._topics, self._robot_hw = topics, robot_hw
         self._ready = {name: threading.Event() for name in topics.awaited}
         self._subscribers: list[rospy.Subscriber] = []
         self._publishers: list[rospy.Publisher] = []
@@ -79,30 +84,39 @@ class HardwareReadiness:
         if message.data:
             event.set()
 
-    def wait(self, timeout_s: float, ended: threading.Event) -> None:
-        """Waits until every awaited hardware has published True, or the node is shut down.
+    def wait(self, timeout_s: float, ended: threading.Event, fault: Callable[[], str]) -> None:
+        """Waits until all hardware is ready and every awaited one has published True, or the node is shut down.
 
         Args:
             timeout_s: how long to wait for all of them together [s of real time].
             ended: set to end the wait.
+            fault: returns the fault of the hardware; logged when it lasts.
 
         Raises:
             HardwareNotReadyError: not all have; names each that has not.
         """
-        deadline = time.monotonic() + timeout_s
-        while not all(event.wait(0.05) for event in self._ready.values()):
+        begun_s, logged = time.monotonic(), ""
+        while not (self._robot_hw.initialised and all(event.is_set() for event in self._ready.values())):
+            time.sleep(WAIT_PERIOD_S)
             if rospy.is_shutdown() or ended.is_set():
                 return
-            if time.monotonic() > deadline:
-                missing = ", ".join(
-                    f"topic {self._topics.awaited[name]} of hardware '{name}'"
-                    for name, event in self._ready.items()
-                    if not event.is_set()
-                )
+            cause, waited_s = fault(), time.monotonic() - begun_s
+            if waited_s > timeout_s:
                 raise HardwareNotReadyError(
-                    f"waited {timeout_s:g} s in vain for True on {missing}; is the hardware "
-                    "switched on and connected? (~ready_timeout gives it longer)"
+                    f"waited {timeout_s:g} s in vain for {self._missing()}; "
+                    f"{cause or 'is the hardware switched on and connected?'} (~ready_timeout gives it longer)"
                 )
+            if cause != logged and waited_s > USUAL_START_S:
+                rospy.logwarn("hardware not ready: %s", cause or "no fault any more")
+                logged = cause
+
+    def _missing(self) -> str:
+        topics = [
+            f"True on topic {self._topics.awaited[name]} of hardware '{name}'"
+            for name, event in self._ready.items()
+            if not event.is_set()
+        ]
+        return ", ".join(topics) or "the hardware"
 
     def announce(self) -> None:
         """Publishes True, latched, for the hardware that does not do so itself."""

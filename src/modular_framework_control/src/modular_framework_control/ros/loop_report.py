@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,17 +17,17 @@ from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.realtime.cycle_pacer import LoopFigures, LoopStatistics
 from modular_framework_ros.publishing import publish
 
-REPORT_PERIOD_S = 1.0
+REPORT_PERIOD_S, WATCH_PERIOD_S = 1.0, 0.1
 OVERRUN_WARNING_PERIOD_S = 10.0
 
 
 class LoopReport:
-    """Publishes `/diagnostics` (diagnostic_msgs/DiagnosticArray) once a second of real time.
+    """Publishes `/diagnostics` (diagnostic_msgs/DiagnosticArray) once a second of real time, and at each new fault.
 
     The service `~reset_statistics` (std_srvs/Empty) resets the statistics.
 
-    The status is a warning when cycles were late since the last message or joints stand outside their range, an error
-    when the hardware has a fault.
+    The status is a warning when cycles were late since the last message, joints stand outside their range or the
+    hardware warns, an error when the hardware has a fault.
     Values: `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
     `work_max_us`, `no_processor_us` (total time that the loop was due and had no processor),
     `no_processor_max_us` (the longest such time), `fault`, `outside_limits`.
@@ -35,17 +36,17 @@ class LoopReport:
         statistics: figures that the loop writes.
         period_s: period of the loop [s].
         robot_hw: what the loop drives.
-        fault: returns the fault of the hardware, "" for none.
+        health: returns the fault of the hardware and its warning; "" for none.
     """
 
     def __init__(
-        self, statistics: LoopStatistics, period_s: float, robot_hw: RobotHW, fault: Callable[[], str]
+        self, statistics: LoopStatistics, period_s: float, robot_hw: RobotHW, health: Callable[[], tuple[str, str]]
     ) -> None:
         self._statistics = statistics
         self._period_s = period_s
         self._robot_hw = robot_hw
         self._outside: frozenset[str] = frozenset()
-        self._fault = fault
+        self._health = health
         self._late = 0
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._work, name="loop_report", daemon=True)
@@ -71,13 +72,17 @@ class LoopReport:
         return EmptyResponse()
 
     def _work(self) -> None:
-        while not self._ended.wait(REPORT_PERIOD_S) and not rospy.is_shutdown():
-            self._publish(self._statistics.figures())
+        reported, due_s = ("", ""), time.monotonic() + REPORT_PERIOD_S
+        while not self._ended.wait(WATCH_PERIOD_S) and not rospy.is_shutdown():
+            health, now_s = self._health(), time.monotonic()
+            if health != reported or now_s >= due_s:
+                self._publish(self._statistics.figures(), *health)
+                reported, due_s = health, now_s + REPORT_PERIOD_S
 
-    def _publish(self, figures: LoopFigures) -> None:
+    def _publish(self, figures: LoopFigures, fault: str, warning: str) -> None:
         late = figures.missed + figures.overruns
         late_since_last, self._late = late > self._late, late
-        fault, outside = self._fault(), self._report_joints_outside()
+        outside = self._report_joints_outside()
         text = (
             f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles took too long, "
             f"{figures.missed} were left out"
@@ -92,9 +97,9 @@ class LoopReport:
         status = DiagnosticStatus(
             name=f"{rospy.get_name().lstrip('/')}: control loop",
             hardware_id=type(self._robot_hw).__name__,
-            message="; ".join(filter(None, (fault and f"hardware fault: {fault}", outside, text))),
+            message="; ".join(filter(None, (fault and f"hardware fault: {fault}", warning, outside, text))),
         )
-        level = DiagnosticStatus.WARN if late_since_last or outside else DiagnosticStatus.OK
+        level = DiagnosticStatus.WARN if late_since_last or outside or warning else DiagnosticStatus.OK
         status.level = DiagnosticStatus.ERROR if fault else level
         values = {
             "rate": 1.0 / self._period_s,

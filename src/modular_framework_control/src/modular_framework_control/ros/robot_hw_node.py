@@ -86,6 +86,7 @@ class RobotHwNode:
         self._connected = threading.Event()
         self._failure = ""
         self._statistics = LoopStatistics(self._period_s)
+        self._report = LoopReport(self._statistics, self._period_s, self._robot_hw, self._health)
         self._last_s = 0.0
 
     def connect(self) -> None:
@@ -95,16 +96,15 @@ class RobotHwNode:
             ParameterError: the hardware refused its parameters.
         """
         self._warn_of_a_description_elsewhere()
+        self._report.connect()
         if not self._robot_hw.init(self._root_nh, self._hw_nh):
             raise ParameterError(
                 f"{self._nh.namespace}: hardware {type(self._robot_hw).__name__} did not initialise; "
                 "its own message above says why"
             )
-        self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh))
+        self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh), self._robot_hw)
         self._readiness.connect()
         self._manager = RosControllerManager(self._robot_hw, rospy.get_namespace(), loop_time=self._loop_time)
-        self._report = LoopReport(self._statistics, self._period_s, self._robot_hw, self._fault)
-        self._report.connect()
 
     def _warn_of_a_description_elsewhere(self) -> None:
         if (
@@ -118,12 +118,16 @@ class RobotHwNode:
                 self._root_nh.namespace,
             )
 
-    def _fault(self) -> str:
-        return self._manager.manager.fault if self._manager is not None else ""
+    def _health(self) -> tuple[str, str]:
+        """The fault of the hardware and its warning."""
+        if self._manager is None:
+            return "the hardware is being initialised", ""
+        return self._manager.manager.fault, self._robot_hw.warning()
 
     def close(self) -> None:
         """Closes the hardware; may be called twice."""
         self._robot_hw.close()
+        self._report.close()
 
     def run(self) -> bool:
         """Runs the control loop until `ended` is set; then stops all controllers and brings the robot to rest.
@@ -180,6 +184,7 @@ class RobotHwNode:
             manager.update(time_s, period_s)
         else:
             self._robot_hw.seed_commands()
+            manager.manager.watch_hardware()
         self._robot_hw.write(time_s, period_s)
         self._statistics.add(late_s, missed, time.perf_counter() - begun_s, woken_late_s)
         return self._goes_on()
@@ -237,7 +242,7 @@ class RobotHwNode:
     def _get_ready(self, manager: RosControllerManager) -> None:
         """Waits for the hardware and opens the services, beside the loop, which the hardware may need to get ready."""
         try:
-            self._readiness.wait(self._ready_timeout_s, self._ended)
+            self._readiness.wait(self._ready_timeout_s, self._ended, lambda: manager.manager.fault)
             if rospy.is_shutdown() or self._ended.is_set():
                 return
             manager.connect()

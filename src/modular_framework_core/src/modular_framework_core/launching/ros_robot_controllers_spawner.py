@@ -18,6 +18,7 @@ from controller_manager_msgs.srv import (
     SwitchController,
     SwitchControllerRequest,
 )
+from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool
 
 from modular_framework_core.launching.robot_controllers_spawner import (
@@ -34,6 +35,8 @@ from modular_framework_core.launching.robot_controllers_spawner import (
 from modular_framework_ros.calls import CallError, call_service
 from modular_framework_ros.start_up import start_timeout
 
+LOOP_STATUS = ": control loop"
+"""End of the name of a control loop's status in `/diagnostics`."""
 CALL_TIMEOUT_S = 30.0
 """Longest wait for the controller manager's answer [s]; the manager itself waits 10 s for a stopped loop."""
 
@@ -49,8 +52,9 @@ class RobotControllersSpawner:
     default `/start_timeout`: how long to wait for the hardware and for the controller manager; `~stay_alive` false:
     keep the node alive after success (for launch files that require it). Read besides: `/robot_hardware`,
     `/<hardware>/topic_to_wait_for`.
-    Subscribes those topics (std_msgs/Bool). Calls `controller_manager/{list_controllers, load_controller,
-    switch_controller}`. Uploads the controller file to the parameter server's root.
+    Subscribes those topics (std_msgs/Bool), and `/diagnostics` for the faults that keep hardware from being ready.
+    Calls `controller_manager/{list_controllers, load_controller, switch_controller}`.
+    Uploads the controller file to the parameter server's root.
 
     Args:
         robot_package: ROS package with a folder `controllers`.
@@ -59,6 +63,7 @@ class RobotControllersSpawner:
 
     def __init__(self, robot_package: str, controller_file: str) -> None:
         self._warn_after_s = _seconds("~timeout", 10.0)
+        self._faults: dict[str, str] = {}
         self._give_up_after_s = _seconds("~give_up_after", start_timeout())
         try:
             folder = Path(rospkg.RosPack().get_path(robot_package))
@@ -175,22 +180,28 @@ class RobotControllersSpawner:
                 if not event.is_set()
             )
 
+        subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics))
         self._wait(lambda: not missing(), missing, "is the hardware connected and its driver running?")
         for subscriber in subscribers:
             subscriber.unregister()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.endswith(LOOP_STATUS):
+                self._faults[status.name] = next((value.value for value in status.values if value.key == "fault"), "")
 
     def _wait(self, done: Callable[[], bool], what: Callable[[], str], advice: str) -> None:
         """Polls `done` in real time; warns every `~timeout`, gives up after `~give_up_after`."""
         started = warned = time.monotonic()
         while not done():
-            now = time.monotonic()
+            now, cause = time.monotonic(), "; ".join(filter(None, self._faults.values()))
             if rospy.is_shutdown():
                 raise SpawnError(f"shut down while waiting for {what()}")
             if now - started > self._give_up_after_s:
-                raise SpawnError(f"waited {now - started:.0f} s for {what()} in vain; {advice}")
+                raise SpawnError(f"waited {now - started:.0f} s for {what()} in vain; {cause or advice}")
             if now - warned > self._warn_after_s:
                 warned = now
-                rospy.logwarn("still waiting for %s after %.0f s; %s", what(), now - started, advice)
+                rospy.logwarn("still waiting for %s after %.0f s; %s", what(), now - started, cause or advice)
             time.sleep(0.05)
 
 

@@ -27,7 +27,7 @@ from modular_framework_drivers.emulators.ur_controller import HOME, MODELS, UrCo
 from modular_framework_drivers.emulators.ur_dashboard import BANNER, DashboardReceiver
 from modular_framework_drivers.emulators.ur_links import LinkFaults, Links, Session
 from modular_framework_drivers.emulators.ur_motion import JOINTS
-from modular_framework_drivers.emulators.ur_rtde_server import RtdeServer, RtdeSession
+from modular_framework_drivers.emulators.ur_rtde_server import REFUSALS, RtdeServer, RtdeSession
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
 RTDE_PORT, SCRIPT_PORTS, DASHBOARD_PORT, COMMAND_PORT = 30004, (30001, 30002, 30003), 29999, 29901
@@ -158,6 +158,18 @@ class UrEmulator:
             raise ValueError(f"every={every}: expected a whole number of at least 0")
         self._links.faults.lose_every = int(every)
 
+    def inject_corrupt(self, every: int) -> None:
+        """Flip bits in each `every`-th data package; 0 for none."""
+        if every < 0:
+            raise ValueError(f"every={every}: expected a whole number of at least 0")
+        self._links.faults.corrupt_every = int(every)
+
+    def inject_refuse(self, what: str) -> None:
+        """Refuse the `protocol` of clients, or have software of an old `version`, until `restore`."""
+        if what not in REFUSALS:
+            raise ValueError(f"what={what}: expected one of {', '.join(filter(None, REFUSALS))}")
+        self._rtde.refusal = what
+
     def inject_garbage(self, count: int = 64) -> None:
         """Send this many random bytes between the data packages."""
         self._links.send_to_all(os.urandom(int(count)), time.monotonic())
@@ -165,6 +177,7 @@ class UrEmulator:
     def command_restore(self) -> None:
         """End all faults of the network."""
         self._links.faults = LinkFaults()
+        self._rtde.refusal = ""
         self._links.connect()
 
     def inject_protective_stop(self) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import random
 import selectors
 import socket
 from collections import deque
@@ -11,6 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 LOGGER = logging.getLogger("rosout.ur_emulator")
+_HEADER_BYTES = 4  # length, type and recipe of a data package
 _MAX_WAITING = 2_000  # packages that may wait for a client that does not read
 
 
@@ -22,11 +24,13 @@ class LinkFaults:
         frozen: nothing gets through in either direction, though all connections stay open.
         delay_s: how late everything the controller sends arrives [s].
         lose_every: every n-th data package is lost; 0 for none.
+        corrupt_every: every n-th data package has flipped bits; 0 for none.
     """
 
     frozen: bool = False
     delay_s: float = 0.0
     lose_every: int = 0
+    corrupt_every: int = 0
 
 
 class Session:
@@ -137,6 +141,8 @@ class Links:
                 if package:
                     connection.packages += 1
                     lost = self.faults.lose_every and connection.packages % self.faults.lose_every == 0
+                    if self.faults.corrupt_every and connection.packages % self.faults.corrupt_every == 0:
+                        package = _with_flipped_bits(package)
                     if not lost:
                         self._queue(connection, package, now_s)
             self._flush(connection, now_s)
@@ -208,3 +214,11 @@ class Links:
         connection.socket.close()
         if connection.session.close is not None:
             connection.session.close()
+
+
+def _with_flipped_bits(package: bytes) -> bytes:
+    """The package with a random bit flipped in each word of eight bytes after its header."""
+    damaged = bytearray(package)
+    for start in range(_HEADER_BYTES, len(package), 8):
+        damaged[random.randrange(start, min(start + 8, len(package)))] ^= 1 << random.randrange(8)
+    return bytes(damaged)

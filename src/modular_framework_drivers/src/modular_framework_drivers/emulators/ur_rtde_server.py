@@ -18,6 +18,8 @@ from modular_framework_drivers.emulators.ur_motion import flange_pose
 _PROTOCOL, _VERSION, _DATA = ord("V"), ord("v"), ord("U")
 _OUTPUTS, _INPUTS, _START, _PAUSE = ord("O"), ord("I"), ord("S"), ord("P")
 _HEADER = struct.Struct(">HB")
+_OLD = (3, 3, 0, 0)
+REFUSALS = ("", "protocol", "version")
 _FORMATS = {
     "DOUBLE": "d",
     "INT32": "i",
@@ -208,6 +210,9 @@ class RtdeServer:
 
     Args:
         controller: whose variables they are.
+
+    Attributes:
+        refusal: one of `REFUSALS`: which request of a client is refused, or answered with an old version.
     """
 
     def __init__(self, controller: UrController) -> None:
@@ -215,6 +220,7 @@ class RtdeServer:
         self.outputs = output_variables(controller)
         self.inputs = input_variables(controller)
         self.owners: dict[str, RtdeSession] = {}
+        self.refusal = ""
 
 
 class RtdeSession:
@@ -233,8 +239,10 @@ class RtdeSession:
         self._cycles = 0
         self._started = False
         self._answers: dict[int, Callable[[bytes], bytes]] = {
-            _PROTOCOL: lambda payload: b"\x01" if payload[-1:] == b"\x02" else b"\x00",
-            _VERSION: lambda _: struct.pack(">4I", *server.controller.model.version),
+            _PROTOCOL: lambda payload: bytes([payload[-1:] == b"\x02" and server.refusal != "protocol"]),
+            _VERSION: lambda _: struct.pack(
+                ">4I", *(_OLD if server.refusal == "version" else server.controller.model.version)
+            ),
             _OUTPUTS: self._set_up_outputs,
             _INPUTS: self._set_up_inputs,
             _START: lambda _: self._start(True),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import logging
-import time
+import math
 
 from modular_framework_control.hardware_interface.handles import JointHandle, JointStateHandle
 from modular_framework_control.hardware_interface.interfaces import JointStateInterface, PositionJointInterface
@@ -18,18 +18,18 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 
 LOGGER = logging.getLogger("rosout.ezgripper_robot_hw")
 JOINT = "ezgripper_knuckle_palm_L1_1"
-READY_POLL_S = 0.02
 
 
 class EzGripperRobotHW(RobotHW):
     """modular_framework_drivers/EzGripperRobotHW: one joint, commanded by position, its effort bounded on request.
 
-    `init` calibrates the gripper, which closes it and then brings it to its start position. A fault of the link or of
-    the motor is `fault()`; the gripper comes back by itself and then stands still until it is commanded.
+    `init` begins to connect and calibrate the gripper, which closes it; `initialised` is true once it has been at its
+    start position. A fault of the link or of the motor is `fault()`; the gripper comes back by itself and then stands
+    still until it is commanded.
 
     Parameters, below its name: `joint` ezgripper_knuckle_palm_L1_1; `port_name`, `baudrate` 57600, `servo_ids` [1],
     `manipulator_name` EzGripper (these four are looked for in the root namespace when it has no `port_name`);
-    `full_effort` [Nm] 1.0: effort of the joint at full torque; `startup_timeout` [s] 30; `poll_rate` [1/s] 50,
+    `full_effort` [Nm] 1.0: effort of the joint at full torque; `poll_rate` [1/s] 50,
     `start_position` [rad] 0, `hold_torque` [0 to 1023] 400, `position_tolerance` [rad] 0.03, `stall_time` [s] 0.25,
     `link_timeout` [s] 0.1.
     Limits come from `robot_description` and from `joint_limits`, when they are there.
@@ -47,7 +47,6 @@ class EzGripperRobotHW(RobotHW):
             connection = robot_hw_nh if robot_hw_nh.has_param("port_name") else root_nh
             settings = read_gripper_settings(connection, robot_hw_nh)
             self._full_effort = read_number(robot_hw_nh, "full_effort", 1.0, 0.001)
-            timeout_s = read_number(robot_hw_nh, "startup_timeout", 30.0)
             self._register(joint, root_nh)
         except ParameterError as error:
             LOGGER.error("%s in %s: %s", type(self).__name__, where, error)
@@ -55,52 +54,37 @@ class EzGripperRobotHW(RobotHW):
         self._default_torque = settings.rules.hold_torque
         self._gripper = EzGripper(settings)
         self._gripper.start()
-        if not self._wait_until_ready(self._gripper, timeout_s):
-            LOGGER.error(
-                "%s in %s: not ready within %g s: %s",
-                type(self).__name__,
-                where,
-                timeout_s,
-                self._gripper.state().fault or "it has not come to its start position",
-            )
-            self.close()
-            return False
-        self._faults = self._gripper.state().faults
-        self.read(0.0, 0.0)
         return True
+
+    @property
+    def initialised(self) -> bool:
+        return self._gripper is not None and self._gripper.state().ready and not self._gripper.state().fault
 
     def _register(self, joint: str, root_nh: NodeHandle) -> None:
         states, commands = JointStateInterface(), PositionJointInterface()
-        state = states.register_handle(JointStateHandle(joint))
+        state = states.register_handle(JointStateHandle(joint, math.nan))
         self._handle = commands.register_handle(JointHandle(state, supports_max_effort=True))
         self.register_interface(states)
         self.register_interface(commands)
         self._guard = JointLimitGuard(self, root_nh)
 
-    @staticmethod
-    def _wait_until_ready(gripper: EzGripper, timeout_s: float) -> bool:
-        end_s = time.monotonic() + timeout_s
-        while not gripper.state().ready:
-            if time.monotonic() > end_s:
-                return False
-            time.sleep(READY_POLL_S)
-        return True
-
     def read(self, time_s: float, period_s: float) -> None:
         if self._gripper is None:
             return
         state, joint = self._gripper.state(), self._handle.state
+        if not math.isfinite(state.stamp_s):  # nothing is measured before the calibration
+            return
         joint.position, joint.velocity = state.reading.position, 0.0 if state.fault else state.reading.velocity
         joint.stale = self._gripper.stale
         joint.effort = state.reading.load * TORQUE_MAX / FULL_TORQUE * self._full_effort
         self._missed = state.last_fault if state.faults != self._faults else ""
         self._faults = state.faults
-        if state.fault or self._missed:
+        if state.fault or self._missed or not state.ready:
             self._handle.command = joint.position
             self._guard.reset()
 
     def write(self, time_s: float, period_s: float) -> None:
-        if self._gripper is None:
+        if self._gripper is None or not self._gripper.state().ready:
             return
         self._guard.enforce(period_s)
         position = min(max(self._handle.command, 0.0), CLOSED_POSITION)

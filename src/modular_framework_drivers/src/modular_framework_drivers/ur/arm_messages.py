@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 JOINTS = 6
 CONNECTING, STATE, ALIVE, READY, ACCEPTED, FAILED, SERVO = b"C", b"S", b"A", b"R", b"T", b"F", b"Q"
-_STATE = struct.Struct("=cdd26dii I".replace(" ", ""))
+_STATE = struct.Struct("=cdd26diiId")
 _SERVO = struct.Struct("=c7d")
 MESSAGE_SIZE = 1024
 Six = tuple[float, ...]
@@ -35,6 +35,7 @@ class ArmState:
         speed_fraction: the speed slider, 0 to 1.
         speed_scaling: share of the pace at which the controller lets programs run.
         robot_mode, safety_mode, runtime_state: numbers of RTDE.
+        late_s: how long it was under way [s].
     """
 
     received_s: float
@@ -48,6 +49,12 @@ class ArmState:
     robot_mode: int
     safety_mode: int
     runtime_state: int
+    late_s: float = 0.0
+
+    @property
+    def modes(self) -> tuple[int, int, int]:
+        """Modes of robot and safety, and state of the program."""
+        return self.robot_mode, self.safety_mode, self.runtime_state
 
     def packed(self) -> bytes:
         """The message that carries it."""
@@ -61,16 +68,15 @@ class ArmState:
             *self.wrench,
             self.speed_fraction,
             self.speed_scaling,
-            self.robot_mode,
-            self.safety_mode,
-            self.runtime_state,
+            *self.modes,
+            self.late_s,
         )
 
     @classmethod
     def unpacked(cls, message: bytes) -> ArmState:
         """The state in a message."""
         values = _STATE.unpack(message)
-        return cls(values[1], values[2], values[3:9], values[9:15], values[15:21], values[21:27], *values[27:32])
+        return cls(values[1], values[2], values[3:9], values[9:15], values[15:21], values[21:27], *values[27:])
 
 
 def servo_message(positions: Sequence[float], time_s: float) -> bytes:

@@ -38,6 +38,8 @@ JOINT_NAMES = (
 _PERIOD_SMOOTHING = 0.02
 _SHORTEST_PERIOD_S = 0.002
 _LONGEST_PERIOD_S = 0.05  # a longer one is not made up for at once
+_STALE_S = 0.025  # three cycles of a CB3 controller
+_LATE_S = 0.04  # a state that was under way for so long is worth a warning [s]
 _CAUSE_S = 0.03  # by which the state that explains the end of the program may come after it [s]
 
 
@@ -131,10 +133,12 @@ class UrArmHardware(RobotHW):
     def _update_handles(self, state: ArmState) -> None:
         self._robot_fault = robot_fault(state, self.address)
         known = self._link is not None and not self._link.lost
+        stale = time.monotonic() - state.received_s > _STALE_S
         for handle, position, velocity, current in zip(
             self._handles, state.positions, state.velocities, state.currents, strict=True
         ):
             joint = handle.state
+            joint.stale = stale
             joint.position, joint.velocity, joint.effort = position, velocity if known else 0.0, current
         self._wrench.force = state.wrench[0], state.wrench[1], state.wrench[2]
         self._wrench.torque = state.wrench[3], state.wrench[4], state.wrench[5]
@@ -173,6 +177,12 @@ class UrArmHardware(RobotHW):
     def _restart_from_measured(self, check: CommandCheck) -> None:
         check.reset([handle.position for handle in self._handles])
         self._refused = ""
+
+    def warning(self) -> str:
+        state = self._link.state if self._link is not None else None
+        if state is None or state.late_s < _LATE_S:
+            return ""
+        return f"the states of the arm at {self.address} come {state.late_s:.2f} s late; check the network"
 
     def fault(self) -> str:
         return self._refused or self._fault
