@@ -112,11 +112,11 @@ class HardwareReadiness:
 
     def _missing(self) -> str:
         topics = [
-            f"True on topic {self._topics.awaited[name]} of hardware '{name}'"
+            f"topic {self._topics.awaited[name]} of hardware '{name}'"
             for name, event in self._ready.items()
             if not event.is_set()
         ]
-        return ", ".join(topics) or "the hardware"
+        return f"True on {', '.join(topics)}" if topics else "the hardware"
 
     def announce(self) -> None:
         """Publishes True, latched, for the hardware that does not do so itself."""
