@@ -16,7 +16,7 @@ from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
 
 WAIT_PERIOD_S = 0.05
-USUAL_START_S = 3.0
+USUAL_START_S = 10.0
 """A fault that a start takes longer than this to clear is logged [s]."""
 
 
