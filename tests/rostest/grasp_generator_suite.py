@@ -230,12 +230,13 @@ def test_grasps_that_the_arm_cannot_approach_with_the_fingers_as_they_are_are_le
     assert method.generate()[0]
 
 
-def test_a_wrong_parameter_is_named_and_the_node_lives_on(scene, method: Method) -> None:
+def test_a_wrong_parameter_is_refused_by_name_until_it_is_corrected(scene, method: Method) -> None:
     method.set("object_name", "box")
     method.set("approach_distance", "far")
-    assert method.generate()[0]
-    assert "approach_distance" in scene.session.log()
-    assert scene.session.alive()
+    success, text = method.generate()
+    assert not success and "approach_distance" in text and "'far'" in text and "at least 0.01" in text
+    method.set("approach_distance", APPROACH_M)
+    assert method.generate()[0], "the node lives on, and does not run a default meanwhile"
 
 
 def test_grasps_can_be_stored_under_names(scene, method: Method) -> None:

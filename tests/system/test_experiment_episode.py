@@ -94,6 +94,14 @@ def test_a_launch_that_dies_is_an_episode_with_its_cause_at_once(runner: TaskEpi
     assert "no.world" in (tmp_path / "dead/log.txt").read_text()
 
 
+def test_a_time_limit_that_passes_before_the_method_is_asked_says_nothing_of_the_method(
+    runner: TaskEpisodeRunner, tmp_path: Path
+) -> None:
+    record = run(runner, tmp_path / "short", PICK | {"time_limit": 1.0})
+    assert record.status is EpisodeStatus.BROKEN
+    assert record.cause.startswith("no end within 1 s")
+
+
 def test_a_setting_that_is_wrong_is_named_and_nothing_is_launched(runner: TaskEpisodeRunner, tmp_path: Path) -> None:
     record = run(runner, tmp_path / "wrong", PICK | {"arguments": {"world_fil": "ur5_table.world"}})
     assert record.status is EpisodeStatus.BROKEN

@@ -57,6 +57,14 @@ class DyingRunner(QuickRunner):
         return super().run(spec, folder)
 
 
+class BrokenRunner(QuickRunner):
+    """Has a fault in every episode."""
+
+    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
+        """Raises an exception."""
+        raise ValueError("the simulator is not there")
+
+
 class RaisingRunner(QuickRunner):
     """Raises in every second trial."""
 

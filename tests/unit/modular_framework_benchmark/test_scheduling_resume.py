@@ -40,8 +40,8 @@ workers: 2
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "experiment.yaml").write_text(TEXT)
-    for name in ("robot.urdf", "robot.srdf"):
-        (tmp_path / name).write_text("<robot name='r'/>")
+    (tmp_path / "robot.urdf").write_text("<robot name='r'><link name='base'/></robot>")
+    (tmp_path / "robot.srdf").write_text("<robot name='r'/>")
     (tmp_path / "problems").mkdir()
     for kind in ("scene", "request"):
         (tmp_path / "problems" / f"{kind}0001.yaml").write_text("{}")
@@ -90,6 +90,14 @@ def finished(folder: Path) -> int:
     with contextlib.suppress(sqlite3.Error), sqlite3.connect(f"file:{folder}/plans.db?mode=ro", uri=True) as connection:
         return int(connection.execute("SELECT count(*) FROM runs").fetchone()[0])
     return 0
+
+
+def test_an_experiment_whose_every_episode_broke_compares_nothing(folder: Path) -> None:
+    process = start(folder, "run_experiment", "experiment.yaml", runner="BrokenRunner")
+    printed, errors = process.communicate(timeout=300)
+    assert process.returncode == 1, errors
+    assert "error: every episode broke, so nothing is compared; the first one: the runner raised ValueError" in errors
+    assert "report: " in printed and "RRTConnect" not in printed
 
 
 def test_kills_at_random_moments_lose_nothing_and_run_nothing_twice(folder: Path) -> None:

@@ -145,6 +145,15 @@ def test_a_joint_outside_its_range_stays_without_a_controller_and_when_one_start
     assert text == "joint 'j' is held at 2.5, outside its range -1 to 1, until a goal brings it back"
 
 
+@pytest.mark.parametrize(("upper", "within", "beyond"), [(1.94, 1.949, 1.951), (0.04, 0.0403, 0.0405)])
+def test_a_measured_position_counts_as_outside_from_the_accuracy_of_hardware_on(
+    upper: float, within: float, beyond: float
+) -> None:
+    limits = JointLimits(0.0, upper)
+    assert not limits.is_beyond(within) and not limits.is_beyond(upper - within)
+    assert limits.is_beyond(beyond) and limits.is_beyond(upper - beyond)
+
+
 def test_joints_without_limits_are_named_when_the_controllers_get_their_hardware(
     make_loop: Callable[..., Any], caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -159,10 +159,12 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 
 
 def test_positions_that_are_not_finite_are_found_and_other_numbers_left_alone() -> None:
-    state = JointState(name=["a", "b"], position=[0.0, float("nan")], velocity=[float("nan")])
+    state = JointState(name=["a", "b"], position=[0.0, float("nan")], velocity=[float("nan"), 0.0])
     assert unusable_position(state) == "position[1] is nan"
     state.position = [1e308, 1e308]
     assert unusable_position(state) == ""
+    state.velocity = [0.0]
+    assert unusable_position(state) == "velocity has 1 values for 2 names"
     plan = AddMoveitPlanRequest().moveit_plan
     plan.joint_trajectory.points = [
         JointTrajectoryPoint(positions=[0.0], accelerations=[float("nan")]),

@@ -111,11 +111,15 @@ class ExperimentSession:
             again = f"{COMMAND} report {shlex.quote(self._shown)} --experiment {self._name} --into FILE"
             print(f"error: no report: {error}; the results are stored. To write it: {again}", file=sys.stderr)
             return EXIT_FAILED
-        print(answer, f"report: {page}", sep="\n")
         episodes = results.episodes
         if len(episodes) and (episodes["status"] == EpisodeStatus.BROKEN.value).all():
-            print(f"error: every episode broke; the first one: {episodes['cause'].iloc[0]}", file=sys.stderr)
+            print(f"report: {page}")
+            print(
+                f"error: every episode broke, so nothing is compared; the first one: {episodes['cause'].iloc[0]}",
+                file=sys.stderr,
+            )
             return EXIT_FAILED
+        print(answer, f"report: {page}", sep="\n")
         return 0
 
 

@@ -22,6 +22,8 @@ LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
 POINT_MARGIN = 1e-3
 """How far a goal may lie beyond a position limit [rad|m]: rounding of angles."""
+MEASURED_FRACTION, MEASURED_MARGIN = 0.01, 0.01
+"""A measured position beyond a limit by less than both, of the range and [rad|m], is the accuracy of the hardware."""
 SOFT_LIMIT_KEYS = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
 
 
@@ -50,8 +52,9 @@ class JointLimits:
         return min(self.min_position, position), max(self.max_position, position)
 
     def is_beyond(self, position: float) -> bool:
-        """Whether `position` [rad|m] lies outside the range by more than POINT_MARGIN."""
-        return position < self.min_position - POINT_MARGIN or position > self.max_position + POINT_MARGIN
+        """Whether a measured `position` [rad|m] lies outside the range by more than hardware is accurate."""
+        margin = min(MEASURED_MARGIN, MEASURED_FRACTION * (self.max_position - self.min_position))
+        return position < self.min_position - margin or position > self.max_position + margin
 
 
 @dataclass(frozen=True, slots=True)

@@ -144,9 +144,9 @@ class GraspGenerator:
             if wait_limit is None and self._time.enabled:
                 rospy.rostime.wallsleep(SCENE_PERIOD_S)
                 continue
-            if wait_limit or time.monotonic() - settings_read_s > SETTINGS_PERIOD_S:
-                settings, settings_read_s = read_settings(), time.monotonic()
             try:
+                if wait_limit or time.monotonic() - settings_read_s > SETTINGS_PERIOD_S:
+                    settings, settings_read_s = read_settings(), time.monotonic()
                 # a request that comes meanwhile looks at the scene later, and so has the last word
                 with self._generating if self._time.enabled else nullcontext():
                     objects = self._scene.targets(settings)
@@ -160,6 +160,8 @@ class GraspGenerator:
                                     self._signal_grasps(settings, objects)
                             wait_limit = None
                     before = objects
+            except ParameterError as error:  # a request answers with it
+                rospy.logerr_throttle(WAITING_PERIOD_S, f"{rospy.get_name()} generates no grasps: {error}")
             except (NoObjectError, CallError, CommanderError) as error:
                 if isinstance(error, NoObjectError):
                     self._generated.keep(self._scene.attached)
