@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rospy
 from moveit_msgs.msg import Constraints, JointConstraint, MoveItErrorCodes, PlannerParams, PositionIKRequest
 from moveit_msgs.srv import (
     GetPlannerParams,
@@ -152,6 +153,13 @@ def test_settings_of_planners_are_read_and_changed_for_one_group_or_all(session:
     assert settings() == {"type": "geometric::RRT"}
     for name, group in (("nobody", ""), ("", ""), ("nobody", "no_group")):
         assert call("get_planner_params", GetPlannerParams, "ompl", name, group).params.keys == []
+    uneven = PlannerParams(["range", "goal_bias"], ["0.2"], [])
+    for service, kind, arguments, reason in (
+        ("get_planner_params", GetPlannerParams, ("nobody", "RRT", ""), "nobody"),
+        ("set_planner_params", SetPlannerParams, ("ompl", "RRT", "", uneven, False), "2 keys and 1 values"),
+    ):
+        with pytest.raises(rospy.ServiceException, match=reason):
+            call(service, kind, *arguments)
 
 
 def test_a_seed_repeats_the_motion_also_while_others_plan(session: Any) -> None:

@@ -58,8 +58,8 @@ METHOD = """<launch><arg name="method_launch_file" default=""/><arg name="config
         (
             "method_launch_file:=top_down_grasp/a.launch",
             "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; did you mean 'top_down_grasps'; "
-            "allowed is PACKAGE/FILE with a file in the package's folder launch, or the path of a launch file from /; "
-            "correct it",
+            "allowed is PACKAGE/FILE with a file in the package's folder launch, the path of a launch file from /, or "
+            "none; correct it",
         ),
         (
             "method_launch_file:=top_down_grasps/top_down.launch",
@@ -79,7 +79,7 @@ def test_a_method_or_a_configuration_that_is_not_there_is_refused(tmp_path: Path
     (tmp_path / "a.launch").write_text(METHOD)
     with pytest.raises(roslaunch.core.RLException, match=re.escape(hint)):
         check_arguments(str(tmp_path / "a.launch"), [argument])
-    for file in ("", "top_down_grasps/top_down_grasps.launch", tmp_path / "a.launch"):
+    for file in ("", "none", "top_down_grasps/top_down_grasps.launch", tmp_path / "a.launch"):
         check_arguments(str(tmp_path / "a.launch"), [f"method_launch_file:={file}", f"config_directory:={tmp_path}"])
 
 

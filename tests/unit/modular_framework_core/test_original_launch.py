@@ -51,11 +51,9 @@ def test_it_has_the_grasp_generator_and_a_launch_with_its_own_configuration_only
     configuration = str(Path(rospkg.RosPack().get_path("modular_framework_api")) / "config")
     own = load(tmp_path, config_directory=configuration)
     named = load(tmp_path, config_directory=configuration, method_launch_file="top_down_grasps/top_down_grasps.launch")
-    assert [any(node.package == "top_down_grasps" for node in found.nodes) for found in (config, own, named)] == [
-        True,
-        False,
-        True,
-    ]
+    without = load(tmp_path, method_launch_file="none")
+    found = [any(node.package == "top_down_grasps" for node in each.nodes) for each in (config, own, named, without)]
+    assert found == [True, False, True, False]
 
 
 def test_its_configuration_files_are_those_of_the_api_package(config: roslaunch.config.ROSLaunchConfig) -> None:

@@ -14,7 +14,13 @@ import rospkg
 from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.episodes.stack import StackLaunch
 from modular_framework_benchmark.episodes.task_settings import TaskSettings
-from modular_framework_core.launching.launch_arguments import METHOD, argument_values, check_arguments, known_arguments
+from modular_framework_core.launching.launch_arguments import (
+    METHOD,
+    NO_METHOD,
+    argument_values,
+    check_arguments,
+    known_arguments,
+)
 from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
 
 OWN_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
@@ -61,8 +67,8 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
 
 
 def _nodes_of(method: str) -> tuple[str, ...]:
-    """Returns the names of the nodes in the launch file of a method; "" has none."""
-    if not method:
+    """Returns the names of the nodes in the launch file of a method; that of NO_METHOD has none."""
+    if method in NO_METHOD:
         return ()
     package, _, file = method.partition("/")
     path = method if not package else roslaunch.rlutil.resolve_launch_arguments([package, file])[0]

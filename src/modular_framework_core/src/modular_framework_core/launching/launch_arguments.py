@@ -19,6 +19,8 @@ from modular_framework_urdf import xml_text
 BOOLEANS = ("true", "false", "1", "0")
 """Texts that roslaunch accepts as a bool, in upper or lower case."""
 METHOD, CONFIGURATION = "method_launch_file", "config_directory"
+NO_METHOD = ("", "none")
+"""Values of METHOD that start no method; roslaunch passes over an argument that is given an empty value."""
 
 
 def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
@@ -92,9 +94,9 @@ def check_arguments(path: str, arguments: list[str]) -> None:
 
 def _method_fault(value: str) -> str:
     """Says what is wrong with the launch file of a method; nothing if it is there."""
-    if not value or Path(value).is_absolute() and Path(value).is_file():
+    if value in NO_METHOD or Path(value).is_absolute() and Path(value).is_file():
         return ""
-    allowed = "PACKAGE/FILE with a file in the package's folder launch, or the path of a launch file from /"
+    allowed = "PACKAGE/FILE with a file in the package's folder launch, the path of a launch file from /, or none"
     fault, package, file = f"argument '{METHOD}' is '{value}', ", *value.partition("/")[::2]
     if Path(value).is_absolute() or not file:
         reason = f"and there is no such file{_path_hint(Path(value))}" if file else "which is no launch file"

@@ -48,13 +48,12 @@ class QueryPlannersService(MoveGroupCapability):
             *(f"{group}[{name}]" for group in self._context.model.groups for name in pipeline.group_planners(group)),
         ]
 
-    def _get(self, request: Any) -> GetPlannerParamsResponse | None:
+    def _get(self, request: Any) -> GetPlannerParamsResponse:
         """Returns the settings; none where no planner or group of that name has any, as in MoveIt."""
         try:
             pipeline = self._context.pipeline(request.pipeline_id)
         except PlanningError as error:
-            rospy.logerr("%s", error.reason)
-            return None
+            raise rospy.ServiceException(error.reason) from error
         values = pipeline.configurations.get(request.planner_config, request.group)
         return GetPlannerParamsResponse(
             PlannerParams(
@@ -62,7 +61,7 @@ class QueryPlannersService(MoveGroupCapability):
             )
         )
 
-    def _set(self, request: Any) -> SetPlannerParamsResponse | None:
+    def _set(self, request: Any) -> SetPlannerParamsResponse:
         try:
             pipeline = self._named(request)
             if len(request.params.keys) != len(request.params.values):
@@ -72,8 +71,7 @@ class QueryPlannersService(MoveGroupCapability):
                     f"{len(request.params.values)} values; one value a key is needed",
                 )
         except PlanningError as error:
-            rospy.logerr("%s", error.reason)
-            return None
+            raise rospy.ServiceException(error.reason) from error
         values = dict(zip(request.params.keys, request.params.values, strict=True))
         pipeline.configurations.set(request.planner_config, request.group, values, request.replace)
         for fault in pipeline.parameter_faults(request.planner_config, request.group):
