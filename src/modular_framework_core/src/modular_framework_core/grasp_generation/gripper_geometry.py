@@ -210,11 +210,10 @@ def _pads(fingers: list[HandPart]) -> tuple[HandPart, HandPart]:
     right = [part for part in fingers if part.corners[spread, :, 0].mean() > 0]
     left = [part for part in fingers if part.corners[spread, :, 0].mean() <= 0]
     gaps = {
-        (one, other): fingers_gap
+        (one, other): part.corners[:, :, 0].min(axis=1) - partner.corners[:, :, 0].max(axis=1)
         for one, part in enumerate(right)
         for other, partner in enumerate(left)
         if _face_each_other(part.corners[spread], partner.corners[spread])
-        for fingers_gap in (part.corners[:, :, 0].min(axis=1) - partner.corners[:, :, 0].max(axis=1),)
     }
     if not gaps:
         raise GripperGeometryError(
