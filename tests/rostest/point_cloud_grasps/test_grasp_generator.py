@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "unit"))
 pytest.register_assert_rewrite("grasp_generator_suite")
 from depth_camera import AXES, EYE, Box, image  # noqa: E402
 from grasp_generator_suite import *  # noqa: E402, F403
-from grasp_generator_suite import FakeMoveGroup, Method, Watcher  # noqa: E402
+from grasp_generator_suite import FakeMoveGroup, Method, Watcher, renew  # noqa: E402
 
 TOPIC, FRAME = "camera/points", "camera_optical"
 TABLE = Box((2.0, 2.0, 0.02), (0.0, 0.5, 0.83))
@@ -160,6 +160,22 @@ def test_no_cloud_in_time_is_a_failure_that_names_the_topic(scene, method: Metho
     method.set("point_cloud_topic", "")
     method.set("cloud_timeout", 60.0)
     assert method.generate()[0]
+
+
+def test_a_task_waits_for_an_object_that_the_first_cloud_did_not_show(scene, method: Method) -> None:
+    box = scene.objects.pop()
+    answers: list[tuple[bool, str]] = []
+    method.set("scene_timeout", 60.0)
+    task = threading.Thread(target=lambda: answers.append(renew()))
+    until(lambda: not scene.camera.watched, "the camera without a subscriber")
+    task.start()
+    until(lambda: scene.camera.watched, "the generator waits for a cloud")
+    until(lambda: not scene.camera.watched, "the generator has a cloud without an object")
+    assert not answers
+    scene.objects.append(box)
+    task.join(60.0)
+    method.set("scene_timeout", 1.0)
+    assert answers and answers[0][0], answers
 
 
 def test_what_the_scene_does_not_know_is_found_in_the_cloud(scene, method: Method) -> None:

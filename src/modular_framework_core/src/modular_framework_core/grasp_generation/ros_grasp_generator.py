@@ -201,32 +201,23 @@ class GraspGenerator:
         return not self._generated.stale(objects) and self._stored.left() >= max(1, needed)
 
     def _objects(self, settings: GeneratorSettings, kept: Kept) -> list[SceneObject]:
-        """Returns the objects to grasp; those that the method sees, if the planning scene has none in the crop box."""
-        try:
-            if kept is Kept.NONE:
-                return self._scene.targets(settings)
-            return self._resting(settings, kept)
-        except NoObjectError as error:
-            if settings.object_name or not isinstance(self._method, SeeingMethod):
-                raise
-            try:
-                with self._time.held("grasp generation", during_motions=True):
-                    return self._method.seen_objects(settings.crop, settings.seed)
-            except NoCandidatesError as unseen:
-                raise NoObjectError(f"{error}; and {unseen}") from unseen
+        """Returns the objects to grasp; for `Kept.NONE` as they are now, else once they rest or that takes too long.
 
-    def _resting(self, settings: GeneratorSettings, kept: Kept) -> list[SceneObject]:
-        """Returns the objects to grasp once they rest, or as they are when that takes too long."""
+        For `Kept.COMPLETE` it waits for an object, too.
+        """
         before: list[SceneObject] = []
         wait_limit = WaitLimit()
         while True:
-            late = wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s)
+            late = kept is Kept.NONE or wait_limit.is_exceeded(rospy.get_time(), settings.scene_timeout_s)
+            objects: list[SceneObject] = []
             try:
                 objects = self._scene.targets(settings)
-            except NoObjectError:
-                if late or kept is not Kept.COMPLETE or isinstance(self._method, SeeingMethod):
-                    raise
-                objects = []
+            except NoObjectError as error:
+                try:
+                    return self._seen(settings, error)
+                except NoObjectError:
+                    if late or kept is not Kept.COMPLETE:
+                        raise
             if objects and (
                 late or at_rest(before, objects) or (kept is Kept.COMPLETE and self._may_stay(objects, kept))
             ):
@@ -236,6 +227,21 @@ class GraspGenerator:
                 self._time.sleep(SCENE_PERIOD_S)
             else:
                 rospy.rostime.wallsleep(SCENE_PERIOD_S)
+
+    def _seen(self, settings: GeneratorSettings, error: NoObjectError) -> list[SceneObject]:
+        """Returns the objects that the method sees where the planning scene has none.
+
+        Raises:
+            NoObjectError: `error` if the method sees nothing by itself or is asked for a named object; otherwise with
+                why it sees no object.
+        """
+        if settings.object_name or not isinstance(self._method, SeeingMethod):
+            raise error
+        try:
+            with self._time.held("grasp generation", during_motions=True):
+                return self._method.seen_objects(settings.crop, settings.seed)
+        except NoCandidatesError as unseen:
+            raise NoObjectError(f"{error}; and {unseen}") from unseen
 
     def _signal_grasps(self, settings: GeneratorSettings, objects: list[SceneObject]) -> tuple[bool, str]:
         """Stores grasps in place of the earlier ones and signals it, or signals that what is there cannot be grasped.
