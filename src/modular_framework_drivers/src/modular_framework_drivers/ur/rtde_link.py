@@ -34,6 +34,7 @@ _START_TIMEOUT_S = 30.0  # for a process to start; a busy computer takes its tim
 _CONNECT_TIMEOUT_S = 5.0  # from then to the first state
 _PROGRAM_TIMEOUT_S = 15.0  # from then until the program is uploaded and runs
 _SILENCE_TIMEOUT_S = 0.5  # a process that sends nothing for so long counts as failed
+_LONGEST_RETRY_S = 2.0  # each attempt starts an interpreter, which takes 0.3 s of a processor
 _STOP_PATIENCE_S = 1.5  # for the arm to come to rest when the link is closed
 _FINAL_STOP_S = 0.1  # for a process that is ended to send its stop, behind all commands still queued
 
@@ -52,7 +53,7 @@ class LinkSettings:
         lookahead_s: of servoj, 0.03 to 0.2 [s].
         gain: of servoj, 100 to 2000.
         real_time: whether the processes that hold ur-rtde ask for real-time scheduling.
-        retry_s: between two attempts to connect [s].
+        retry_s: between two attempts to connect [s]; twice as long after each that fails, at most 2 s.
     """
 
     address: str
@@ -221,17 +222,18 @@ class RtdeLink:
             self.drop_program(f"the process that commands the arm has taken no command for {_SILENCE_TIMEOUT_S:g} s")
 
     def _keep(self) -> None:
-        next_attempt_s = 0.0
+        next_attempt_s, retry_s = 0.0, self._settings.retry_s
         while not self._closing.wait(_KEEPER_PERIOD_S):
             now_s = time.monotonic()
             try:
                 if self._states is None and now_s >= next_attempt_s:
-                    next_attempt_s = now_s + self._settings.retry_s
+                    next_attempt_s = now_s + retry_s
                     self._states = self._start("state", ["--timeout", str(self._settings.timeout_s)], now_s)
                 elif self._states is not None and self._is_over(self._states, now_s):
                     states, self._states = self._states, None
                     states.process.end()
-                    next_attempt_s = now_s + self._settings.retry_s
+                    retry_s = self._settings.retry_s if states.working else min(2.0 * retry_s, _LONGEST_RETRY_S)
+                    next_attempt_s = now_s + retry_s
                 self._keep_program(now_s)
             except OSError as error:
                 self._log_start_failure(error)
