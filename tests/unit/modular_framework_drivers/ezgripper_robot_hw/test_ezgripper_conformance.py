@@ -49,6 +49,7 @@ class TestEzGripper(RobotHWConformance):
 
     period_s = 0.008
     settle_s = 0.6
+    jump = 1.0
     real_time = True
     close_after_test = False
     robot_hw: ClassVar[RobotHW]
