@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import signal
 import sys
+import threading
 import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -13,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import psutil
 import pytest
 
 ROSTEST = Path(__file__).parents[2] / "rostest"
@@ -176,6 +180,35 @@ def test_a_run_without_repetition_keeps_one_log_per_suite(
     assert runner.main(["unit/steady", "-k", "test_it"]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "1 passed, 0 failed, 0 skipped"
     assert [path.name for path in (scripted / "logs" / "unit").iterdir()] == ["steady.log"]
+
+
+def test_sigterm_ends_the_suites_that_run_and_what_they_started(runner: ModuleType, scripted: Path) -> None:
+    started = scripted / "started"
+    (scripted / "steady.py").write_text(
+        "import subprocess, sys, time\n"
+        "def test_it():\n"
+        "    child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'], start_new_session=True)\n"
+        f"    open({str(started)!r}, 'w').write(f'{{child.pid}} ')\n"
+        "    time.sleep(600)\n"
+    )
+
+    children: list[psutil.Process] = []
+
+    def terminate() -> None:
+        while not started.exists() or not started.read_text().endswith(" "):
+            time.sleep(0.01)
+        children.append(psutil.Process(int(started.read_text())))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    thread = threading.Thread(target=terminate)
+    thread.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            runner.main(["unit/steady"])
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    thread.join()
+    assert psutil.wait_procs(children, 30.0) == (children, [])
 
 
 @pytest.mark.parametrize("count", ["0", "-1", "many", "2.5"])
