@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The workspace around a benchmark; every benchmark imports it before anything else.
+
+- A benchmark that is started without the workspace, as `benchmarks/planning --help` in any shell, starts again by
+  `./install.sh exec`, with the workspace's interpreter and packages.
+- The modules of the tests that benchmarks share can be imported.
+- SIGTERM ends a benchmark as an interrupt does. Programs that it started and that still run at its end are killed.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import signal
+import sys
+import uuid
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SHARED = (  # several have a module `conftest`: the first is found
+    "tests/unit/modular_framework_planning",
+    "tests/unit/modular_framework_benchmark",
+    "tests/rostest/modular_framework_planning",
+    "tests",
+)
+MARK = "MODULAR_FRAMEWORK_BENCHMARK"
+"""Variable of the environment that programs of a benchmark have, with a value of its own."""
+
+
+def _enter() -> None:
+    sourced = str(ROOT / "src") in os.environ.get("ROS_PACKAGE_PATH", "") and Path(sys.prefix) == ROOT / ".venv"
+    if not sourced and MARK not in os.environ:
+        os.environ[MARK] = "starts in the workspace"
+        os.execv(ROOT / "install.sh", ["install.sh", "exec", *sys.argv])
+    sys.path += [str(ROOT / path) for path in SHARED]
+    os.environ[MARK] = uuid.uuid4().hex
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    os.register_at_fork(after_in_child=lambda: signal.signal(signal.SIGTERM, signal.SIG_DFL))
+    atexit.register(_kill_what_is_left, os.getpid(), os.environ[MARK])
+
+
+def _kill_what_is_left(benchmark: int, mark: str) -> None:
+    """Kills the programs of a benchmark; does nothing in a process that was forked from it."""
+    from modular_framework_core.launching.launch_session import processes_with
+
+    while os.getpid() == benchmark and (left := processes_with(MARK, mark)):
+        for process in left:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+
+
+if __name__ != "__main__":
+    _enter()

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A benchmark needs no sourced shell, and leaves no program behind however it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+STARTS_A_PROGRAM = """
+import workspace
+import subprocess, sys, time
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_new_session=True)
+print(child.pid, flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_what_a_benchmark_started_ends_with_it(number: signal.Signals) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", STARTS_A_PROGRAM],
+        env={**os.environ, "PYTHONPATH": f"{ROOT / 'benchmarks'}:{os.environ['PYTHONPATH']}"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as benchmark:
+        assert benchmark.stdout is not None
+        child = psutil.Process(int(benchmark.stdout.readline()))
+        benchmark.send_signal(number)
+    assert psutil.wait_procs([child], 30.0) == ([child], [])
+
+
+def test_help_needs_no_sourced_shell() -> None:
+    bare = {name: os.environ[name] for name in ("HOME",)}
+    printed = subprocess.run(
+        [ROOT / "benchmarks" / "planning", "--help"],
+        env={**bare, "PATH": "/usr/local/bin:/usr/bin:/bin"},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    ).stdout
+    assert "--planner PLANNER" in printed
