@@ -51,6 +51,31 @@ def test_the_mean_of_bounded_units_has_students_interval() -> None:
     assert (found.low, found.high) == pytest.approx((exact.low, exact.high))
 
 
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.integers(-5, 5), min_size=8, max_size=9), st.floats(-1.0, 1.0))
+def test_the_interval_of_a_few_units_holds_every_mean_that_the_sign_flip_test_does_not_reject(
+    wins: list[int], true_mean: float
+) -> None:
+    means = np.array(wins) / 5
+    found = bounded_mean_interval(means, (-1.0, 1.0), 0.95)
+    assert found is not None
+    if "sign flips" in found.method and not found.low - 1e-9 <= true_mean <= found.high + 1e-9:
+        zeros = np.zeros_like(means)
+        exact = stats.permutation_test(
+            (means - true_mean, zeros),
+            lambda a, b: np.mean(a) - np.mean(b),
+            permutation_type="samples",
+            n_resamples=np.inf,
+        )
+        assert exact.pvalue <= 0.05 + 1e-9
+
+
+def test_seven_of_eight_units_with_one_sign_do_not_exclude_a_mean_of_0() -> None:
+    found = bounded_mean_interval(np.array([0.7] * 4 + [0.68] * 3 + [-0.7]), (-1.0, 1.0), 0.95)
+    assert found is not None
+    assert found.low <= 0.0
+
+
 @pytest.mark.parametrize(("value", "bounds", "low", "high"), [
     (1.0, (0.0, 1.0), 0.025**0.1, 1.0), (0.0, (0.0, 1.0), 0.0, 1 - 0.025**0.1),
     (1.0, (-1.0, 1.0), 2 * 0.025**0.1 - 1, 1.0),

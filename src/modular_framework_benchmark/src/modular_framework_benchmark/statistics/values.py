@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 MIN_UNITS = 6
 """Fewest independent units for an interval, a test or a claim."""
+FEW_UNITS = 12
+"""Up to so many units, the interval of a mean also holds what the sign flip test does not reject."""
 MAX_STEPS = 200_000
 """Steps in which the sum of the units' means is counted for the sign flip test."""
 
@@ -52,8 +54,10 @@ def bounded_mean_interval(means: Floats, bounds: tuple[float, float], confidence
     """Returns the interval of the mean of bounded values; None of fewer units than `MIN_UNITS`.
 
     Student's t with units - 1 degrees of freedom (R. Ibragimov, U. K. Müller, J. Business and Economic Statistics 28
-    (2010) 453-468). It is too narrow where most units are equal: then a betting interval, and if all are at a
-    bound the exact end: a true mean below `((1 - confidence) / 2) ** (1 / units)` would give that less often.
+    (2010) 453-468). It is too narrow for a few units that lie in two groups, so up to `FEW_UNITS` it is widened to
+    what the sign flip test of the means does not reject. It is too narrow as well where most units are equal: then a
+    betting interval, and if all are at a bound the exact end: a true mean below
+    `((1 - confidence) / 2) ** (1 / units)` would give that less often.
 
     Args:
         means: Mean of each unit, shape (n,).
@@ -73,8 +77,25 @@ def bounded_mean_interval(means: Floats, bounds: tuple[float, float], confidence
         found = anytime_interval(means - middle, confidence, (highest - lowest) / 2)
         return Interval(found.low + middle, found.high + middle, confidence, "betting")
     half = float(stats.t.isf((1 - confidence) / 2, count - 1) * np.std(means, ddof=1) / math.sqrt(count))
-    mean = float(np.mean(means))
-    return Interval(max(mean - half, lowest), min(mean + half, highest), confidence, "Student's t of the units")
+    mean, name = float(np.mean(means)), "Student's t of the units"
+    low, high = mean - half, mean + half
+    if count <= FEW_UNITS:
+        subsets = np.sort(_subset_weights(count) @ means)
+        rank = int((1 - confidence) / 2 * (len(subsets) + 1)) - 1
+        first, last = (subsets[rank], subsets[-1 - rank]) if rank >= 0 else bounds  # too few to reject anything
+        low, high, name = min(low, float(first)), max(high, float(last)), f"{name} and sign flips"
+    return Interval(max(low, lowest), min(high, highest), confidence, name)
+
+
+@lru_cache(maxsize=FEW_UNITS)
+def _subset_weights(count: int) -> Floats:
+    """Returns what makes the mean of every subset of so many values, shape (2 ** count - 1, count).
+
+    The true mean lies between each two neighbours of these means with the same chance, if either sign of every
+    deviation is as likely. Source: J. A. Hartigan, J. American Statistical Association 64 (1969) 1303-1317.
+    """
+    chosen = (np.arange(1, 2**count)[:, None] >> np.arange(count)) & 1
+    return chosen / chosen.sum(axis=1, keepdims=True)
 
 
 def restricted_mean_interval(
