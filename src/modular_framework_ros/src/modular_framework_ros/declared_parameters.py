@@ -1,48 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the declared parameters of a running node; a value that the declaration does not allow is refused."""
+"""Reads the declared parameters of a running node from the parameter server."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import rospy
 
-from modular_framework_ros.node_handle import ParameterError
-from modular_framework_ros.parameter_declarations import Declaration, node_declaration
+from modular_framework_ros.parameter_declarations import DeclarationError, ParameterReader, node_declaration
 
 
-class DeclaredParameters:
+class DeclaredParameters(ParameterReader):
     """The parameters of a node on the parameter server.
 
     Args:
         package: Package of the node.
         node: Its executable.
+
+    Raises:
+        DeclarationError: The package declares no parameters of the node, or not as it should.
     """
 
     def __init__(self, package: str, node: str) -> None:
-        self._package, self._node = package, node
-
-    def value(self, name: str) -> Any:
-        """Returns a parameter; its default if it is not set.
-
-        Args:
-            name: As it is declared, with `~` for the node's own.
-
-        Raises:
-            ParameterError: It is required and not set, or its value is not allowed.
-        """
-        declared = self.declaration(name)
-        value = rospy.get_param(name, declared.default)
-        if value is None and not declared.required:
-            return None
-        fault = "is not set; allowed: " + declared.allowed if value is None else declared.fault(value)
-        if fault:
-            raise ParameterError(f"parameter '{rospy.resolve_name(name)}' {fault}")
-        return float(value) if declared.type == "float" else value
-
-    def declaration(self, name: str) -> Declaration:
-        """Returns the declaration of a parameter; raises KeyError if there is none."""
-        found = node_declaration(self._package, self._node)
+        found = node_declaration(package, node)
         if found is None:
-            raise KeyError(f"{self._package}/parameters/{self._node}.yaml")
-        return found.parameters[name]
+            raise DeclarationError(f"there is no {package}/parameters/{node}.yaml")
+        super().__init__(found, lambda name: rospy.get_param(name, None), rospy.resolve_name)

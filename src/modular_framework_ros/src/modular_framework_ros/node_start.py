@@ -15,7 +15,7 @@ def run_node(module: str, function: str = "main") -> NoReturn:
     An interrupt (SIGINT) before the node handles signals itself ends the process at once, without a traceback:
     roslaunch sends it to all nodes when one of them died, and the reason of that death is what the user needs to see.
     One that comes while rospy starts the node ends the process too. The node's publishers send without a change of
-    threads.
+    threads. A parameter with a wrong value ends it with the fault in the log.
 
     Args:
         module: Full name of the module.
@@ -24,11 +24,15 @@ def run_node(module: str, function: str = "main") -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     import rospy
 
+    from modular_framework_ros.node_handle import ParameterError
     from modular_framework_ros.ros_direct_publishing import publish_directly
 
     publish_directly()
     try:
         sys.exit(getattr(importlib.import_module(module), function)())
+    except ParameterError as error:
+        rospy.logfatal("the node cannot start: %s", error)
+        sys.exit(1)
     except rospy.exceptions.ROSInitException:
         if not rospy.core.is_shutdown():
             raise

@@ -7,14 +7,16 @@ Programs that check a launch before it starts read the same file, without import
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import rospkg
 import yaml
+
+from modular_framework_ros.node_handle import ParameterError
 
 TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "str": ((str,), "a text"),
@@ -42,9 +44,11 @@ class Declaration:
         doc: Meaning and unit.
         default: Value if it is not set; None: none.
         required: Whether it must be set, and not to an empty text.
+        required_with: Parameter with which it is required, unless that is empty.
         at_least, at_most: Bounds of a number, themselves allowed.
         above: Lower bound that is itself not allowed.
         choices: Allowed values; empty: any.
+        items: Type of each item of a list, a word of TYPES; empty: any.
         names: Kind of thing it names, such as `planner` or `group`; empty: none.
         tree: Whether there are names below this one that only the robot or a plugin knows.
     """
@@ -54,10 +58,12 @@ class Declaration:
     doc: str
     default: Any = None
     required: bool = False
+    required_with: str = ""
     at_least: float = -math.inf
     at_most: float = math.inf
     above: float = -math.inf
     choices: tuple[Any, ...] = ()
+    items: str = ""
     names: str = ""
     tree: bool = False
 
@@ -71,21 +77,44 @@ class Declaration:
             for word, bound in (("above", self.above), ("at least", self.at_least), ("at most", self.at_most))
             if math.isfinite(bound)
         ]
-        if not bounds:
-            return TYPES[self.type][1] + (" that is not empty" if self.required and self.type == "str" else "")
-        return f"{TYPES[self.type][1]}, {' and '.join(bounds)}"
+        words = TYPES[self.type][1] + (f", each {TYPES[self.items][1]}" if self.items else "")
+        if self.required and self.type in ("str", "list"):
+            words += " that is not empty"
+        return ", ".join([words, " and ".join(bounds)] if bounds else [words])
+
+    @property
+    def needed(self) -> str:
+        """What a required parameter must be set to, in words."""
+        return f"allowed: {self.allowed} ({self.doc.rstrip('.')})"
+
+    def beside(self, get: Callable[[str], Any]) -> Declaration:
+        """Returns the declaration beside the values of the other parameters.
+
+        Args:
+            get: Returns the value of a parameter by its declared name, None if it is not set.
+        """
+        return replace(self, required=True) if self.required_with and get(self.required_with) else self
 
     def fault(self, value: Any) -> str:
         """Returns what is wrong with a value, in words that follow the name of the parameter; "" if nothing is."""
-        kinds = TYPES[self.type][0]
-        fits = isinstance(value, kinds) and (object in kinds or isinstance(value, bool) == (bool in kinds))
-        if fits and isinstance(value, int | float) and not isinstance(value, bool):
-            fits = self.at_least <= value <= self.at_most and value > self.above and math.isfinite(value)
-        if self.choices:
-            fits = fits and value in self.choices
-        if fits and not (self.required and value == ""):
+        fits = _is_of(self.type, value)
+        if fits and self.items:
+            fits = all(_is_of(self.items, item) and self._is_within(item) for item in value)
+        fits = fits and self._is_within(value) and not (self.required and value in ("", []))
+        if fits and (not self.choices or value in self.choices):
             return ""
-        return f"is {value!r}; allowed: {self.allowed}"
+        return f"is {value!r}; {self.needed}"
+
+    def _is_within(self, value: Any) -> bool:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return True
+        return self.at_least <= value <= self.at_most and value > self.above and math.isfinite(value)
+
+
+def _is_of(word: str, value: Any) -> bool:
+    """Returns whether a value is of a type by its word; true and false are no numbers."""
+    kinds = TYPES[word][0]
+    return isinstance(value, kinds) and (object in kinds or isinstance(value, bool) == (bool in kinds))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +131,54 @@ class NodeDeclaration:
     closed: bool = True
 
 
+class ParameterReader:
+    """Reads declared parameters; a value that the declaration does not allow is refused.
+
+    Args:
+        declaration: The parameters.
+        get: Returns the value of a parameter by its declared name, None if it is not set.
+        whole_name: Returns the name for messages.
+    """
+
+    def __init__(
+        self, declaration: NodeDeclaration, get: Callable[[str], Any], whole_name: Callable[[str], str] = str
+    ) -> None:
+        self._declared, self._get, self._whole_name = declaration.parameters, get, whole_name
+
+    def value(self, name: str) -> Any:
+        """Returns a parameter, a number of type float as a float; its default if it is not set.
+
+        Args:
+            name: As it is declared, with `~` for the node's own.
+
+        Raises:
+            ParameterError: It is required and not set, or its value is not allowed.
+            KeyError: It is not declared.
+        """
+        return self.values(name)[0]
+
+    def values(self, *names: str) -> list[Any]:
+        """Returns several parameters, all that are declared if none is named, as `value` does.
+
+        Raises:
+            ParameterError: Names each that is not set though required, or whose value is not allowed.
+            KeyError: One is not declared.
+        """
+        found, faults = [], []
+        for name in names or self._declared:
+            declared = self._declared[name].beside(self._get)
+            value = self._get(declared.name)
+            value = declared.default if value is None else value
+            if value is None and declared.required:
+                faults.append(f"parameter '{self._whole_name(declared.name)}' is not set; {declared.needed}")
+            elif value is not None and declared.fault(value):
+                faults.append(f"parameter '{self._whole_name(declared.name)}' {declared.fault(value)}")
+            found.append(float(value) if declared.type == "float" and not faults and value is not None else value)
+        if faults:
+            raise ParameterError("; ".join(faults))
+        return found
+
+
 @cache
 def node_declaration(package: str, node: str) -> NodeDeclaration | None:
     """Returns the declared parameters of an executable of a package; None if it declares none.
@@ -110,10 +187,16 @@ def node_declaration(package: str, node: str) -> NodeDeclaration | None:
         DeclarationError: The file cannot be used.
     """
     try:
-        path = Path(rospkg.RosPack().get_path(package)) / "parameters" / f"{node}.yaml"
+        path = Path(_packages().get_path(package)) / "parameters" / f"{node}.yaml"
     except rospkg.ResourceNotFound:
         return None
     return read_declaration(path) if path.is_file() else None
+
+
+@cache
+def _packages() -> rospkg.RosPack:
+    """Returns the packages; looking for them takes long."""
+    return rospkg.RosPack()
 
 
 def read_declaration(path: Path) -> NodeDeclaration:
@@ -126,7 +209,7 @@ def read_declaration(path: Path) -> NodeDeclaration:
         DeclarationError: It cannot be used.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
         parameters: dict[str, Declaration] = {}
         for included in content.get("includes", ()):
             found = node_declaration(*str(included).split("/"))
@@ -136,8 +219,9 @@ def read_declaration(path: Path) -> NodeDeclaration:
         for name, keys in (content.get("parameters") or {}).items():
             choices = tuple(keys.pop("choices", ()))
             parameters[name] = Declaration(name=name, choices=choices, **keys)
-            if parameters[name].type not in TYPES:
-                raise DeclarationError(f"{name}: type '{parameters[name].type}'; allowed: {', '.join(TYPES)}")
+            for word in filter(None, (parameters[name].type, parameters[name].items)):
+                if word not in TYPES:
+                    raise DeclarationError(f"{name}: type '{word}'; allowed: {', '.join(TYPES)}")
         return NodeDeclaration(parameters, bool(content.get("closed", True)))
     except (OSError, yaml.YAMLError, TypeError, ValueError, AttributeError, DeclarationError) as error:
         raise DeclarationError(f"{path}: {error}") from error

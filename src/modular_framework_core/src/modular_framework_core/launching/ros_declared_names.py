@@ -78,12 +78,13 @@ class DeclaredNames:
         for name, users in self.known.items():
             if name in ROSLAUNCH_NAMES or any(item.tree for _, item in users):
                 continue
-            for node, item in users:
+            for node, declared in users:
+                item = declared.beside(lambda other, node=node: self._launch.parameters.get(_whole_name(other, node)))
                 value = self._launch.parameters.get(name, item.default)
                 if value is None and item.required:
                     yield LaunchFault(name, f"node '{node.name}' needs the parameter '{name}'; {item.doc}")
                 elif value is not None and item.fault(value):
-                    yield LaunchFault(name, f"parameter '{name}' {item.fault(value)} ({item.doc.rstrip('.')})")
+                    yield LaunchFault(name, f"parameter '{name}' {item.fault(value)}")
                     break
 
     def naming(self, kind: str) -> Iterator[tuple[str, str]]:

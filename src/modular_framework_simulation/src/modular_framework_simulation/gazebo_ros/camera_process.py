@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from typing import Any
 
 import rospy
 
@@ -147,10 +148,11 @@ class CameraProcess:
             self._process.wait()
 
 
-def configured_cameras(robot: RobotBody | None, seed: int) -> list[Camera]:
+def configured_cameras(settings: Mapping[str, Any], robot: RobotBody | None, seed: int) -> list[Camera]:
     """Reads the cameras of parameter `~sensors` (a `sensors_config.yaml`); what cannot be used is logged.
 
     Args:
+        settings: Value of the parameter.
         robot: The robot, if there is one.
         seed: Of noise.
     """
@@ -161,12 +163,7 @@ def configured_cameras(robot: RobotBody | None, seed: int) -> list[Camera]:
             return ros_names.WORLD_FRAME
         return f"{name}::{frame}" if robot is not None and frame in robot.body.link_indices else None
 
-    settings = rospy.get_param("~sensors", {})
-    where = rospy.resolve_name("~sensors")
-    if not isinstance(settings, Mapping):
-        rospy.logwarn("parameter %s: got %r; expected the contents of a sensors_config.yaml", where, settings)
-        settings = {}
-    cameras, faults = read_cameras(settings, f"parameter {where}", locate, seed)
+    cameras, faults = read_cameras(settings, f"parameter {rospy.resolve_name('~sensors')}", locate, seed)
     for fault in faults:
         rospy.logwarn(fault)
     return cameras

@@ -16,6 +16,8 @@ from moveit_msgs.msg import DisplayTrajectory, PlanningScene
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 
+from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.parameter_search import nearest_parameter
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import ros_names
@@ -48,8 +50,7 @@ _SCENE_MESSAGES = 1000
 class ViewerNode:
     """Draws while a browser is connected, and rests otherwise.
 
-    Parameters: ~address (127.0.0.1), ~port (8080; the next free one where it is taken), ~fixed_frame (world):
-    the frame that is drawn at the origin; ~read_only (false): no button acts on the simulation; robot_description.
+    Parameters: see `parameters/viewer.yaml`.
 
     Subscribes, while a browser is connected: /gazebo/visible_models and /gazebo/visible_poses (std_msgs/String),
     joint_states (sensor_msgs/JointState), /tf and /tf_static where the root of the robot is not the fixed frame, and,
@@ -60,12 +61,12 @@ class ViewerNode:
 
     Args:
         server: Serves the page.
+        fixed_frame: The frame that is drawn at the origin.
+        read_only: Whether no button acts on the simulation.
     """
 
-    def __init__(self, server: WebServer) -> None:
+    def __init__(self, server: WebServer, fixed_frame: str, read_only: bool) -> None:
         self._server = server
-        fixed_frame = str(rospy.get_param("~fixed_frame", ros_names.WORLD_FRAME))
-        read_only = bool(rospy.get_param("~read_only", False))
         self._panel = ControlPanel(server.viser, GazeboCommands(), rospy.logwarn, read_only=read_only)
         self._layers = {name: Layer(server.viser, name) for name in ("world", "robot", "planning scene", "plan")}
         self._world = WorldView(self._layers["world"], rospy.logwarn)
@@ -262,16 +263,16 @@ def main() -> int:
     # Without simulated time: the viewer runs on while time is paused.
     rospy.init_node(_NODE, disable_rostime=True)
     os.nice(_NICENESS)
-    host, port = rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080)
+    read = DeclaredParameters("modular_framework_simulation", "viewer").values
     try:
-        free = free_port(str(host), int(port))
-        server = WebServer(str(host), free)
-    except (SimulationError, ValueError) as error:
+        host, port, frame, read_only = read("~address", "~port", "~fixed_frame", "~read_only")
+        server = WebServer(host, free_port(host, port))
+    except (SimulationError, ParameterError, ValueError) as error:
         rospy.logfatal("the viewer cannot start: %s", error)
         return 1
     if server.port != port:
         rospy.logwarn("port %s is taken: the viewer uses %d", port, server.port)
     rospy.loginfo("viewer: open %s in a browser", server.address)
-    ViewerNode(server).run()
+    ViewerNode(server, frame, read_only).run()
     server.close()
     return 0
