@@ -17,7 +17,7 @@ from moveit_msgs.srv import (
     GetPlanningSceneRequest,
 )
 
-from modular_framework_core.task_runner.userdata_parameters import manipulator_links
+from modular_framework_core.task_runner.manipulator_links import manipulator_links
 from modular_framework_ros.calls import CallError, request_service
 
 PREFIX_PARAMETER = "manipulator_prefix"

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from modular_framework_core.files.faults import nearest
 from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix, MutableMatrix
-from modular_framework_core.task_runner.userdata_parameters import manipulator_links
+from modular_framework_core.task_runner.manipulator_links import manipulator_links
 
 LINK_SEPARATOR = "__"
 DEFAULT_LINK = "link"

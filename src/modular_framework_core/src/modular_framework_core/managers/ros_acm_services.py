@@ -29,9 +29,9 @@ from modular_framework_core.srv import (
     UpdateAndPublishACMEntryResponse,
 )
 from modular_framework_ros.calls import CallError, request_service
+from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_ros.node_handle import ParameterError
 
-INDICES_PARAMETER = "manipulator_links_indices"
-PREFIX_PARAMETER = "manipulator_prefix"
 APPLY_TIMEOUT_S = 3.0
 
 
@@ -98,7 +98,8 @@ class AcmServices(ManagerServices):
 
     def connect(self) -> None:
         """Advertises the services."""
-        entry_type = UpdateAndPublishACMEntry if rospy.get_param("~grip_interfaces", False) else UpdateACMEntry
+        read = DeclaredParameters("modular_framework_core", "managers").value
+        entry_type = UpdateAndPublishACMEntry if read("~grip_interfaces") else UpdateACMEntry
         self._services = [
             rospy.Service("set_init_acm", SetInitACM, self._set_init),
             rospy.Service("update_acm_entry", entry_type, self._update_entry),
@@ -108,17 +109,12 @@ class AcmServices(ManagerServices):
 
     def _set_init(self, request: Any) -> SetInitACMResponse:
         try:
-            indices = rospy.get_param(INDICES_PARAMETER, [])
-            if not isinstance(indices, list) or not all(type(index) is int for index in indices):
-                raise AcmError(
-                    f"parameter '{rospy.resolve_name(INDICES_PARAMETER)}' is {indices!r}, "
-                    "expected a list of whole numbers"
-                )
-            prefix = "" if indices else str(rospy.get_param(PREFIX_PARAMETER, ""))
-            if self.manager.set_initial(matrix_from_message(request.acm), indices, prefix):
+            read = DeclaredParameters("modular_framework_core", "managers").values
+            indices, prefix = read("manipulator_links_indices", "manipulator_prefix")
+            if self.manager.set_initial(matrix_from_message(request.acm), indices, "" if indices else prefix):
                 rospy.loginfo("set_init_acm: an earlier reference collision matrix was replaced.")
             return SetInitACMResponse(success=True)
-        except (AcmError, rospy.ROSException) as error:
+        except (AcmError, ParameterError, rospy.ROSException) as error:
             rospy.logerr("set_init_acm: %s", error)
             return SetInitACMResponse(success=False)
 

@@ -19,6 +19,7 @@ from modular_framework_core.managers.message_numbers import unusable_position
 from modular_framework_core.managers.message_store import Change, MessageNotFoundError, MessageStore
 from modular_framework_core.managers.ros_manager_services import ManagerServices
 from modular_framework_core.msg import ManagerChange
+from modular_framework_ros.declared_parameters import DeclaredParameters
 
 OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; manager_changes reports every one
 
@@ -135,7 +136,9 @@ class MessageServices(ManagerServices):
                 rospy.logerr("%s. This entry is skipped.", fault)
 
     def connect(self) -> None:
-        """Advertises the services."""
+        """Advertises the services; raises ParameterError where a parameter has a wrong value."""
+        given = DeclaredParameters("modular_framework_core", "managers").value("~file_directory")
+        self._folder = Path(given) if given else default_folders.framework_home() / "managers"
         self._changes = rospy.Publisher("manager_changes", ManagerChange, queue_size=1000)
         kind, last = self.kind, self.kind.suffixes[-1]
         for suffix in kind.suffixes:
@@ -203,7 +206,7 @@ class MessageServices(ManagerServices):
 
     def _save(self, request: Any) -> Any:
         try:
-            path = message_files.path_of(request.path, self._folder())
+            path = message_files.path_of(request.path, self._folder)
             count = message_files.save(path, self.kind.noun, *self.store.contents())
         except message_files.MessageFileError as error:
             return self._refused(str(error))
@@ -211,7 +214,7 @@ class MessageServices(ManagerServices):
 
     def _load(self, request: Any) -> Any:
         try:
-            path = message_files.path_of(request.path, self._folder())
+            path = message_files.path_of(request.path, self._folder)
             named, anonymous = message_files.load(path, self.kind.noun, self.kind.message_type)
         except message_files.MessageFileError as error:
             return self._refused(str(error))
@@ -241,7 +244,7 @@ class MessageServices(ManagerServices):
         file = self._file
         try:
             if request.path:
-                path = message_files.path_of(request.path, self._folder(), (file.path.parent,))
+                path = message_files.path_of(request.path, self._folder, (file.path.parent,))
                 file = NamedFile(path, file.read)
         except message_files.MessageFileError as error:
             return self._refused(str(error))
@@ -268,7 +271,3 @@ class MessageServices(ManagerServices):
     def _refused(self, reason: str, count: int = 0) -> Any:
         rospy.logerr("%s", reason)
         return srv.MessageFileResponse(success=False, message=reason, count=count)
-
-    def _folder(self) -> Path:
-        given = str(rospy.get_param("~file_directory", "") or "")
-        return Path(given) if given else default_folders.framework_home() / "managers"

@@ -23,6 +23,7 @@ from modular_framework_core.managers.ros_named_files import (
     trajectory_reader,
 )
 from modular_framework_core.managers.ros_object_type_services import ObjectTypeServices
+from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.service_backlog import widen_backlog
 from modular_framework_ros.start_up import start_timeout
 
@@ -78,10 +79,9 @@ def run_all() -> None:
     file of poses may be missing: older configurations have none.
     """
     arguments = [*start("managers"), "", "", ""]
-    files = [
-        str(rospy.get_param(f"~named_{name}_file", argument))
-        for name, argument in zip(("joint_states", "trajectories", "poses"), arguments, strict=False)
-    ]
+    read = DeclaredParameters("modular_framework_core", "managers").values
+    given = read("~named_joint_states_file", "~named_trajectories_file", "~named_poses_file")
+    files = [path or argument for path, argument in zip(given, arguments, strict=False)]
 
     def named(path: str, read: Callable[[Path], NamedMessages]) -> NamedFile | None:
         return NamedFile(Path(path), read) if path else None

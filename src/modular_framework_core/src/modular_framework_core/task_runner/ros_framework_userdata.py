@@ -6,9 +6,7 @@ until a state selects something), ``arm_commander`` (ArmCommander), ``manipulato
 (actionlib.SimpleActionClient of the Grasp action) and ``max_torque``; the last two are None when the task has no
 manipulator (parameter ``manipulator_prefix`` empty).
 
-Parameters: ``manipulator_prefix``; from motion_planner_config.yaml ``planner_name``, ``robot_speed_factor``,
-``arm_group_name``, ``number_plan_attempt``, ``planning_max_time``; from manipulator_controller_parameters.yaml
-``manipulator_controller_action_server_name``, ``max_torque``. Written: ``manipulator_links_indices``.
+Parameters: see ``parameters/run_task.yaml``. Written: ``manipulator_links_indices``.
 Services called: ``get_planning_scene``, ``set_init_acm``.
 """
 
@@ -23,13 +21,10 @@ from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 from modular_framework_core.commander.arm_commander import ArmCommander
 from modular_framework_core.msg import GraspAction
 from modular_framework_core.srv import SetInitACM, SetInitACMRequest
-from modular_framework_core.task_runner.userdata_parameters import (
-    UserdataParameters,
-    manipulator_links,
-    read_parameters,
-)
+from modular_framework_core.task_runner.manipulator_links import manipulator_links
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import call_service, wait_for_service
+from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.start_up import start_timeout
 
 SERVICE_TIMEOUT_S = 10.0
@@ -47,15 +42,15 @@ def initialise_userdata(userdata: Any) -> None:
         ParameterError: Parameters are missing or wrong; names all of them and their files.
         UserdataError, CallError, CommanderError: move_group or a manager is missing or refused.
     """
-    parameters = read_parameters(lambda name: rospy.get_param(f"/{name}", None))
+    arm = ("/planner_name", "/robot_speed_factor", "/arm_group_name", "/number_plan_attempt", "/planning_max_time")
+    hand = ("/manipulator_prefix", "/manipulator_controller_action_server_name", "/max_torque")
+    *of_arm, prefix, action, max_torque = DeclaredParameters("modular_framework_core", "run_task").values(*arm, *hand)
     for key in SELECTED_KEYS:
         userdata[key] = None
-    initialise_acm(parameters.manipulator_prefix)
-    userdata.arm_commander = make_arm_commander(parameters)
-    userdata.manipulator_controller_client = None
-    userdata.max_torque = parameters.max_torque
-    if parameters.manipulator_action:
-        userdata.manipulator_controller_client = SteadyActionClient(parameters.manipulator_action, GraspAction)
+    initialise_acm(prefix)
+    userdata.arm_commander = _make_arm_commander(*of_arm)
+    userdata.max_torque = max_torque if prefix else None
+    userdata.manipulator_controller_client = SteadyActionClient(action, GraspAction) if prefix else None
 
 
 def initialise_acm(manipulator_prefix: str) -> None:
@@ -90,16 +85,16 @@ def initialise_acm(manipulator_prefix: str) -> None:
         )
 
 
-def make_arm_commander(parameters: UserdataParameters) -> ArmCommander:
-    """Returns a connected commander for the planning group of the parameters, with their planner settings.
+def _make_arm_commander(planner: str, speed: float, group: str, attempts: int, time_s: float) -> ArmCommander:
+    """Returns a connected commander for a planning group.
 
     Raises:
         CommanderError: Something needed is missing, or there is no planner of that name.
     """
-    commander = ArmCommander(name=parameters.arm_group_name, set_ground=False)
-    commander.set_max_velocity_scaling_factor(parameters.robot_speed_factor)
-    commander.set_num_planning_attempts(parameters.number_plan_attempt)
-    commander.set_planning_time(parameters.planning_max_time)
+    commander = ArmCommander(name=group, set_ground=False)
+    commander.set_max_velocity_scaling_factor(speed)
+    commander.set_num_planning_attempts(attempts)
+    commander.set_planning_time(time_s)
     commander.connect()
-    commander.set_planner_id(parameters.planner_name)
+    commander.set_planner_id(planner)
     return commander

@@ -48,6 +48,8 @@ from modular_framework_core.task_constructor.state_catalogue import StateCatalog
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder, write_record
 from modular_framework_core.task_runner.ros_introspection import shown
 from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, EXIT_SUCCEEDED, TaskResult, TaskRun
+from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import SimulatedTime
 
@@ -199,10 +201,10 @@ def _asked(asked_by: list[str]) -> TriggerResponse:
 
 
 def _keep_record(name: str, begun: float, result: TaskResult, recorder: TaskRecorder) -> None:
-    folder = Path(str(rospy.get_param("~record_directory", "") or default_folders.framework_home() / "task_records"))
     try:
+        folder = Path(_parameter("~record_directory") or default_folders.framework_home() / "task_records")
         path = write_record(folder, name, begun, result.outcome, result.succeeded, result.error, recorder.records())
-    except OSError as error:
+    except (OSError, TaskNotRun) as error:
         rospy.logwarn(f"the record of the run is not kept: {error}; set ~record_directory to a folder to write to")
         return
     rospy.loginfo(f"record of the run: {path}")
@@ -248,12 +250,25 @@ def main() -> int:
     _start_node("run_task")
     try:
         name, factory = prepare(rospy.myargv()[1:])
+        waits = _parameter("~wait_for_start")
     except TaskNotRun as error:
         rospy.logfatal("The task could not be run: %s", error)
         return _finish(EXIT_NOT_RUN)
-    if rospy.get_param("~wait_for_start", False):
+    if waits:
         return _finish(StartedRuns(name, factory).serve())
     return _finish(run_machine(name, factory))
+
+
+def _parameter(name: str) -> Any:
+    """Returns a parameter of the node.
+
+    Raises:
+        TaskNotRun: Its value is not allowed.
+    """
+    try:
+        return DeclaredParameters("modular_framework_core", "run_task").value(name)
+    except ParameterError as error:
+        raise TaskNotRun(str(error)) from error
 
 
 class StartedRuns:
@@ -301,9 +316,9 @@ def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:
         TaskNotRun: There is nothing to run, or it is faulty.
     """
     given = Path(arguments[0]) if arguments else None
-    machine = str(rospy.get_param("~state_machine_to_load", "") or "").strip() if given is None else ""
+    machine = _parameter("~state_machine_to_load").strip() if given is None else ""
     if given is None:
-        given = Path(machine or str(rospy.get_param("~task_constructor_script", "") or ""))
+        given = Path(machine or _parameter("~task_constructor_script"))
     if not given.name:
         raise TaskNotRun(
             "nothing to run was given; give a task script or a state machine as argument, or as parameter "
@@ -332,7 +347,7 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
         for folder in StateCatalogue(states).empty_directories:
             rospy.logwarn(pipeline.no_states_in(folder))
         output = generator.default_output_directory()
-        file_name = str(rospy.get_param("~generated_state_machine_name", "") or "")
+        file_name = _parameter("~generated_state_machine_name")
         task, path = pipeline.construct_task(script, states, templates, output, _known_names(), file_name)
     except (TaskFault, generator.GenerationError, OSError, ValueError) as error:
         raise TaskNotRun(str(error)) from error
@@ -342,7 +357,7 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
 
 def _known_names() -> KnownNames:
     """Returns the names that the configuration files of the launch and the robot have."""
-    config = str(rospy.get_param("~config_directory", "") or "")
+    config = _parameter("~config_directory")
     names = names_of_config(Path(config)) if config else KnownNames()
     srdf = str(rospy.get_param("/robot_description_semantic", "") or "")
     return names.with_robot(srdf, "the parameter /robot_description_semantic") if srdf else names
@@ -350,5 +365,5 @@ def _known_names() -> KnownNames:
 
 def _directories(parameter: str) -> list[Path]:
     """Returns the directories of a parameter."""
-    value = rospy.get_param(f"~{parameter}", "")
+    value = _parameter(f"~{parameter}")
     return [Path(str(item)) for item in value] if isinstance(value, list) else pipeline.directories_from(str(value))
