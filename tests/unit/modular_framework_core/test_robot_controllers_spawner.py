@@ -12,7 +12,6 @@ from modular_framework_core.launching.robot_controllers_spawner import (
     SpawnPlan,
     plan_spawn,
     read_controller_file,
-    ready_topics,
     with_joint_states,
 )
 
@@ -69,25 +68,3 @@ def test_only_what_is_missing_is_done() -> None:
     states = {"a": "running", "b": "stopped", "d": "running"}
     assert plan_spawn(["a", "b", "c"], states) == SpawnPlan(load=("c",), start=("b", "c"))
     assert plan_spawn(["a"], states) == SpawnPlan(load=(), start=())
-
-
-def test_every_hardware_with_a_topic_is_waited_for() -> None:
-    assert ready_topics(["arm", "plain", "hand"], {"arm": "arm_ready", "plain": None, "hand": "hand_ready"}) == {
-        "arm": "arm_ready",
-        "hand": "hand_ready",
-    }
-    assert ready_topics(None, {}) == {}
-    assert ready_topics(["arm"], {"arm": ""}) == {}
-
-
-@pytest.mark.parametrize(
-    ("hardware", "topics", "words"),
-    [
-        ("arm", {}, "/robot_hardware: got 'arm'"),
-        ([1], {}, "/robot_hardware"),
-        (["arm"], {"arm": True}, "/arm/topic_to_wait_for: got True"),
-    ],
-)
-def test_faulty_hardware_parameters_are_named(hardware: object, topics: dict[str, object], words: str) -> None:
-    with pytest.raises(ControllerFileError, match=words):
-        ready_topics(hardware, topics)

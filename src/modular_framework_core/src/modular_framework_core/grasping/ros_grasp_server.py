@@ -28,6 +28,7 @@ from modular_framework_core.grasping.stall_evidence import Attempt, StallEvidenc
 from modular_framework_core.msg import GraspAction, GraspCommand, GraspFeedback, GraspResult
 from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_ros.calls import CallError
+from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.running_goals import RunningGoals
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 
@@ -44,11 +45,7 @@ class GraspServer:
 
     Only ``posture`` of the commanded stage moves anything here: the arm brings the hand to ``pose``.
 
-    Parameters:
-        ``~max_torque_full_scale`` (800): value of a command's ``max_torque`` that stands for the joints' full effort.
-        ``~position_tolerance`` [rad or m] (2.5 % of the smallest range of the fingers' joints, at most 0.05): distance
-        that counts as reached; fingers this near to shut count as shut.
-        ``~motion_timeout`` (25 s).
+    Parameters: see ``parameters/grasp_server.yaml``.
 
     Args:
         group: The joints of the fingers and their limits.
@@ -57,9 +54,11 @@ class GraspServer:
 
     def __init__(self, group: Group, manipulator: Manipulator) -> None:
         self._group, self._manipulator = group, manipulator
-        self._full_scale = float(rospy.get_param("~max_torque_full_scale", 800.0))
-        self._tolerance = float(rospy.get_param("~position_tolerance", reached_tolerance(group)))
-        self._timeout_s = float(rospy.get_param("~motion_timeout", 25.0))
+        read = DeclaredParameters("modular_framework_core", "grasp_server").values
+        self._full_scale, tolerance, self._timeout_s = read(
+            "~max_torque_full_scale", "~position_tolerance", "~motion_timeout"
+        )
+        self._tolerance = tolerance or reached_tolerance(group)
         self._motion_lock = threading.Lock()
         self._goals = RunningGoals()
         self._evidence = StallEvidence(self._tolerance)
@@ -180,23 +179,18 @@ def read_controllers() -> list[dict[str, Any]]:
 def main() -> int:
     """Runs the node ``moveit_grasp_action_server``; returns 1 when the robot's side is incomplete.
 
-    Parameters, beside those of :class:`GraspServer`:
-        ``manipulator_controller_action_server_name`` (moveit_grasp_action_server): name of the action.
-        ``manipulator_group_name``: planning group of the fingers.
-        ``robot_description``, ``robot_description_semantic``: the robot.
-        ``/move_group/controller_list`` or ``~controller_list``: controllers to drive the fingers with.
-        ``~motion_duration`` (2 s, trajectory controllers only).
+    Parameters: see ``parameters/moveit_grasp_action_server.yaml``.
 
     Subscribers: ``joint_states``. Actions called: the controller's own.
     """
     rospy.init_node("moveit_grasp_action_server")
+    read = DeclaredParameters("modular_framework_core", "moveit_grasp_action_server").values
+    duration_s, name = read("~motion_duration", "manipulator_controller_action_server_name")
     try:
-        duration_s = float(rospy.get_param("~motion_duration", 2.0))
         server = GraspServer(read_manipulator(), ControlledManipulator(read_controllers(), duration_s))
     except RobotModelError as error:
         rospy.logfatal("moveit_grasp_action_server: %s", error)
         return 1
-    name = str(rospy.get_param("manipulator_controller_action_server_name", "moveit_grasp_action_server"))
     server.connect(name)
     rospy.loginfo("The manipulator listens to action '%s'.", rospy.resolve_name(name))
     rospy.spin()

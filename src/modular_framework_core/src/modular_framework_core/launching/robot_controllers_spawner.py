@@ -112,31 +112,3 @@ def plan_spawn(wanted: Sequence[str], states: Mapping[str, str]) -> SpawnPlan:
         load=tuple(name for name in wanted if name not in states),
         start=tuple(name for name in wanted if states.get(name) != "running"),
     )
-
-
-def ready_topics(robot_hardware: object, topic_of: Mapping[str, object]) -> dict[str, str]:
-    """Returns which topic to wait for on behalf of which hardware.
-
-    Args:
-        robot_hardware: Parameter of that name: a list of hardware names, or None.
-        topic_of: `topic_to_wait_for` of each hardware that has one.
-
-    Returns:
-        Topic by hardware name, for every hardware that names one.
-
-    Raises:
-        ControllerFileError: `robot_hardware` is not a list of names, or a topic is not a name.
-    """
-    if robot_hardware is None:
-        return {}
-    if not isinstance(robot_hardware, list) or not all(isinstance(name, str) and name for name in robot_hardware):
-        raise ControllerFileError(f"parameter /robot_hardware: got {robot_hardware!r}; expected a list of names")
-    topics: dict[str, str] = {}
-    for name in robot_hardware:
-        topic = topic_of.get(name)
-        if topic in (None, ""):
-            continue
-        if not isinstance(topic, str):
-            raise ControllerFileError(f"parameter /{name}/topic_to_wait_for: got {topic!r}; expected a topic name")
-        topics[name] = topic
-    return topics

@@ -29,10 +29,10 @@ from modular_framework_core.launching.robot_controllers_spawner import (
     SpawnPlan,
     plan_spawn,
     read_controller_file,
-    ready_topics,
     with_joint_states,
 )
 from modular_framework_ros.calls import CallError, call_service
+from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.start_up import start_timeout
 
 LOOP_STATUS = ": control loop"
@@ -48,10 +48,7 @@ class SpawnError(Exception):
 class RobotControllersSpawner:
     """Node `custom_controller_spawner`.
 
-    Parameters: `~timeout` [s] 10: how long to wait before each warning about what is missing; `~give_up_after` [s],
-    default `/start_timeout`: how long to wait for the hardware and for the controller manager; `~stay_alive` false:
-    keep the node alive after success (for launch files that require it). Read besides: `/robot_hardware`,
-    `/<hardware>/topic_to_wait_for`.
+    Parameters: see `parameters/robot_controllers_spawner.yaml`; `/<hardware>/topic_to_wait_for`.
     Subscribes those topics (std_msgs/Bool), and `/diagnostics` for the faults that keep hardware from being ready.
     Calls `controller_manager/{list_controllers, load_controller, switch_controller}`.
     Uploads the controller file to the parameter server's root.
@@ -59,12 +56,18 @@ class RobotControllersSpawner:
     Args:
         robot_package: ROS package with a folder `controllers`.
         controller_file: File in that folder.
+
+    Attributes:
+        stays: Whether the node stays after success, for launch files that require it.
     """
 
     def __init__(self, robot_package: str, controller_file: str) -> None:
-        self._warn_after_s = _seconds("~timeout", 10.0)
         self._faults: dict[str, str] = {}
-        self._give_up_after_s = _seconds("~give_up_after", start_timeout())
+        read = DeclaredParameters("modular_framework_core", "robot_controllers_spawner").values
+        self._warn_after_s, give_up_after_s, self.stays, self._hardware = read(
+            "~timeout", "~give_up_after", "~stay_alive", "/robot_hardware"
+        )
+        self._give_up_after_s = give_up_after_s or start_timeout()
         try:
             folder = Path(rospkg.RosPack().get_path(robot_package))
         except rospkg.ResourceNotFound as error:
@@ -162,12 +165,11 @@ class RobotControllersSpawner:
         return True
 
     def _wait_for_hardware(self) -> None:
-        names = rospy.get_param("/robot_hardware", None)
-        listed = [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
-        try:
-            topics = ready_topics(names, {name: rospy.get_param(f"/{name}/topic_to_wait_for", None) for name in listed})
-        except ControllerFileError as error:
-            raise SpawnError(str(error)) from error
+        topics = {name: rospy.get_param(f"/{name}/topic_to_wait_for", "") for name in self._hardware}
+        topics = {name: topic for name, topic in topics.items() if topic}
+        for name, topic in topics.items():
+            if not isinstance(topic, str):
+                raise SpawnError(f"parameter '/{name}/topic_to_wait_for' is {topic!r}; allowed: the name of a topic")
         ready = {hardware: threading.Event() for hardware in topics}
         subscribers = [
             rospy.Subscriber(topic, Bool, _set_when_true, ready[hardware]) for hardware, topic in topics.items()
@@ -205,13 +207,6 @@ class RobotControllersSpawner:
             time.sleep(0.05)
 
 
-def _seconds(name: str, default: float) -> float:
-    value = rospy.get_param(name, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0.0:
-        raise SpawnError(f"parameter {rospy.resolve_name(name)}: got {value!r}; expected seconds above 0")
-    return float(value)
-
-
 def _set_when_true(message: Bool, event: threading.Event) -> None:
     if message.data:
         event.set()
@@ -225,10 +220,11 @@ def main() -> int:
         rospy.logfatal("usage: robot_controllers_spawner ROBOT_PACKAGE CONTROLLER_FILE; got %s", arguments)
         return 2
     try:
-        RobotControllersSpawner(*arguments).run()
+        spawner = RobotControllersSpawner(*arguments)
+        spawner.run()
     except SpawnError as error:
         (rospy.loginfo if rospy.is_shutdown() else rospy.logfatal)("controllers not spawned: %s", error)
         return 1
-    if rospy.get_param("~stay_alive", False):
+    if spawner.stays:
         rospy.spin()
     return 0
