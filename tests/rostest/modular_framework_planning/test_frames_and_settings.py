@@ -248,8 +248,8 @@ def test_the_monitored_scene_is_silent_while_it_is_switched_off_and_whole_afterw
 
 
 def test_a_parameter_of_the_wrong_type_is_named_and_its_default_used(session: Any) -> None:
-    error = next(line for line in session.log().splitlines() if "max_attempted_states_per_pose is 'many'" in line)
-    assert "1 to 100" in error and "4 is used" in error
+    error = next(line for line in session.log().splitlines() if "max_attempted_states_per_pose' is 'many'" in line)
+    assert "allowed: a whole number, at least 1 and at most 100" in error and "4 is used" in error
     with adjusted("pick_place", cartesian_motion_step_size=0.02) as before:
         assert before["max_attempted_states_per_pose"] == 4 and before["cartesian_motion_step_size"] == 0.005
 

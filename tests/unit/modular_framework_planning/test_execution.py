@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,10 +22,8 @@ from modular_framework_planning.messages.execution_messages import MotionPart
 from modular_framework_planning.move_group.controllers.action_controllers import ActionControllers
 from modular_framework_planning.move_group.controllers.execution import TrajectoryExecution
 from modular_framework_planning.trajectory_execution.controllers import ControllerSpec
-from modular_framework_planning.trajectory_execution.execution_settings import (
-    ExecutionSettings,
-    parse_execution_settings,
-)
+from modular_framework_planning.trajectory_execution.execution_settings import ExecutionSettings
+from modular_framework_ros.parameter_declarations import node_declaration
 
 WHEEL = ControllerSpec("base", "follow", "FollowJointTrajectory", ("wheel",))
 ARM = ControllerSpec("arm", "follow", "FollowJointTrajectory", ("elbow",))
@@ -109,9 +107,20 @@ def clock() -> Any:
     rospy.rostime.set_rostime_initialized(False)
 
 
+def execution_settings(**settings: Any) -> ExecutionSettings:
+    """Those that move_group declares, but for some."""
+    declared = node_declaration("modular_framework_planning", "move_group")
+    assert declared is not None
+    defaults = {
+        item.name: declared.parameters[f"~trajectory_execution/{item.name}"].default
+        for item in fields(ExecutionSettings)
+    }
+    return ExecutionSettings(**{**defaults, **settings})
+
+
 def executor(controllers: ActionControllers, **settings: Any) -> TrajectoryExecution:
-    settings = {"wait_for_trajectory_completion": False, **settings}
-    return TrajectoryExecution(controllers, ExecutionSettings(**settings), StandingRobot())  # type: ignore[arg-type]
+    used = execution_settings(**{"wait_for_trajectory_completion": False, **settings})
+    return TrajectoryExecution(controllers, used, StandingRobot())  # type: ignore[arg-type]
 
 
 def motion(joints: str, *points: tuple[float, list[float]]) -> RobotTrajectory:
@@ -136,7 +145,7 @@ def test_parts_of_a_motion_begin_at_one_instant_where_time_can_be_held(waits_for
             stood.append(robot.time.stands)
             return super().begin(part)
 
-    settings = ExecutionSettings(wait_for_trajectory_completion=False)
+    settings = execution_settings(wait_for_trajectory_completion=False)
     execution = TrajectoryExecution(Watched(ARM, GRIPPER), settings, robot)  # type: ignore[arg-type]
     execution.execute(motion("elbow finger", (0.0, [0.3, 0.3]), (1.0, [0.4, 0.4])), threading.Event())
     assert stood == [waits_for_planning, waits_for_planning] and not robot.time.stands
@@ -165,7 +174,7 @@ def test_where_time_is_held_a_motion_settles_from_the_state_of_the_instant_in_wh
             robot.late = True
             return super().begin(part)
 
-    settings = ExecutionSettings(wait_for_trajectory_completion=True)
+    settings = execution_settings(wait_for_trajectory_completion=True)
     execution = TrajectoryExecution(Moving(ARM), settings, robot)  # type: ignore[arg-type]
     execution.execute(motion("elbow", (0.0, [0.3]), (1.0, [0.4])), threading.Event())
     assert robot.states == 1
@@ -321,7 +330,7 @@ def test_without_monitoring_a_motion_may_take_for_ever(clock: Any) -> None:
 
 
 def test_a_node_that_only_plans_says_so() -> None:
-    execution = TrajectoryExecution(None, ExecutionSettings(), StandingRobot())  # type: ignore[arg-type]
+    execution = TrajectoryExecution(None, execution_settings(), StandingRobot())  # type: ignore[arg-type]
     with pytest.raises(PlanningError, match="allow_trajectory_execution is false"):
         execution.execute(motion("elbow", (0.0, [0.3])), threading.Event())
     assert execution.describe() == "no execution of motions"
@@ -347,25 +356,6 @@ def test_closing_stops_the_motion_and_waits_until_it_has_ended() -> None:
     assert ended
     assert controllers.cancelled == ["arm"]
     execution.close()  # a second time does nothing
-
-
-def test_settings_that_make_no_sense_keep_their_defaults_and_are_named() -> None:
-    settings, faults = parse_execution_settings(
-        {
-            "allowed_start_tolerance": 0,
-            "allowed_goal_duration_margin": "much",
-            "execution_velocity_scaling": 0.0,
-            "execution_duration_monitoring": "yes",
-            "joints_allowed_start_tolerance": {"elbow": 1},
-            "unheard_of": 1,
-        }
-    )
-    assert settings == ExecutionSettings(allowed_start_tolerance=0.0, joints_allowed_start_tolerance={"elbow": 1})
-    assert [fault.split()[0] for fault in faults] == [
-        "execution_duration_monitoring",
-        "allowed_goal_duration_margin",
-        "execution_velocity_scaling",
-    ]
 
 
 def test_motions_of_different_joints_run_at_the_same_time_and_those_of_the_same_do_not() -> None:

@@ -7,7 +7,7 @@ Programs that check a launch before it starts read the same file, without import
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -48,8 +48,9 @@ class Declaration:
         at_least, at_most: Bounds of a number, themselves allowed.
         above: Lower bound that is itself not allowed.
         choices: Allowed values; empty: any.
-        items: Type of each item of a list, a word of TYPES; empty: any.
+        items: Type of each item of a list or mapping, a word of TYPES; empty: any.
         names: Kind of thing it names, such as `planner` or `group`; empty: none.
+        adjustable: Lowest and highest value that dynamic_reconfigure may give it while the node runs; empty: none.
         tree: Whether there are names below this one that only the robot or a plugin knows.
     """
 
@@ -65,6 +66,7 @@ class Declaration:
     choices: tuple[Any, ...] = ()
     items: str = ""
     names: str = ""
+    adjustable: tuple[Any, ...] = ()
     tree: bool = False
 
     @property
@@ -99,7 +101,8 @@ class Declaration:
         """Returns what is wrong with a value, in words that follow the name of the parameter; "" if nothing is."""
         fits = _is_of(self.type, value)
         if fits and self.items:
-            fits = all(_is_of(self.items, item) and self._is_within(item) for item in value)
+            items = value.values() if isinstance(value, dict) else value
+            fits = all(_is_of(self.items, item) and self._is_within(item) for item in items)
         fits = fits and self._is_within(value) and not (self.required and value in ("", []))
         if fits and (not self.choices or value in self.choices):
             return ""
@@ -144,6 +147,14 @@ class ParameterReader:
         self, declaration: NodeDeclaration, get: Callable[[str], Any], whole_name: Callable[[str], str] = str
     ) -> None:
         self._declared, self._get, self._whole_name = declaration.parameters, get, whole_name
+
+    def declarations(self) -> Iterable[Declaration]:
+        """Returns the declarations of all parameters."""
+        return self._declared.values()
+
+    def declaration(self, name: str) -> Declaration:
+        """Returns the declaration of a parameter."""
+        return self._declared[name]
 
     def value(self, name: str) -> Any:
         """Returns a parameter, a number of type float as a float; its default if it is not set.
@@ -217,8 +228,8 @@ def read_declaration(path: Path) -> NodeDeclaration:
                 raise DeclarationError(f"includes {included}, which declares no parameters")
             parameters |= found.parameters
         for name, keys in (content.get("parameters") or {}).items():
-            choices = tuple(keys.pop("choices", ()))
-            parameters[name] = Declaration(name=name, choices=choices, **keys)
+            lists = {key: tuple(keys.pop(key, ())) for key in ("choices", "adjustable")}
+            parameters[name] = Declaration(name=name, **lists, **keys)
             for word in filter(None, (parameters[name].type, parameters[name].items)):
                 if word not in TYPES:
                     raise DeclarationError(f"{name}: type '{word}'; allowed: {', '.join(TYPES)}")

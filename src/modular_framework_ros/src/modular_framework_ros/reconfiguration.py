@@ -12,6 +12,8 @@ from typing import Any
 import rospy
 from dynamic_reconfigure.server import Server
 
+from modular_framework_ros.parameter_declarations import ParameterReader
+
 
 @dataclass(frozen=True, slots=True)
 class Adjustable:
@@ -27,11 +29,20 @@ class Adjustable:
         """The type in dynamic_reconfigure's words."""
         return {bool: "bool", int: "int", float: "double"}[type(self.lowest)]
 
-    def accepts(self, value: object) -> bool:
-        """Whether a parameter's value is of the type and within the range."""
-        if isinstance(value, bool) or isinstance(self.lowest, bool):
-            return type(value) is type(self.lowest)
-        return isinstance(value, type(self.lowest) | int) and self.lowest <= value <= self.highest
+
+def adjustable(parameters: ParameterReader, namespace: str) -> tuple[Adjustable, ...]:
+    """Returns the declared parameters below a namespace that may be changed while the node runs.
+
+    Args:
+        parameters: The parameters of the node.
+        namespace: With the slash at its end.
+    """
+    as_kind = {"bool": bool, "int": int, "float": float}
+    return tuple(
+        Adjustable(item.name.removeprefix(namespace), *map(as_kind[item.type], item.adjustable), item.doc)
+        for item in parameters.declarations()
+        if item.adjustable and item.name.startswith(namespace)
+    )
 
 
 class _Server(Server):

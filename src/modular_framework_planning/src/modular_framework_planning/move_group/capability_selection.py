@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import rospy
 
 from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
+from modular_framework_planning.move_group.node_parameters import parameter
 
 PIPELINES = "~planning_pipelines"
 
@@ -33,16 +34,15 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapab
 
     An unknown name is a warning with the list of those that are known, as in MoveIt.
     """
-    wanted = [(rospy.resolve_name("~capabilities"), name) for name in _split(rospy.get_param("~capabilities", ""))]
-    for pipeline, settings in (rospy.get_param(PIPELINES, {}) or {}).items():
+    wanted = [(rospy.resolve_name("~capabilities"), name) for name in _split(parameter("~capabilities"))]
+    for pipeline, settings in (parameter(PIPELINES) or {}).items():
         if isinstance(settings, dict):
             wanted += [
                 (rospy.resolve_name(f"{PIPELINES}/{pipeline}/capabilities"), name)
                 for name in _split(settings.get("capabilities", ""))
             ]
     disabled = [
-        (rospy.resolve_name("~disable_capabilities"), name)
-        for name in _split(rospy.get_param("~disable_capabilities", ""))
+        (rospy.resolve_name("~disable_capabilities"), name) for name in _split(parameter("~disable_capabilities"))
     ]
     known = list(dict.fromkeys(item.name for item in table))
     for where, name in (*wanted, *disabled):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import rospy
 from std_msgs.msg import String
 
+from modular_framework_planning.move_group.node_parameters import parameter
 from modular_framework_planning.move_group.robot_parameters import DESCRIPTION
 from modular_framework_ros.parameter_search import nearest_parameter
 
@@ -16,6 +17,6 @@ def publish_descriptions() -> None:
     Publishes: robot_description, robot_description_semantic (std_msgs/String, latched).
     """
     for topic in (DESCRIPTION, f"{DESCRIPTION}_semantic"):
-        if rospy.get_param(f"~planning_scene_monitor/publish_{topic}", False):
+        if parameter(f"~planning_scene_monitor/publish_{topic}"):
             publisher = rospy.Publisher(topic, String, queue_size=1, latch=True)
             publisher.publish(str(rospy.get_param(nearest_parameter(topic))))

@@ -34,6 +34,7 @@ from modular_framework_planning.move_group.description_topics import publish_des
 from modular_framework_planning.move_group.markers.scene_markers import MarkerPublisher
 from modular_framework_planning.move_group.monitors.octomap_monitor import OctomapMonitor
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
+from modular_framework_planning.move_group.node_parameters import settings_below
 from modular_framework_planning.move_group.node_settings import (
     MotionSettings,
     PlanExecutionSettings,
@@ -42,7 +43,7 @@ from modular_framework_planning.move_group.node_settings import (
 from modular_framework_planning.move_group.padding_parameters import load_padding
 from modular_framework_planning.move_group.pipeline_parameters import load_pipelines
 from modular_framework_planning.move_group.planning_report import Reporter
-from modular_framework_planning.move_group.reconfiguration import given_settings, reconfigurations
+from modular_framework_planning.move_group.reconfiguration import reconfigurations
 from modular_framework_planning.move_group.robot_parameters import (
     collision_detector_name,
     ignored_parameters,
@@ -52,6 +53,7 @@ from modular_framework_planning.move_group.robot_parameters import (
 from modular_framework_planning.numba_cache import cache_is_empty
 from modular_framework_planning.pick_place.settings import PickPlaceSettings
 from modular_framework_planning.planning_interface.collision_detectors import collision_detector
+from modular_framework_planning.planning_interface.planning_request import SamplingSettings
 from modular_framework_planning.process_setup.compile_loops import compile_all
 from modular_framework_planning.process_setup.garbage_collection import freeze_loaded_objects
 from modular_framework_planning.process_setup.many_threads import prepare
@@ -81,16 +83,16 @@ def build_context() -> MoveGroupContext:
     """Reads parameters and builds the shared parts; raises PlanningError with what is missing."""
     model = load_robot_model()
     kinematics = KinematicsPool(model, load_kinematics_settings())
-    monitor = SceneMonitor(model, load_padding(model), given_settings("planning_scene_monitor", SceneMonitorSettings()))
+    monitor = SceneMonitor(model, load_padding(model), settings_below("planning_scene_monitor", SceneMonitorSettings))
     for sentence in ignored_parameters():
         rospy.logwarn("%s", sentence)
     execution = load_execution(monitor)
     detector = collision_detector_name()
     new_checker = collision_detector(detector)
     pipelines = load_pipelines(model, kinematics, detector)
-    pipelines.sampling_settings = given_settings("ompl", pipelines.sampling_settings)
+    pipelines.sampling_settings = settings_below("ompl", SamplingSettings)
     settings = MotionSettings(
-        given_settings("plan_execution", PlanExecutionSettings()), given_settings("pick_place", PickPlaceSettings())
+        settings_below("plan_execution", PlanExecutionSettings), settings_below("pick_place", PickPlaceSettings)
     )
     return MoveGroupContext(
         model,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from modular_framework_planning.pick_place.settings import PickPlaceSettings
@@ -20,11 +20,11 @@ class SceneMonitorSettings:
             joints and of frames outside the robot are published.
     """
 
-    publish_planning_scene: bool = True
-    publish_planning_scene_hz: float = 10.0
-    publish_geometry_updates: bool = True
-    publish_state_updates: bool = True
-    publish_transforms_updates: bool = True
+    publish_planning_scene: bool
+    publish_planning_scene_hz: float
+    publish_geometry_updates: bool
+    publish_state_updates: bool
+    publish_transforms_updates: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,8 @@ class PlanExecutionSettings:
         record_trajectory_state_frequency: of what `executed_trajectory` holds [Hz]; 0: nothing is recorded.
     """
 
-    max_replan_attempts: int = 5
-    record_trajectory_state_frequency: float = 20.0
+    max_replan_attempts: int
+    record_trajectory_state_frequency: float
 
     def attempts(self, options: Any) -> int:
         """Returns how often moveit_msgs/PlanningOptions allow to plan."""
@@ -50,5 +50,5 @@ class PlanExecutionSettings:
 class MotionSettings:
     """Holds the settings of motions; each motion uses those in force when it starts."""
 
-    plan_execution: PlanExecutionSettings = field(default_factory=PlanExecutionSettings)
-    pick_place: PickPlaceSettings = field(default_factory=PickPlaceSettings)
+    plan_execution: PlanExecutionSettings
+    pick_place: PickPlaceSettings

@@ -134,7 +134,7 @@ class ManoeuvrePlanner:
         plan: Callable[[PlanningRequest], PlanningAnswer],
         request: PlanningRequest,
         contact_tolerance_m: float,
-        settings: PickPlaceSettings | None = None,
+        settings: PickPlaceSettings,
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
     ) -> None:
         """Stores what all manoeuvres share.
@@ -148,7 +148,7 @@ class ManoeuvrePlanner:
             new_checker: makes the collision checkers.
         """
         self._arm, self._plan, self._template = arm, plan, request
-        self._tolerance_m, self._settings = contact_tolerance_m, settings or PickPlaceSettings()
+        self._tolerance_m, self._settings = contact_tolerance_m, settings
         self._new_checker = new_checker
         self._deadline_s = time.monotonic() + request.allowed_time_s
         self._constraints: KinematicConstraints | None = request.path_constraints

@@ -15,5 +15,5 @@ class PickPlaceSettings:
         cartesian_motion_step_size: between the poses that are solved on a straight line [m].
     """
 
-    max_attempted_states_per_pose: int = 4
-    cartesian_motion_step_size: float = 0.005
+    max_attempted_states_per_pose: int
+    cartesian_motion_step_size: float

@@ -28,6 +28,7 @@ from modular_framework_planning.robot_model.multi_dof_joint import PLANAR
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.visualization.goal_marker import BASE, GOAL, ON_THE_GROUND, SIX_WAYS, Choice, GoalMarker
 from modular_framework_planning.visualization.move_group_client import MotionOptions, MoveGroupClient
+from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.publishing import publish
 
 VALID, COLLIDING, UNREACHABLE = (0.2, 0.8, 0.3, 0.5), (0.9, 0.15, 0.1, 0.6), (0.6, 0.6, 0.6, 0.35)
@@ -53,26 +54,22 @@ class InteractiveGoal:
     Interactive marker: ~marker.
     Subscribes: /rviz/moveit/{plan, execute, stop, update_start_state, update_goal_state} (std_msgs/Empty) and
         /rviz/moveit/{update_custom_start_state, update_custom_goal_state} (moveit_msgs/RobotState), as MoveIt's panel.
-    Parameters: ~group (the first that is a chain), ~marker_scale (0.25) [m], ~planning_time (5) [s],
-        ~velocity_scaling, ~acceleration_scaling (0: move_group's default), ~connection_timeout (60) [s].
+    Parameters: see `parameters/interactive_goal.yaml`.
     """
 
     def __init__(self, model: RobotModel, client: MoveGroupClient) -> None:
         self._model, self._client = model, client
         self._groups = [group.name for group in model.groups.values() if group.is_chain]
-        wanted = str(rospy.get_param("~group", "") or next(iter(self._groups), ""))
+        read = DeclaredParameters("modular_framework_planning", "interactive_goal").values
+        group, self._scale_m, self._connection_timeout_s = read("~group", "~marker_scale", "~connection_timeout")
+        wanted = group or next(iter(self._groups), "")
         if wanted not in self._groups:
             raise ModelError(
                 f"{rospy.resolve_name('~group')} is '{wanted}'; groups with a tip to drag: "
                 f"{', '.join(self._groups) or 'none'}"
             )
         self._group: JointGroup = model.group(wanted)
-        self._options = MotionOptions(
-            *(
-                float(rospy.get_param(f"~{name}", default))
-                for name, default in (("planning_time", 5.0), ("velocity_scaling", 0.0), ("acceleration_scaling", 0.0))
-            )
-        )
+        self._options = MotionOptions(*read("~planning_time", "~velocity_scaling", "~acceleration_scaling"))
         self._marker = GoalMarker(rospy.resolve_name("~marker"), self._on_drag)
         self._ghosts = {
             name: rospy.Publisher(f"~{name}_ghost", MarkerArray, queue_size=1, latch=True) for name in ("goal", "start")
@@ -92,11 +89,10 @@ class InteractiveGoal:
 
     def connect(self) -> None:
         """Waits for move_group, then shows the marker; raises PlanningError."""
-        self._client.connect(float(rospy.get_param("~connection_timeout", 60.0)))
+        self._client.connect(self._connection_timeout_s)
         self._goal = self._positions_of(self._client.state())
         self._fill_menu()
         self._show_goal()
-        self._scale_m = float(rospy.get_param("~marker_scale", 0.25))
         self._show_markers()
         for topic, command in (
             ("plan", self.plan),

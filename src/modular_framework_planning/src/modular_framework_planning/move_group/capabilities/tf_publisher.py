@@ -13,8 +13,7 @@ from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
 from modular_framework_planning.move_group.context import MoveGroupContext
-
-DEFAULT_RATE_HZ = 10.0
+from modular_framework_planning.move_group.node_parameters import parameter
 
 
 class TfPublisher(MoveGroupCapability):
@@ -25,13 +24,13 @@ class TfPublisher(MoveGroupCapability):
 
     def __init__(self, context: MoveGroupContext) -> None:
         super().__init__(context)
-        self._rate_hz = float(rospy.get_param("~planning_scene_frame_publishing_rate", DEFAULT_RATE_HZ))
-        self._prefix = str(rospy.get_param("~planning_scene_tf_prefix", "")).rstrip("/")
+        self._rate_hz = parameter("~planning_scene_frame_publishing_rate")
+        self._prefix = parameter("~planning_scene_tf_prefix").rstrip("/")
 
     def connect(self) -> None:
         """Starts to broadcast."""
         self._broadcaster = tf2_ros.TransformBroadcaster()
-        self._timer = rospy.Timer(rospy.Duration(1.0 / max(self._rate_hz, 0.1)), self._publish)
+        self._timer = rospy.Timer(rospy.Duration(1.0 / self._rate_hz), self._publish)
 
     def _publish(self, _: Any) -> None:
         scene = self._context.monitor.snapshot()

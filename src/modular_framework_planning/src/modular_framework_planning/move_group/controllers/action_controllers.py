@@ -14,6 +14,7 @@ from control_msgs.msg import FollowJointTrajectoryAction, GripperCommandAction
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.execution_messages import MotionPart, gripper_goal, trajectory_goal
+from modular_framework_planning.move_group.node_parameters import parameter
 from modular_framework_planning.trajectory_execution.controllers import (
     ACTION_KINDS,
     GRIPPER,
@@ -63,7 +64,7 @@ class ControllerManager(Protocol):
 def listed_controllers(kinds: Sequence[str] = ACTION_KINDS, default_kind: str = "") -> tuple[ControllerSpec, ...]:
     """Returns the usable controllers of ~controller_list; faults of the others are logged."""
     where = rospy.resolve_name("~controller_list")
-    specs, faults = parse_controllers(rospy.get_param(where, None) or [], kinds, default_kind)
+    specs, faults = parse_controllers(parameter("~controller_list") or [], kinds, default_kind)
     for fault in faults:
         rospy.logerr("%s: %s; this controller is left out", where, fault)
     return tuple(specs)

@@ -29,11 +29,9 @@ from modular_framework_planning.move_group.controllers.action_controllers import
 from modular_framework_planning.move_group.controllers.fake_controllers import FakeControllers
 from modular_framework_planning.move_group.controllers.ros_control import RosControlControllers
 from modular_framework_planning.move_group.monitors.scene_monitor import STATE_PERIOD_S, SceneMonitor
+from modular_framework_planning.move_group.node_parameters import parameter, settings_below
 from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, GRIPPER, choose_controllers
-from modular_framework_planning.trajectory_execution.execution_settings import (
-    ExecutionSettings,
-    parse_execution_settings,
-)
+from modular_framework_planning.trajectory_execution.execution_settings import ExecutionSettings
 from modular_framework_planning.trajectory_execution.path_watch import PathWatch
 from modular_framework_ros.calls import wait_until
 
@@ -340,24 +338,22 @@ def load_execution(monitor: SceneMonitor) -> TrajectoryExecution:
     Raises:
         ModelError: a controller manager of that name does not exist.
     """
-    settings, faults = parse_execution_settings(rospy.get_param("~trajectory_execution", {}) or {})
-    for fault in faults:
-        rospy.logerr("%s/%s; the default is used", rospy.resolve_name("~trajectory_execution"), fault)
-    allowed = rospy.get_param("~allow_trajectory_execution", True)
+    settings = settings_below("trajectory_execution", ExecutionSettings)
+    allowed = parameter("~allow_trajectory_execution")
     manager = _load_manager(settings.controller_connection_timeout, monitor) if allowed else None
     return TrajectoryExecution(manager, settings, monitor)
 
 
 def _load_manager(timeout_s: float, monitor: SceneMonitor) -> ControllerManager:
-    name = str(rospy.get_param("~moveit_controller_manager", "") or SIMPLE_MANAGER)
+    name = parameter("~moveit_controller_manager") or SIMPLE_MANAGER
     match name.replace("::", "/"):
         case known if known == SIMPLE_MANAGER:
             return ActionControllers(listed_controllers(), timeout_s)
         case known if known == FAKE_MANAGER:
             return FakeControllers(listed_controllers(FAKE_KINDS, FAKE_KINDS[0]), monitor)
         case known if known in (ROS_CONTROL_MANAGER, ALL_ROS_CONTROL_MANAGERS):
-            only = str(rospy.get_param("~ros_control_namespace", "/")) if known == ROS_CONTROL_MANAGER else None
-            may_switch = bool(rospy.get_param("~moveit_manage_controllers", False))
+            only = parameter("~ros_control_namespace") if known == ROS_CONTROL_MANAGER else None
+            may_switch = parameter("~moveit_manage_controllers")
             return RosControlControllers(listed_controllers(), only, may_switch, timeout_s)
     raise ModelError(
         f"parameter {rospy.resolve_name('~moveit_controller_manager')}: '{name}' is not known; known: "

@@ -18,12 +18,12 @@ from modular_framework_planning.messages.execution_messages import MotionPart
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.controllers.action_controllers import RunningMotion
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
+from modular_framework_planning.move_group.node_parameters import parameter
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_execution.controllers import ControllerSpec
 from modular_framework_ros.calls import wait_until
 from modular_framework_ros.publishing import publish
 
-DEFAULT_RATE = 10.0
 SEEN_TIMEOUT_S = 5.0
 SEEN_TOLERANCE = 1.0e-3  # [rad or m]
 
@@ -67,13 +67,13 @@ class FakeControllers:
     def __init__(self, specs: tuple[ControllerSpec, ...], monitor: SceneMonitor) -> None:
         self._specs = specs
         self._monitor = monitor
-        self._rate = float(rospy.get_param("~fake_interpolating_controller_rate", DEFAULT_RATE))
+        self._rate = parameter("~fake_interpolating_controller_rate")
         self._publisher: Any = None
 
     def connect(self) -> None:
         """Publishes the initial positions and waits until they have come back: until then the robot seems elsewhere."""
         self._publisher = rospy.Publisher(names.FAKE_JOINT_STATES_TOPIC, JointState, queue_size=100, latch=True)
-        positions, faults = initial_positions(self._monitor.model, rospy.get_param("~initial", []))
+        positions, faults = initial_positions(self._monitor.model, parameter("~initial"))
         for fault in faults:
             rospy.logerr("%s", fault)
         if positions:

@@ -18,6 +18,7 @@ from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.markers.octomap_markers import OctomapMarkers
 from modular_framework_planning.move_group.monitors.octomap_updaters import updater_of
 from modular_framework_planning.move_group.monitors.scene_monitor import SceneMonitor
+from modular_framework_planning.move_group.node_parameters import parameter
 from modular_framework_planning.octomap.encoding import read_file, write_file
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
@@ -56,10 +57,9 @@ class OctomapMonitor:
 
     def connect(self) -> None:
         """Reads the parameters, subscribes to the sensors and advertises the services."""
-        self._resolution = empty_map(float(rospy.get_param("~octomap_resolution", DEFAULT_RESOLUTION))).resolution
-        self._frame = str(rospy.get_param("~octomap_frame", ""))
-        max_range = rospy.get_param("~max_range", None)
-        sensors, faults = read_sensors(rospy.get_param("~sensors", []), None if max_range is None else float(max_range))
+        self._resolution = empty_map(parameter("~octomap_resolution")).resolution
+        self._frame = parameter("~octomap_frame")
+        sensors, faults = read_sensors(parameter("~sensors"), parameter("~max_range"))
         for fault in faults:
             rospy.logerr("%s: this sensor is left out of the octomap", fault)
         self._monitor.listeners.append(OctomapMarkers().show)

@@ -48,13 +48,11 @@ class SceneMonitor:
     Parameters: those of `settings`, below ~planning_scene_monitor.
     """
 
-    def __init__(
-        self, model: RobotModel, padding: Padding | None = None, settings: SceneMonitorSettings | None = None
-    ) -> None:
+    def __init__(self, model: RobotModel, padding: Padding, settings: SceneMonitorSettings) -> None:
         self.model = model
-        self.settings = settings or SceneMonitorSettings()  # may be replaced while the node runs
+        self.settings = settings  # may be replaced while the node runs
         self._frames = TfFrames(model)
-        self._scene = empty_scene(model).with_padding(padding or Padding())
+        self._scene = empty_scene(model).with_padding(padding)
         self._lock = threading.RLock()
         self._positions = model.default_positions()
         self._base_is_seen = False  # tf has shown where a planar or floating base is

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads the parameters of move_group that `parameters/move_group.yaml` declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from functools import cache
+from typing import Any, TypeVar
+
+import rospy
+
+from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_ros.node_handle import ParameterError
+
+Settings = TypeVar("Settings")
+
+
+@cache
+def declared_parameters() -> DeclaredParameters:
+    """Returns the parameters of the node."""
+    return DeclaredParameters("modular_framework_planning", "move_group")
+
+
+def parameter(name: str) -> Any:
+    """Returns a parameter; as in MoveIt a value that is not allowed is an error in the log, and the default is used."""
+    try:
+        return declared_parameters().value(name)
+    except ParameterError as error:
+        default = declared_parameters().declaration(name).default
+        rospy.logerr("%s; %s is used", error, default)
+        return default
+
+
+def settings_below(namespace: str, kind: Callable[..., Settings]) -> Settings:
+    """Returns settings whose attributes have the names of the parameters below a namespace of the node."""
+    return kind(**{item.name: parameter(f"~{namespace}/{item.name}") for item in fields(kind)})  # type: ignore[arg-type]
