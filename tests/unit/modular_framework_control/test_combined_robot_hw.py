@@ -177,10 +177,13 @@ def test_two_controllers_may_not_command_one_joint_through_two_parts() -> None:
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [
-        ({}, ["parameter /robot_hardware: got None"]),
-        ({"robot_hardware": "arm"}, ["parameter /robot_hardware: got 'arm'; expected a list"]),
-        ({"robot_hardware": []}, ["got []"]),
-        ({"robot_hardware": ["a", "a"]}, ["may be named once"]),
+        ({}, ["parameter '/robot_hardware' is not set; allowed: a list"]),
+        ({"robot_hardware": "arm"}, ["parameter '/robot_hardware' is 'arm'; allowed: a list"]),
+        ({"robot_hardware": []}, ["is []; allowed: a list that is not empty"]),
+        (
+            {"robot_hardware": ["a", "a"]},
+            ["is ['a', 'a']; allowed: a list that is not empty, each a text and listed once"],
+        ),
         ({"robot_hardware": ["a"]}, ["entry 'a' of robot_hardware", "parameter /a/type is None"]),
         (
             {"robot_hardware": ["a"], "a": {"type": "no/Such"}},

@@ -7,7 +7,7 @@ Programs that check a launch before it starts read the same file, without import
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any
 import rospkg
 import yaml
 
-from modular_framework_ros.node_handle import ParameterError
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
 
 TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "str": ((str,), "a text"),
@@ -48,6 +48,8 @@ class Declaration:
         at_least, at_most: Bounds of a number, themselves allowed.
         above: Lower bound that is itself not allowed.
         choices: Allowed values; empty: any.
+        distinct: Whether no item of a list may come twice.
+        length: Number of items of a list; None: any.
         items: Type of each item of a list or mapping, a word of TYPES; empty: any.
         names: Kind of thing it names, such as `planner` or `group`; empty: none.
         adjustable: Lowest and highest value that dynamic_reconfigure may give it while the node runs; empty: none.
@@ -64,6 +66,8 @@ class Declaration:
     at_most: float = math.inf
     above: float = -math.inf
     choices: tuple[Any, ...] = ()
+    distinct: bool = False
+    length: int | None = None
     items: str = ""
     names: str = ""
     adjustable: tuple[Any, ...] = ()
@@ -79,9 +83,11 @@ class Declaration:
             for word, bound in (("above", self.above), ("at least", self.at_least), ("at most", self.at_most))
             if math.isfinite(bound)
         ]
-        words = TYPES[self.type][1] + (f", each {TYPES[self.items][1]}" if self.items else "")
+        words = TYPES[self.type][1] + (f" of {self.length}" if self.length else "")
         if self.required and self.type in ("str", "list"):
             words += " that is not empty"
+        if self.items:
+            words += f", each {TYPES[self.items][1]}{' and listed once' if self.distinct else ''}"
         return ", ".join([words, " and ".join(bounds)] if bounds else [words])
 
     @property
@@ -102,7 +108,8 @@ class Declaration:
         fits = _is_of(self.type, value)
         if fits and self.items:
             items = value.values() if isinstance(value, dict) else value
-            fits = all(_is_of(self.items, item) and self._is_within(item) for item in items)
+            fits = all(_is_of(self.items, item) and self._is_within(item) and item != "" for item in items)
+            fits = fits and not (self.distinct and len(set(items)) < len(items)) and self.length in (None, len(items))
         fits = fits and self._is_within(value) and not (self.required and value in ("", []))
         if fits and (not self.choices or value in self.choices):
             return ""
@@ -168,8 +175,12 @@ class ParameterReader:
         """
         return self.values(name)[0]
 
-    def values(self, *names: str) -> list[Any]:
+    def values(self, *names: str, required: Container[str] = ()) -> list[Any]:
         """Returns several parameters, all that are declared if none is named, as `value` does.
+
+        Args:
+            names: As they are declared.
+            required: Names of those that are required though the declaration does not say so.
 
         Raises:
             ParameterError: Names each that is not set though required, or whose value is not allowed.
@@ -178,6 +189,7 @@ class ParameterReader:
         found, faults = [], []
         for name in names or self._declared:
             declared = self._declared[name].beside(self._get)
+            declared = replace(declared, required=True) if name in required else declared
             value = self._get(declared.name)
             value = declared.default if value is None else value
             if value is None and declared.required:
@@ -188,6 +200,36 @@ class ParameterReader:
         if faults:
             raise ParameterError("; ".join(faults))
         return found
+
+
+def parameters_below(package: str, name: str, own: NodeHandle, root: NodeHandle) -> ParameterReader:
+    """Returns the parameters of a part of a node, such as hardware, which has a declaration of its own.
+
+    Args:
+        package: Package of the part.
+        name: Name of the file in its folder `parameters`; that of hardware is its class.
+        own: Namespace of the names that begin with `~`.
+        root: Namespace of the others.
+
+    Raises:
+        DeclarationError: There is no declaration of it, or it cannot be used.
+    """
+    found = node_declaration(package, name)
+    if found is None:
+        raise DeclarationError(f"there is no {package}/parameters/{name}.yaml")
+
+    def place(declared: str) -> tuple[NodeHandle, str]:
+        return (own, declared[1:]) if declared.startswith("~") else (root, declared)
+
+    def get(declared: str) -> Any:
+        handle, key = place(declared)
+        return handle.get_param(key)
+
+    def whole_name(declared: str) -> str:
+        handle, key = place(declared)
+        return join_names(handle.namespace, key)
+
+    return ParameterReader(found, get, whole_name)
 
 
 @cache

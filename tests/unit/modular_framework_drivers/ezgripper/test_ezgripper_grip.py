@@ -170,27 +170,33 @@ def test_open_is_0_and_closed_1_94() -> None:
 
 def test_the_parameters_of_the_guide_are_read() -> None:
     settings = read_gripper_settings(
+        MappingNodeHandle({"poll_rate": 100, "hold_torque": 200, "start_position": 1.0}, "/hw"),
         MappingNodeHandle(
             {"port_name": "/dev/ttyUSB0", "baudrate": 57600, "servo_ids": [1, 2], "manipulator_name": "EzGripper"}
         ),
-        MappingNodeHandle({"poll_rate": 100, "hold_torque": 200, "start_position": 1.0}, "/hw"),
     )
     assert (settings.port_name, settings.baudrate, settings.servo_ids) == ("/dev/ttyUSB0", 57600, (1, 2))
     assert (settings.name, settings.poll_period_s, settings.rules.hold_torque) == ("EzGripper", 0.01, 200)
 
 
+def test_a_gripper_with_a_port_of_its_own_has_the_rest_of_its_connection_beside_it() -> None:
+    own = MappingNodeHandle({"port_name": "/dev/ttyUSB1", "servo_ids": [3]}, "/hw")
+    settings = read_gripper_settings(own, MappingNodeHandle({"port_name": "/dev/ttyUSB0", "baudrate": 9600}))
+    assert (settings.port_name, settings.baudrate, settings.servo_ids) == ("/dev/ttyUSB1", 57600, (3,))
+
+
 def test_all_faults_of_the_parameters_are_reported_at_once() -> None:
     with pytest.raises(ParameterError) as error:
         read_gripper_settings(
-            MappingNodeHandle({"baudrate": 12345, "servo_ids": [1, 1]}),
             MappingNodeHandle({"start_position": 3.0, "poll_rate": "fast"}, "/hw"),
+            MappingNodeHandle({"baudrate": 12345, "servo_ids": [1, 1]}),
         )
     for part in (
-        "/port_name: got ''",
-        "/baudrate: got 12345; expected one of 9600",
-        "/servo_ids: got [1, 1]",
-        "/hw/start_position: got 3; expected a number from 0 to 1.94",
-        "/hw/poll_rate: got 'fast'",
+        "parameter '/port_name' is not set; allowed: a text that is not empty (Path of the serial port",
+        "parameter '/baudrate' is 12345; allowed: 9600, ",
+        "parameter '/servo_ids' is [1, 1]; allowed: a list that is not empty, each a whole number and listed once, at",
+        "parameter '/hw/start_position' is 3.0; allowed: a number, at least 0 and at most 1.94",
+        "parameter '/hw/poll_rate' is 'fast'",
     ):
         assert part in str(error.value)
 
@@ -198,4 +204,4 @@ def test_all_faults_of_the_parameters_are_reported_at_once() -> None:
 @pytest.mark.parametrize("servo_ids", [[], [True], [253], [-1], ["1"], 1, [1, 1]])
 def test_servo_ids_are_different_numbers(servo_ids: object) -> None:
     with pytest.raises(ParameterError, match="servo_ids"):
-        read_gripper_settings(MappingNodeHandle({"port_name": "p", "servo_ids": servo_ids}), MappingNodeHandle({}))
+        read_gripper_settings(MappingNodeHandle({}), MappingNodeHandle({"port_name": "p", "servo_ids": servo_ids}))

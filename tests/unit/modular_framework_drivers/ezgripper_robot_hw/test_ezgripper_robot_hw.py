@@ -293,7 +293,7 @@ def test_wrong_parameters_are_an_error_that_says_so(caplog: pytest.LogCaptureFix
     root = MappingNodeHandle({"hand": {"baudrate": 1}})
     with caplog.at_level(logging.ERROR):
         assert not EzGripperRobotHW().init(root, root.child("hand"))
-    assert "/port_name: got ''" in caplog.text
+    assert "parameter '/port_name' is not set" in caplog.text
 
 
 class SteadyGripper(EzGripper):

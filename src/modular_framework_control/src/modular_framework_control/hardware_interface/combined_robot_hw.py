@@ -18,6 +18,7 @@ from modular_framework_control.hardware_interface.interfaces import (
 from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginError, PluginIndex
 from modular_framework_control.hardware_interface.robot_hw import HardwareFault, RobotHW, SwitchState
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_ros.parameter_declarations import parameters_below
 
 LOGGER = logging.getLogger("rosout.combined_robot_hw")
 
@@ -81,8 +82,8 @@ class CombinedRobotHW(RobotHW):
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         try:
-            names = read_hardware_list(robot_hw_nh)
-            for name in names:
+            parameters = parameters_below("modular_framework_control", "robot_hw", robot_hw_nh, robot_hw_nh)
+            for name in parameters.values("robot_hardware", required=("robot_hardware",))[0]:
                 self._parts.append(self._make_part(name, root_nh, robot_hw_nh.child(name)))
             self._combine_interfaces()
         except (ParameterError, HardwareInterfaceError) as error:
@@ -256,21 +257,6 @@ def _combined(
     for handle in handles.values():
         combined.register_handle(handle)
     return combined
-
-
-def read_hardware_list(robot_hw_nh: NodeHandle) -> list[str]:
-    """The names of `robot_hardware`.
-
-    Raises:
-        ParameterError: not set, or not a list of distinct names.
-    """
-    names = robot_hw_nh.get_param("robot_hardware")
-    where = join_names(robot_hw_nh.namespace, "robot_hardware")
-    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(name, str) and name for name in names):
-        raise ParameterError(f"parameter {where}: got {names!r}; expected a list of names of hardware")
-    if len(set(names)) != len(names):
-        raise ParameterError(f"parameter {where}: got {names!r}; each hardware may be named once")
-    return list(names)
 
 
 def robot_hw_of_type(type_name: str, index: PluginIndex | None = None) -> RobotHW:

@@ -11,12 +11,12 @@ from modular_framework_control.hardware_interface.interfaces import (
     CommandInterface,
     EffortJointInterface,
     JointStateInterface,
-    PositionJointInterface,
     VelocityJointInterface,
 )
 from modular_framework_control.hardware_interface.joint_limits import JointLimitGuard, JointLimits
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_ros.parameter_declarations import parameters_below
 
 LOGGER = logging.getLogger("rosout.mock_robot_hw")
 
@@ -28,9 +28,7 @@ class MockRobotHW(RobotHW):
     with inertia 1 and without friction or gravity. Joints stop at once at the ends of their range, those that begin
     outside at their initial position.
 
-    Parameters: `joints`, a list of names; `initial_positions/<joint>` [rad|m] 0; `command_interface`
-    PositionJointInterface, or VelocityJointInterface, EffortJointInterface, PosVelJointInterface,
-    PosVelAccJointInterface (which are followed by position). Limits come from `robot_description` in the
+    Parameters: see `parameters/MockRobotHW.yaml`; limits come from `robot_description` in the
     root namespace and from `joint_limits`, when they are there.
     """
 
@@ -43,9 +41,10 @@ class MockRobotHW(RobotHW):
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         try:
-            names = read_names(robot_hw_nh, "joints")
-            positions = [read_number(robot_hw_nh, f"initial_positions/{name}", 0.0, None) for name in names]
-            interface_class = _read_interface(robot_hw_nh)
+            parameters = parameters_below("modular_framework_control", "MockRobotHW", robot_hw_nh, root_nh)
+            names, initial, wanted = parameters.values("~joints", "~initial_positions", "~command_interface")
+            positions = [float(initial.get(name, 0.0)) for name in names]
+            interface_class = next(kind for kind in COMMAND_INTERFACES if wanted in (kind.__name__, kind.type_name))
             self._by_velocity = interface_class is VelocityJointInterface
             self._by_effort = interface_class is EffortJointInterface
             self._register(interface_class, names, positions)
@@ -92,14 +91,3 @@ class MockRobotHW(RobotHW):
         self._guard.enforce(period_s)
         self._sent_period_s = period_s  # the period that the controllers used; the next one may differ
         self._sent = [handle.command for handle in self._handles]
-
-
-def _read_interface(robot_hw_nh: NodeHandle) -> type[CommandInterface]:
-    value = robot_hw_nh.get_param("command_interface", PositionJointInterface.__name__)
-    for interface in COMMAND_INTERFACES:
-        if value in (interface.__name__, interface.type_name):
-            return interface
-    raise ParameterError(
-        f"parameter {join_names(robot_hw_nh.namespace, 'command_interface')}: got {value!r}; expected "
-        f"one of: {', '.join(interface.__name__ for interface in COMMAND_INTERFACES)}"
-    )

@@ -13,7 +13,8 @@ from std_msgs.msg import Bool
 
 from modular_framework_control.hardware_interface.combined_robot_hw import CombinedRobotHW
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_ros.node_handle import NodeHandle
+from modular_framework_ros.parameter_declarations import parameters_below
 
 WAIT_PERIOD_S = 0.05
 USUAL_START_S = 10.0
@@ -49,10 +50,8 @@ def ready_topics_of(robot_hw: RobotHW, robot_hw_nh: NodeHandle) -> ReadyTopics:
     awaited: dict[str, str] = {}
     announced: set[str] = set()
     for name, (hardware, handle) in listed.items():
-        topic = handle.get_param("topic_to_wait_for", "")
-        if not isinstance(topic, str):
-            where = join_names(handle.namespace, "topic_to_wait_for")
-            raise ParameterError(f"parameter {where}: got {topic!r}; expected the name of a topic, or nothing")
+        parameters = parameters_below("modular_framework_control", "hardware", handle, handle)
+        topic = parameters.value("~topic_to_wait_for")
         if topic and hardware.announces_ready:
             awaited[name] = rospy.resolve_name(topic)
         elif topic:

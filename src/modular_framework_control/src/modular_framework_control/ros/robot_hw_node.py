@@ -26,12 +26,12 @@ from modular_framework_control.ros.hardware_ready import HardwareNotReadyError, 
 from modular_framework_control.ros.large_messages import receive_in_pieces
 from modular_framework_control.ros.loop_report import LoopReport
 from modular_framework_control.ros.ros_controller_manager import RosControllerManager
-from modular_framework_ros.node_handle import ParameterError, read_bool, read_number
+from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_ros.shutdown import hold_shutdown
 
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
-MOCK_TYPE = "modular_framework_control/MockRobotHW"
 CLOCK_TOLERANCE_S = 1e-6
 REST_VELOCITY = 0.01
 """Velocity below which a joint counts as at rest [rad/s|m/s]; measured velocities are never quite 0."""
@@ -46,13 +46,8 @@ LONGEST_END_S = 2.0
 class RobotHwNode:
     """Node `robot_hw`; its namespace is that of the robot: there are its controllers, services and parameters.
 
-    Parameters: `robot_hardware`: a list of hardware, each with its parameters in the namespace of that name, which is
-    combined to one robot; without it, `~type` (MockRobotHW of this package) is one hardware, with private parameters.
-    `robot_description` and `joint_limits/...`: limits of the joints, as far as there are any.
-    `~rate` [1/s] 125. `topic_to_wait_for`, private and of each listed hardware: topic (std_msgs/Bool, latched) that
-    says True once controllers can be loaded, none when empty. `~ready_timeout` [s] 60: how long hardware that announces
-    itself may take for that. `~real_time` true: ask the system for real-time scheduling and locked memory; where that
-    is not permitted, a warning says so once, and the loop runs without.
+    Parameters: see `parameters/robot_hw.yaml`, and those of the hardware, which has a declaration named after its
+    class: private ones, or in the namespace of each name in `robot_hardware`.
 
     Subscribes the topics of hardware that announces itself; publishes those of hardware that does not. The services of
     `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning. What
@@ -68,14 +63,16 @@ class RobotHwNode:
         self._ended = ended
         self._loop_time = loop_time if loop_time is not None else LoopTime()
         self._nh = RosNodeHandle("~")
-        self._period_s = 1.0 / read_number(self._nh, "rate", 125.0, 1.0)
+        read = DeclaredParameters("modular_framework_control", "robot_hw").values
+        rate_hz, self._real_time, self._ready_timeout_s, type_name = read(
+            "~rate", "~real_time", "~ready_timeout", "~type"
+        )
+        self._period_s = 1.0 / rate_hz
         self._loop_time.longest_step_s = max(HELD_UP_S, 2.0 * self._period_s)
-        self._real_time = read_bool(self._nh, "real_time", True)
-        self._ready_timeout_s = read_number(self._nh, "ready_timeout", 60.0)
         self._root_nh = RosNodeHandle(rospy.get_namespace())
         listed = self._root_nh.has_param("robot_hardware") and not self._nh.has_param("type")
         self._hw_nh = self._root_nh if listed else self._nh
-        type_name = COMBINED_TYPE if listed else self._nh.get_param("type", MOCK_TYPE)
+        type_name = COMBINED_TYPE if listed else type_name
         try:
             self._robot_hw = robot_hw_of_type(type_name)
         except PluginError as error:

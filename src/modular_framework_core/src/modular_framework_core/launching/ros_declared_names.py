@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from modular_framework_core.files.faults import closest, nearest
@@ -79,13 +80,17 @@ class DeclaredNames:
             if name in ROSLAUNCH_NAMES or any(item.tree for _, item in users):
                 continue
             for node, declared in users:
-                item = declared.beside(lambda other, node=node: self._launch.parameters.get(_whole_name(other, node)))
+                item = declared.beside(partial(self._given, node))
                 value = self._launch.parameters.get(name, item.default)
                 if value is None and item.required:
                     yield LaunchFault(name, f"node '{node.name}' needs the parameter '{name}'; {item.doc}")
                 elif value is not None and item.fault(value):
                     yield LaunchFault(name, f"parameter '{name}' {item.fault(value)}")
                     break
+
+    def _given(self, node: LaunchedNode, name: str) -> Any:
+        """Returns the value of a parameter of a node by its declared name; None if it is not set."""
+        return self._launch.parameters.get(_whole_name(name, node))
 
     def naming(self, kind: str) -> Iterator[tuple[str, str]]:
         """Yields the whole name and the value of each parameter that names something of a kind."""

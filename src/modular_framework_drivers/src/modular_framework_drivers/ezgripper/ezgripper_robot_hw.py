@@ -14,10 +14,10 @@ from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper
 from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
 from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_ros.parameter_declarations import parameters_below
 
 LOGGER = logging.getLogger("rosout.ezgripper_robot_hw")
-JOINT = "ezgripper_knuckle_palm_L1_1"
 
 
 class EzGripperRobotHW(RobotHW):
@@ -27,12 +27,8 @@ class EzGripperRobotHW(RobotHW):
     start position. A fault of the link or of the motor is `fault()`; the gripper comes back by itself and then stands
     still until it is commanded.
 
-    Parameters, below its name: `joint` ezgripper_knuckle_palm_L1_1; `port_name`, `baudrate` 57600, `servo_ids` [1],
-    `manipulator_name` EzGripper (these four are looked for in the root namespace when it has no `port_name`);
-    `full_effort` [Nm] 1.0: effort of the joint at full torque; `poll_rate` [1/s] 50,
-    `start_position` [rad] 0, `hold_torque` [0 to 1023] 400, `position_tolerance` [rad] 0.03, `stall_time` [s] 0.25,
-    `link_timeout` [s] 0.1.
-    Limits come from `robot_description` and from `joint_limits`, when they are there.
+    Parameters: see `parameters/EzGripperRobotHW.yaml`; limits come from `robot_description` and from
+    `joint_limits`, when they are there.
     """
 
     def __init__(self) -> None:
@@ -43,10 +39,9 @@ class EzGripperRobotHW(RobotHW):
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         where = join_names(robot_hw_nh.namespace, "")
         try:
-            joint = read_names(robot_hw_nh, "joint")[0] if robot_hw_nh.has_param("joint") else JOINT
-            connection = robot_hw_nh if robot_hw_nh.has_param("port_name") else root_nh
-            settings = read_gripper_settings(connection, robot_hw_nh)
-            self._full_effort = read_number(robot_hw_nh, "full_effort", 1.0, 0.001)
+            settings = read_gripper_settings(robot_hw_nh, root_nh)
+            parameters = parameters_below("modular_framework_drivers", "EzGripperRobotHW", robot_hw_nh, root_nh)
+            joint, self._full_effort = parameters.values("~joint", "~full_effort")
             self._register(joint, root_nh)
         except ParameterError as error:
             LOGGER.error("%s in %s: %s", type(self).__name__, where, error)

@@ -5,11 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from modular_framework_drivers.ezgripper.dynamixel_bus import BAUDRATES
 from modular_framework_drivers.ezgripper.grip import GripRules
-from modular_framework_drivers.ezgripper.gripper_servos import CLOSED_POSITION
-from modular_framework_drivers.ezgripper.mx64 import LARGEST_ID, TORQUE_MAX
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_number
+from modular_framework_ros.node_handle import NodeHandle
+from modular_framework_ros.parameter_declarations import parameters_below
 
 FULL_TORQUE = 800
 """Torque that an intensity of 1 stands for at most, by the maker's advice [units of the servo]."""
@@ -49,73 +47,35 @@ class GripperSettings:
     rules: GripRules = field(default_factory=GripRules)
 
 
-def read_gripper_settings(connection: NodeHandle, behaviour: NodeHandle) -> GripperSettings:
-    """The settings of the parameters.
+def read_gripper_settings(own: NodeHandle, root: NodeHandle) -> GripperSettings:
+    """The settings of the parameters that `parameters/EzGripperRobotHW.yaml` declares.
 
     Args:
-        connection: namespace of port_name, baudrate, servo_ids and manipulator_name.
-        behaviour: namespace of the others: poll_rate [1/s] 50, start_position [rad] 0, hold_torque [0 to 1023] 400,
-            position_tolerance [rad] 0.03, stall_time [s] 0.25, link_timeout [s] 0.1.
+        own: namespace of the gripper.
+        root: namespace of port_name, baudrate, servo_ids and manipulator_name if `own` has no port_name.
 
     Raises:
         ParameterError: lists all faults.
     """
-    faults: list[str] = []
-
-    def number(key: str, default: float, largest: float, smallest: float = 0.0) -> float:
-        try:
-            value = read_number(behaviour, key, default, smallest)
-            if value <= largest:
-                return value
-            faults.append(
-                f"parameter {join_names(behaviour.namespace, key)}: got {value:g}; expected a number from "
-                f"{smallest:g} to {largest:g}"
-            )
-        except ParameterError as error:
-            faults.append(str(error))
-        return default
-
-    port_name = connection.get_param("port_name", "")
-    if not isinstance(port_name, str) or not port_name:
-        faults.append(_fault(connection, "port_name", port_name, "the path of a serial port, such as /dev/ttyUSB0"))
-    baudrate = connection.get_param("baudrate", 57600)
-    if baudrate not in BAUDRATES:
-        faults.append(_fault(connection, "baudrate", baudrate, f"one of {', '.join(map(str, BAUDRATES))}"))
-    servo_ids = connection.get_param("servo_ids", [1])
-    if not _are_ids(servo_ids):
-        faults.append(_fault(connection, "servo_ids", servo_ids, f"a list of different numbers from 0 to {LARGEST_ID}"))
-    period_s = 1.0 / number("poll_rate", 50.0, 200.0, 1.0)
-    rules = GripRules(
-        position_tolerance=number("position_tolerance", 0.03, 0.5, 0.002),
-        stall_s=number("stall_time", 0.25, 5.0, 0.05),
-        hold_torque=int(number("hold_torque", 400, TORQUE_MAX)),
-        stale_s=max(STALE_PERIODS * period_s, STALE_S * (len(servo_ids) if isinstance(servo_ids, list) else 1)),
-    )
-    start_position = number("start_position", 0.0, CLOSED_POSITION)
-    link_timeout_s = number("link_timeout", 0.1, 10.0)
-    if faults:
-        raise ParameterError("; ".join(faults))
-    name = str(connection.get_param("manipulator_name", "EzGripper"))
+    place = "~" if own.has_param("port_name") else ""
+    connection = [place + key for key in ("port_name", "baudrate", "servo_ids", "manipulator_name")]
+    behaviour = ("~poll_rate", "~start_position", "~link_timeout", "~position_tolerance", "~stall_time", "~hold_torque")
+    port, baudrate, ids, name, rate, start_position, link_timeout_s, tolerance, stall_s, torque = parameters_below(
+        "modular_framework_drivers", "EzGripperRobotHW", own, root
+    ).values(*connection, *behaviour, required=connection[:1])
+    period_s = 1.0 / rate
     return GripperSettings(
-        port_name,
+        port,
         baudrate,
-        tuple(servo_ids),
+        tuple(ids),
         name,
         period_s,
         start_position,
         link_timeout_s=link_timeout_s,
-        rules=rules,
+        rules=GripRules(
+            position_tolerance=tolerance,
+            stall_s=stall_s,
+            hold_torque=int(torque),
+            stale_s=max(STALE_PERIODS * period_s, STALE_S * len(ids)),
+        ),
     )
-
-
-def _are_ids(value: object) -> bool:
-    return (
-        isinstance(value, list)
-        and bool(value)
-        and len(set(map(str, value))) == len(value)
-        and all(isinstance(one, int) and not isinstance(one, bool) and 0 <= one <= LARGEST_ID for one in value)
-    )
-
-
-def _fault(handle: NodeHandle, key: str, got: object, expected: str) -> str:
-    return f"parameter {join_names(handle.namespace, key)}: got {got!r}; expected {expected}"

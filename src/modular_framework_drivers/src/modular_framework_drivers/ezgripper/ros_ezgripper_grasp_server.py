@@ -15,16 +15,14 @@ from modular_framework_core.grasping.grasp_server import GraspCommandError, Outc
 from modular_framework_core.grasping.ros_grasp_server import GraspServer
 from modular_framework_core.grasping.ros_manipulator_drivers import Motion as WantedMotion
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper, GripperState
-from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT
 from modular_framework_drivers.ezgripper.grip import Motion, StandstillDetector
 from modular_framework_drivers.ezgripper.gripper_servos import CALIBRATION_TORQUE, CLOSED_POSITION
 from modular_framework_drivers.ezgripper.gripper_settings import FULL_TORQUE, read_gripper_settings
 from modular_framework_drivers.ezgripper.mx64 import TORQUE_MAX
-from modular_framework_ros.node_handle import ParameterError
+from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.publishing import publish
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 
-ACTION_NAME = "moveit_grasp_action_server"
 POLL_S = 0.01
 STOP_TIMEOUT_S = 1.0
 STANDSTILL_SPEED, STANDSTILL_S = 0.05, 0.1
@@ -151,29 +149,22 @@ def gripper_group(joint: str) -> Group:
 
 
 def main() -> int:
-    """Runs the node `ezgripper_grasp_action_server`; returns 1 when its parameters are wrong.
+    """Runs the node `ezgripper_grasp_action_server`; raises ParameterError when its parameters are wrong.
 
     A gripper that is not there, or has a fault, does not end the node: goals are aborted with the reason until it is
     back.
 
-    Parameters, beside those of `GraspServer`: `/manipulator_controller_action_server_name` moveit_grasp_action_server:
-    name of the action; `/port_name`, `/baudrate` 57600, `/servo_ids` [1], `/manipulator_name` EzGripper: how to reach
-    the gripper; `~joint` ezgripper_knuckle_palm_L1_1; `~poll_rate` [1/s] 50; `~start_position` [rad] 0;
-    `~hold_torque` [0 to 1023] 400; `~stall_time` [s] 0.25; `~link_timeout` [s] 0.1. A goal's
-    `max_torque` is in units of the servo, of which no more than 800 are used.
+    Parameters: see `parameters/ezgripper_grasp_action_server.yaml`. A goal's `max_torque` is in units of the servo, of
+    which no more than 800 are used.
 
     Publishers: `joint_states`.
     """
     rospy.init_node("ezgripper_grasp_action_server")
-    try:
-        settings = read_gripper_settings(RosNodeHandle("/"), RosNodeHandle("~"))
-    except ParameterError as error:
-        rospy.logfatal("ezgripper_grasp_action_server: %s", error)
-        return 1
-    joint = str(rospy.get_param("~joint", JOINT))
+    settings = read_gripper_settings(RosNodeHandle("~"), RosNodeHandle("/"))
+    read = DeclaredParameters("modular_framework_drivers", "ezgripper_grasp_action_server").values
+    joint, name = read("~joint", "/manipulator_controller_action_server_name")
     gripper = EzGripper(settings)
     server = GraspServer(gripper_group(joint), EzGripperManipulator(gripper, joint))
-    name = str(rospy.get_param("/manipulator_controller_action_server_name", ACTION_NAME))
     server.connect(name)
     rospy.loginfo("%s at %s listens to action '%s'.", settings.name, settings.port_name, rospy.resolve_name(name))
     rospy.spin()

@@ -15,65 +15,30 @@ from modular_framework_control.hardware_interface.joint_limit_parameters import 
 )
 from modular_framework_drivers.ur.command_check import CheckedJoint
 from modular_framework_drivers.ur.rtde_link import LinkSettings
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_bool, read_number
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_ros.parameter_declarations import ParameterReader
 
 # Largest limits of an arm: range in turns, its maker's speed, and the acceleration that URScript accepts of a joint
 _UR_LIMITS = JointLimits(-2.0 * math.pi, 2.0 * math.pi, max_velocity=math.pi, max_acceleration=40.0)
 
 
-def read_prefix(nh: NodeHandle) -> str:
-    """Returns the prefix of the joint names: `robot_id` and an underscore, or "".
+def read_link_settings(parameters: ParameterReader) -> LinkSettings:
+    """Returns the connection settings from the parameters of the arm.
 
     Raises:
-        ParameterError: it is no text.
+        ParameterError: something is missing or not allowed; names all of it.
     """
-    robot_id = nh.get_param("robot_id", "")
-    if not isinstance(robot_id, str):
-        raise ParameterError(f"parameter {join_names(nh.namespace, 'robot_id')}: got {robot_id!r}; expected a text")
-    return f"{robot_id}_" if robot_id else ""
-
-
-def read_link_settings(nh: NodeHandle) -> LinkSettings:
-    """Returns the connection settings from the parameters below `nh`.
-
-    Raises:
-        ParameterError: something is missing or not allowed.
-    """
-    address = nh.get_param("robot_ip_address")
-    if not isinstance(address, str) or not address:
-        raise ParameterError(
-            f"parameter {join_names(nh.namespace, 'robot_ip_address')}: got {address!r}; expected the "
-            "address of the arm's controller, for example 192.168.56.101"
-        )
-    scale = _read_bounded(nh, "speed_scale", 1.0, 0.0, 1.0) if nh.has_param("speed_scale") else None
-    return LinkSettings(
-        address,
-        read_number(nh, "link_timeout", 0.12, 0.02),
-        scale,
-        read_number(nh, "payload_mass_kg", 0.0),
-        _read_centre(nh),
-        _read_bounded(nh, "servoj_lookahead_time", 0.03, 0.03, 0.2),
-        _read_bounded(nh, "servoj_gain", 2000.0, 100.0, 2000.0),
-        read_bool(nh, "real_time", True),
+    address, timeout_s, scale, mass_kg, centre_m, lookahead_s, gain, real_time = parameters.values(
+        "~robot_ip_address",
+        "~link_timeout",
+        "~speed_scale",
+        "~payload_mass_kg",
+        "~payload_center_of_mass_m",
+        "~servoj_lookahead_time",
+        "~servoj_gain",
+        "~real_time",
     )
-
-
-def _read_bounded(nh: NodeHandle, key: str, default: float, low: float, high: float) -> float:
-    value = read_number(nh, key, default, low)
-    if value > high:
-        raise ParameterError(f"parameter {join_names(nh.namespace, key)}: got {value:g}; expected {low:g} to {high:g}")
-    return value
-
-
-def _read_centre(nh: NodeHandle) -> tuple[float, float, float]:
-    value = nh.get_param("payload_center_of_mass_m", [0.0, 0.0, 0.0])
-    numbers = [float(number) for number in value if isinstance(number, (int, float))] if isinstance(value, list) else []
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise ParameterError(
-            f"parameter {join_names(nh.namespace, 'payload_center_of_mass_m')}: got {value!r}; "
-            "expected three numbers [m]"
-        )
-    return numbers[0], numbers[1], numbers[2]
+    return LinkSettings(address, timeout_s, scale, mass_kg, tuple(centre_m), lookahead_s, gain, real_time)
 
 
 def read_checked_joints(names: list[str], root_nh: NodeHandle) -> list[CheckedJoint]:

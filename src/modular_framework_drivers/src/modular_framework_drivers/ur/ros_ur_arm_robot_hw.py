@@ -14,6 +14,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from modular_framework_drivers.ur.dashboard import DashboardError, ask_dashboard
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 from modular_framework_ros.node_handle import NodeHandle, join_names
+from modular_framework_ros.parameter_declarations import parameters_below
 from modular_framework_ros.publishing import publish
 
 # Dashboard services under the names of ur_robot_driver: the request, and how the answer begins after a success
@@ -50,7 +51,9 @@ class UrArmRobotHW(UrArmHardware):
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         if not super().init(root_nh, robot_hw_nh):
             return False
-        topic = robot_hw_nh.get_param("topic_to_wait_for", "")
+        topic = parameters_below("modular_framework_control", "hardware", robot_hw_nh, root_nh).value(
+            "~topic_to_wait_for"
+        )
         if topic:
             self._publisher = rospy.Publisher(topic, Bool, queue_size=1, latch=True)
         self._offer(join_names(robot_hw_nh.namespace, "resume"), self._on_resume)

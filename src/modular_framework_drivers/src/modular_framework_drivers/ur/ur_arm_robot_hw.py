@@ -21,10 +21,11 @@ from modular_framework_control.hardware_interface.interfaces import (
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_drivers.ur.arm_messages import ArmState
 from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, PROGRAM_STOPPED, robot_fault
-from modular_framework_drivers.ur.arm_parameters import read_checked_joints, read_link_settings, read_prefix
+from modular_framework_drivers.ur.arm_parameters import read_checked_joints, read_link_settings
 from modular_framework_drivers.ur.command_check import CheckedJoint, CommandCheck
 from modular_framework_drivers.ur.rtde_link import LinkSettings, RtdeLink
-from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_number
+from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
+from modular_framework_ros.parameter_declarations import parameters_below
 
 LOGGER = logging.getLogger("rosout.ur_arm")
 JOINT_NAMES = (
@@ -46,14 +47,8 @@ _CAUSE_S = 0.03  # by which the state that explains the end of the program may c
 class UrArmHardware(RobotHW):
     """An arm that is commanded by joint positions.
 
-    Parameters, below its own namespace: `robot_ip_address` (required); `robot_id` "": prefix of the joint names, an
-    underscore is put between; `speed_scale` [0..1]: value for the speed slider, which is left as it is by default;
-    `payload_mass_kg` 0 and `payload_center_of_mass_m` [0, 0, 0]: of the manipulator, in the flange frame;
-    `link_timeout` 0.12 [s]: without news for so long the link counts as lost; `servoj_gain` 2000 and
-    `servoj_lookahead_time` 0.03 [s]; `max_jump_rad` 0.5: a command further from the last one is refused;
-    `real_time` true: the processes that hold the link ask for real-time scheduling.
-    `control_pc_ip_address` and `robot_program_path` are accepted and not used. In the root namespace:
-    `robot_description` and `joint_limits/<joint>/...`: limits and soft limits.
+    Parameters: see `parameters/UrArmRobotHW.yaml`; in the root namespace `robot_description` and
+    `joint_limits/<joint>/...`: limits and soft limits.
 
     The efforts of the joint states are motor currents [A], as in ur_robot_driver.
     """
@@ -76,10 +71,11 @@ class UrArmHardware(RobotHW):
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         where = join_names(robot_hw_nh.namespace, "")
         try:
-            self._prefix = read_prefix(robot_hw_nh)
-            self._settings = read_link_settings(robot_hw_nh)
+            parameters = parameters_below("modular_framework_drivers", "UrArmRobotHW", robot_hw_nh, root_nh)
+            self._settings = read_link_settings(parameters)
+            robot_id, max_jump = parameters.values("~robot_id", "~max_jump_rad")
+            self._prefix = f"{robot_id}_" if robot_id else ""
             names = [self._prefix + name for name in JOINT_NAMES]
-            max_jump = read_number(robot_hw_nh, "max_jump_rad", 0.5)
             joints = read_checked_joints(names, root_nh)
             self._check = CommandCheck(joints, max_jump)
         except ParameterError as error:
