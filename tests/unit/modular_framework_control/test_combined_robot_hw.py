@@ -182,7 +182,7 @@ def test_two_controllers_may_not_command_one_joint_through_two_parts() -> None:
         ({"robot_hardware": []}, ["is []; allowed: a list that is not empty"]),
         (
             {"robot_hardware": ["a", "a"]},
-            ["is ['a', 'a']; allowed: a list that is not empty, each a text and listed once"],
+            ["each a text and listed once"],
         ),
         ({"robot_hardware": ["a"]}, ["entry 'a' of robot_hardware", "parameter /a/type is None"]),
         (

@@ -18,8 +18,10 @@ from modular_framework_control.hardware_interface.robot_hw_conformance import Ro
 from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
-from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
+from modular_framework_drivers.ezgripper.ezgripper_robot_hw import EzGripperRobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle
+
+JOINT = "ezgripper_knuckle_palm_L1_1"
 
 KNUCKLE = {"has_velocity_limits": True, "max_velocity": 2.0}
 SHOULDER = {**KNUCKLE, "has_position_limits": True, "min_position": -1.0, "max_position": 1.0}

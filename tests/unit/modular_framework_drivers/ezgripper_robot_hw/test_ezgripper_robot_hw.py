@@ -28,8 +28,10 @@ from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerM
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.ezgripper.ezgripper_device import EzGripper
-from modular_framework_drivers.ezgripper.ezgripper_robot_hw import JOINT, EzGripperRobotHW
+from modular_framework_drivers.ezgripper.ezgripper_robot_hw import EzGripperRobotHW
 from modular_framework_ros.node_handle import MappingNodeHandle
+
+JOINT = "ezgripper_knuckle_palm_L1_1"
 
 PERIOD_S = 0.008
 CONTROLLER = {
