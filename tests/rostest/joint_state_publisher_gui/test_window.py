@@ -69,7 +69,8 @@ def test_wrong_parameters_end_the_node_with_what_is_allowed(window: RosSession) 
     command = ["rosrun", "joint_state_publisher_gui", "joint_state_publisher_gui", "__name:=wrong", "_rate:=-1",
                "_source_list:=[joint_states]"]  # fmt: skip
     answer = subprocess.run(command, env=window.env, capture_output=True, text=True, timeout=60, check=False)
-    assert answer.returncode == 1 and "parameter rate is -1; allowed: a number above 0" in answer.stdout + answer.stderr
+    assert answer.returncode == 1
+    assert "parameter '/wrong/rate' is -1; allowed: a number, above 0" in answer.stdout + answer.stderr
     command.remove("_rate:=-1")
     answer = subprocess.run(
         [*command, "_rate:=1"], env=window.env, capture_output=True, text=True, timeout=60, check=False

@@ -6,13 +6,17 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from joint_sliders.node_parameters import NodeParameters, ParameterFaults, read_parameters
+from joint_sliders.node_parameters import NodeParameters, read_parameters
 
+from modular_framework_ros.node_handle import ParameterError
+from modular_framework_ros.parameter_declarations import ParameterReader, node_declaration
 from modular_framework_urdf.mimics import Mimic
 
 
 def read(**given: Any) -> NodeParameters:
-    return read_parameters(lambda name, default: given.get(name, default))
+    declared = node_declaration("joint_state_publisher_gui", "joint_state_publisher_gui")
+    assert declared is not None
+    return read_parameters(ParameterReader(declared, lambda name: given.get(name[1:]), lambda name: name[1:]))
 
 
 def test_the_defaults_are_the_public_ones() -> None:
@@ -36,26 +40,26 @@ def test_parameters_are_read() -> None:
     [
         ("rate", 0, "above 0"),
         ("rate", "fast", "above 0"),
-        ("delta", -0.1, "from 0"),
+        ("delta", -0.1, "at least 0"),
         ("num_rows", 1.5, "a whole number"),
-        ("use_mimic_tags", "yes", "true, false"),
-        ("publish_default_efforts", 1, "true, false"),
-        ("zeros", {"a": "x"}, "a number for each joint"),
-        ("source_list", "joint_states_of_the_hand", "a list of topics"),
-        ("dependent_joints", {"a": "b"}, "a mapping with parent"),
+        ("use_mimic_tags", "yes", "true or false"),
+        ("publish_default_efforts", 1, "true or false"),
+        ("zeros", {"a": "x"}, "a mapping, each a number"),
+        ("source_list", "joint_states_of_the_hand", "a list, each a text"),
+        ("dependent_joints", {"a": "b"}, "a mapping, each a mapping"),
         ("dependent_joints", {"a": {"factor": 1}}, "a mapping with parent"),
         ("dependent_joints", {"a": {"parent": "b", "multiplier": 1}}, "a mapping with parent"),
         ("dependent_joints", {"a": {"parent": "b", "factor": float("nan")}}, "numbers as factor and offset"),
-        ("dependent_joints", "a", "a mapping with parent"),
+        ("dependent_joints", "a", "a mapping"),
     ],
 )
 def test_a_wrong_value_is_named_with_what_is_allowed(name: str, value: Any, allowed: str) -> None:
-    with pytest.raises(ParameterFaults) as caught:
+    with pytest.raises(ParameterError) as caught:
         read(**{name: value})
-    assert f"parameter {name}" in str(caught.value) and allowed in str(caught.value)
+    assert f"parameter '{name}" in str(caught.value) and allowed in str(caught.value)
 
 
 def test_all_faults_are_named_at_once() -> None:
-    with pytest.raises(ParameterFaults) as caught:
+    with pytest.raises(ParameterError) as caught:
         read(rate=-1, delta="x", zeros=3)
-    assert len(str(caught.value).splitlines()) == 3
+    assert all(f"parameter '{name}' is " in str(caught.value) for name in ("rate", "delta", "zeros"))

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import rospy
 
-from joint_sliders.ros_publisher import joint_state_publisher, parameter
+from joint_sliders.ros_publisher import declared_parameters, joint_state_publisher
 
 
 def main() -> int:
     """Publishes without a window, or with one where the parameter use_gui is true; returns the exit code."""
     rospy.init_node("joint_state_publisher")
-    if parameter("use_gui", False):
+    if declared_parameters().value("~use_gui"):
         from joint_sliders import ros_window  # a computer without a screen needs no library of windows
 
         return ros_window.run()

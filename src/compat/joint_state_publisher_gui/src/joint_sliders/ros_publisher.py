@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
 
 import rospy
 from sensor_msgs.msg import JointState
 
 from joint_sliders.joint_values import JointValues
-from joint_sliders.node_parameters import NodeParameters, ParameterFaults, read_parameters
+from joint_sliders.node_parameters import NodeParameters, read_parameters
 from joint_sliders.slider_joints import SliderJoints, slider_joints
+from modular_framework_ros.node_handle import ParameterError
+from modular_framework_ros.parameter_declarations import NodeDeclaration, ParameterReader, node_declaration
 from modular_framework_ros.publishing import publish
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
@@ -23,9 +24,7 @@ OUTPUT = "joint_states"
 class JointStatePublisher:
     """Publishes joint states at a rate, and takes over those of other topics.
 
-    Parameters (private, or in the node's namespace): robot_description, rate (10 /s), source_list, zeros,
-    dependent_joints, use_mimic_tags, use_smallest_joint_limits, publish_default_positions, publish_default_velocities,
-    publish_default_efforts, delta, num_rows.
+    Parameters, private or in the node's namespace: see `parameters/joint_state_publisher_gui.yaml`.
     Subscribers: the topics of source_list (sensor_msgs/JointState).
     Publishers: joint_states (sensor_msgs/JointState).
 
@@ -87,11 +86,12 @@ class JointStatePublisher:
 
 def joint_state_publisher() -> JointStatePublisher | None:
     """Returns the publisher that the parameters ask for; logs what is wrong with them and returns None if it is."""
+    declared = declared_parameters()
     try:
-        parameters = read_parameters(parameter)
+        parameters = read_parameters(declared)
         _check_sources(parameters)
-        joints = slider_joints(read_urdf(_description()), parameters.settings)
-    except (ParameterFaults, XmlError, ValueError) as error:
+        joints = slider_joints(read_urdf(declared.value("~robot_description")), parameters.settings)
+    except (ParameterError, XmlError, ValueError) as error:
         for line in str(error).splitlines():
             rospy.logfatal("%s", line)
         return None
@@ -100,18 +100,14 @@ def joint_state_publisher() -> JointStatePublisher | None:
     return JointStatePublisher(joints, parameters)
 
 
-def parameter(name: str, default: Any) -> Any:
-    """Returns a parameter of the node: private, or in its namespace, or the default."""
-    return rospy.get_param(f"~{name}", rospy.get_param(name, default))
-
-
-def _description() -> str:
-    description = parameter("robot_description", None)
-    if description is None:
-        raise ValueError(
-            f"parameter {rospy.resolve_name('robot_description')} is not set; allowed: a URDF; load it before this node"
-        )
-    return str(description)
+def declared_parameters() -> ParameterReader:
+    """Returns the parameters of the node: private, or in its namespace, or the defaults."""
+    declared = node_declaration("joint_state_publisher_gui", "joint_state_publisher_gui")
+    return ParameterReader(
+        declared or NodeDeclaration(),
+        lambda name: rospy.get_param(name, rospy.get_param(name[1:], None)),
+        lambda name: rospy.resolve_name(name if rospy.has_param(name) else name[1:]),
+    )
 
 
 def _check_sources(parameters: NodeParameters) -> None:
