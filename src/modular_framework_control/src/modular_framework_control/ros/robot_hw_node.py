@@ -26,8 +26,8 @@ from modular_framework_control.ros.hardware_ready import HardwareNotReadyError, 
 from modular_framework_control.ros.large_messages import receive_in_pieces
 from modular_framework_control.ros.loop_report import LoopReport
 from modular_framework_control.ros.ros_controller_manager import RosControllerManager
-from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
+from modular_framework_ros.parameter_declarations import parameters_below
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 from modular_framework_ros.shutdown import hold_shutdown
 
@@ -63,13 +63,13 @@ class RobotHwNode:
         self._ended = ended
         self._loop_time = loop_time if loop_time is not None else LoopTime()
         self._nh = RosNodeHandle("~")
-        read = DeclaredParameters("modular_framework_control", "robot_hw").values
-        rate_hz, self._real_time, self._ready_timeout_s, type_name = read(
+        self._root_nh = RosNodeHandle(rospy.get_namespace())
+        parameters = parameters_below("modular_framework_control", "robot_hw", self._nh, self._root_nh)
+        rate_hz, self._real_time, self._ready_timeout_s, type_name = parameters.values(
             "~rate", "~real_time", "~ready_timeout", "~type"
         )
         self._period_s = 1.0 / rate_hz
         self._loop_time.longest_step_s = max(HELD_UP_S, 2.0 * self._period_s)
-        self._root_nh = RosNodeHandle(rospy.get_namespace())
         listed = self._root_nh.has_param("robot_hardware") and not self._nh.has_param("type")
         self._hw_nh = self._root_nh if listed else self._nh
         type_name = COMBINED_TYPE if listed else type_name

@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from modular_framework_core.files.faults import closest, nearest
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
-from modular_framework_ros.parameter_declarations import Declaration, node_declaration
+from modular_framework_ros.parameter_declarations import Declaration, NodeDeclaration, node_declaration
 
 ROSLAUNCH_NAMES = ("/rosdistro", "/rosversion", "/run_id", "/roslaunch")
 
@@ -42,8 +42,7 @@ class DeclaredNames:
         self.known: dict[str, list[tuple[LaunchedNode, Declaration]]] = {}
         self._open: list[str] = []
         self._closed: list[str] = []
-        for node in launch.nodes:
-            declared = node_declaration(node.package, node.executable)
+        for node, declared in self._declarations():
             if declared is None:
                 self._open.append(f"{node.name}/")
                 continue
@@ -52,6 +51,19 @@ class DeclaredNames:
             for item in declared.parameters.values():
                 self.known.setdefault(_whole_name(item.name, node), []).append((node, item))
         self._trees = [f"{name}/" for name, users in self.known.items() if any(item.tree for _, item in users)]
+
+    def _declarations(self) -> Iterator[tuple[LaunchedNode, NodeDeclaration | None]]:
+        """Yields nodes with their declarations, and their hardware, named by its namespace, with that of its class."""
+        for node in self._launch.nodes:
+            declared = node_declaration(node.package, node.executable)
+            yield node, declared
+            for name, item in (declared.parameters if declared else {}).items():
+                value = self._given(node, name) if item.names == "hardware" else None
+                for part in [f"{node.namespace}{entry}" for entry in value] if isinstance(value, list) else [node.name]:
+                    package, _, kind = str(self._launch.parameters.get(f"{part}/type", "")).partition("/")
+                    found = node_declaration(package, kind) if value and kind else None
+                    if found is not None:
+                        yield replace(node, name=part), found
 
     def unread(self, names: Mapping[str, Any], extra: Container[str] = ()) -> Iterator[LaunchFault]:
         """Yields a fault for each name that no node reads.
