@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 import time
 import uuid
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +17,7 @@ import av
 import numpy as np
 import pandas as pd
 import pytest
+import rosgraph
 from ros_session import processes_with
 
 from modular_framework_benchmark.episodes.ros_task_runner import TaskEpisodeRunner
@@ -46,6 +51,22 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> Iterator[TaskEpisodeRunner]:
 def run(runner: TaskEpisodeRunner, folder: Path, settings: dict[str, Any]) -> EpisodeRecord:
     folder.mkdir()
     return runner.run(EpisodeSpec(0, {"object": "cube"}, 0, 7, settings), folder)
+
+
+def _process_in_task(node: str) -> int:
+    """The process of a node of this test's session, once the task runs."""
+    end = time.monotonic() + ENOUGH_S
+    while time.monotonic() < end:
+        for pid in processes_with(MARK, os.environ[MARK]):
+            with contextlib.suppress(OSError):  # a process that ended, a master that does not answer yet
+                if f"__name:={node}".encode() in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0"):
+                    variables = Path(f"/proc/{pid}/environ").read_bytes().decode().split("\0")
+                    uri = next(each for each in variables if each.startswith("ROS_MASTER_URI=")).partition("=")[2]
+                    services = rosgraph.Master("/test", master_uri=uri).getSystemState()[2]
+                    if any(name == "/task/stop" for name, _ in services):
+                        return pid
+        time.sleep(0.2)
+    raise AssertionError(f"the task of node {node} did not start")
 
 
 def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_stack_that_is_kept(
@@ -92,6 +113,23 @@ def test_a_launch_that_dies_is_an_episode_with_its_cause_at_once(runner: TaskEpi
     assert "node 'gazebo' died (exited with 1)" in record.cause and "no.world: cannot be read" in record.cause
     assert time.monotonic() - begun < ENOUGH_S
     assert "no.world" in (tmp_path / "dead/log.txt").read_text()
+
+
+@pytest.mark.parametrize("node", ["move_group", "gazebo", "task"])
+def test_a_frozen_node_makes_the_episode_invalid_and_is_named(
+    runner: TaskEpisodeRunner, tmp_path: Path, node: str
+) -> None:
+    with ThreadPoolExecutor() as pool:
+        episode = pool.submit(run, runner, tmp_path / "frozen", PICK)
+        try:
+            pid = _process_in_task(node)
+            os.kill(pid, signal.SIGSTOP)
+            record = episode.result(ENOUGH_S)
+        finally:
+            runner.close()
+    assert record.status is EpisodeStatus.INVALID, record.cause
+    assert record.cause.startswith(f"node '/{node}' is frozen: its process {pid} was stopped")
+    assert record.metrics["success"] is None
 
 
 def test_a_time_limit_that_passes_before_the_method_is_asked_says_nothing_of_the_method(

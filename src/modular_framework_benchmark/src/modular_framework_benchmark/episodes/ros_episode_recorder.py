@@ -40,7 +40,9 @@ from modular_framework_core.task_runner.ros_episode import (
     generate_grasps,
 )
 from modular_framework_ros.calls import CallError, request_service, wait_until
+from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import ADVANCE_SERVICE, SimulatedTime
+from modular_framework_ros.stop_requests import stoppable
 
 LIST_CONTROLLERS = "/controller_manager/list_controllers"
 JOINT_STATE_CONTROLLER, JOINT_STATE_RATE = "joint_state_controller/JointStateController", 50.0
@@ -115,14 +117,19 @@ class EpisodeRecorder:
         folder = Path(request.folder)
         with self._bag(folder, request.bag), self._time.held("episode"):
             try:
-                self._begin(request, answer)
-                self._run_task(request, answer)
-                self._check(request, answer)
-            except EpisodeAbortedError:
+                with stoppable(self._aborted.is_set):
+                    self._begin(request, answer)
+                    self._run_task(request, answer)
+                    self._check(request, answer)
+            except (EpisodeAbortedError, EpisodeError, CallError):
+                if not self._aborted.is_set():
+                    raise
                 answer["aborted"] = True
                 self._stop_task()
             except FoulError as error:
                 answer["foul"] = str(error)
+                if not self._samples.ends:
+                    self._stop_task()
             spawned = {entry["name"]: entry["model"] for entry in request.objects}
             answer |= write_recording(folder, self._samples, spawned, answer, turns)
         parameters, answer["parameters_digest"] = write_parameters(folder)
@@ -188,6 +195,8 @@ class EpisodeRecorder:
             raise WorldError(f"the task did not start: {started.message}")
         self._wait(lambda: bool(self._samples.ends))
         end = self._samples.ends[-1]
+        if end["frozen"]:
+            raise FoulError(end["frozen"])
         answer |= {
             "outcome": end["outcome"],
             "reason": end["reason"],
@@ -254,6 +263,8 @@ class EpisodeRecorder:
         while not condition():
             if self._aborted.wait(POLL_S):
                 raise EpisodeAbortedError
+            if frozen := frozen_nodes():
+                raise FoulError(frozen)
 
 
 def _services() -> set[str]:
@@ -313,7 +324,8 @@ def main() -> int:
         except EpisodeAbortedError:
             answer = {"aborted": True}
         except (WorldError, EpisodeError, BagError, CallError, rospy.ROSException) as error:
-            answer = {"fault": str(error)}
+            frozen = frozen_nodes()
+            answer = {"foul": frozen} if frozen else {"fault": str(error)}
         print(json.dumps(answer), flush=True)
         aborted.clear()
     return 0

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import http.client
 import xmlrpc.client
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -23,6 +24,7 @@ FILES = {
     "state machine": "/task/state_machine_to_load",
 }
 """Parameters of nodes that name files, by what the files are."""
+NODE_TIMEOUT_S = 5.0
 DESCRIPTIONS = ("/robot_description", "/robot_description_semantic")
 
 
@@ -49,7 +51,7 @@ def running_stack(
             methods={name: {"version": version, "sources": digest} for name, (version, digest) in methods.items()},
             controllers=dict(controllers),
             physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
-            renderer=str(_value(parameters, "/gazebo/renderer")),
+            renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
             digests=described | digests,
             **planners_of(plan.get("run") for plan in plans),
         )
@@ -63,11 +65,21 @@ def _value(parameters: Mapping[str, Any], name: str) -> Any:
     return found
 
 
+class _Transport(xmlrpc.client.Transport):
+    """Does not wait forever for a node whose process was stopped."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        """Returns a connection with a timeout."""
+        connection = super().make_connection(host)
+        connection.timeout = NODE_TIMEOUT_S
+        return connection
+
+
 def package_of(node: str) -> str:
     """Returns the ROS package of a running node's program; "" where it cannot be found out."""
     try:
         uri: Any = rosgraph.Master(rospy.get_name()).lookupNode(node)
-        _, _, process = xmlrpc.client.ServerProxy(uri).getPid(rospy.get_name())
+        _, _, process = xmlrpc.client.ServerProxy(uri, _Transport()).getPid(rospy.get_name())
         words = Path(f"/proc/{process}/cmdline").read_bytes().decode(errors="replace").split("\0")
     except (OSError, rosgraph.MasterException, xmlrpc.client.Error):
         return ""

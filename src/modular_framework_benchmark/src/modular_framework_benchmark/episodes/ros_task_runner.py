@@ -109,8 +109,8 @@ class TaskEpisodeRunner:
         except TimeoutError:
             answer = stack.abort(ABORT_TIMEOUT_S) or {}
             cause = f"no end within {settings.time_limit_s:g} s; {stack.last_words()}"
-            # the method has been asked for nothing before the objects are placed
-            status = EpisodeStatus.TIMED_OUT if "zero" in answer else EpisodeStatus.BROKEN
+            # before the world is ready, the method is asked for nothing
+            status = EpisodeStatus.TIMED_OUT if "requested_s" in answer else EpisodeStatus.BROKEN
             return end.ended(status, cause, answer)
         if "fault" in answer:
             return end.broken(stack.cause_of(str(answer["fault"])))

@@ -138,8 +138,13 @@ class TaskReporter:
     def _publish(self, status: dict[str, Any]) -> None:
         self._status.publish(String(json.dumps(status)))
 
-    def on_end(self, result: TaskResult) -> None:
-        """Publishes and prints how the task ended."""
+    def on_end(self, result: TaskResult, frozen: str = "") -> None:
+        """Publishes and prints how the task ended.
+
+        Args:
+            result: Result of the task.
+            frozen: Description of the nodes that are frozen at its end; empty if there are none.
+        """
         self._outcome.publish(String(result.outcome))
         self._publish(
             {
@@ -150,6 +155,7 @@ class TaskReporter:
                 "elapsed_s": round(time.monotonic() - self._started, 3),
                 "outcome": result.outcome,
                 "succeeded": result.succeeded,
+                "frozen": frozen,
                 "reason": "; ".join([*map(str, result.failures), *([result.error] if result.error else [])]),
             }
         )
@@ -190,7 +196,7 @@ def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Ca
             signal.signal(number, handler)
     result = run.result()
     _keep_record(name, begun, result, recorder)
-    reporter.on_end(result)
+    reporter.on_end(result, frozen_nodes())
     time.sleep(PUBLISH_TIME_S)
     return result.exit_code
 
