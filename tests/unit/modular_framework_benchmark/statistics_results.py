@@ -48,14 +48,14 @@ def results_of(
             trial, number = divmod(place, max(len(objects), 1))
             row: dict[str, object] = {
                 "trial": trial, "seed": 1 + (place if seed_per_pair else trial), "status": status,
-                "success": status == "succeeded", "method": method,
+                "success": status == "succeeded", "method": method, "cause": "" if status == "succeeded" else f"it {status}",
             }  # fmt: skip
             if objects:
                 row["object"] = objects[number]
             for metric in metrics:
                 row[metric.name] = (values or {})[metric.name][method][place]
             rows.append(row)
-    columns = ["trial", "seed", "status", "success", "method", *(["object"] if objects else [])]
+    columns = ["trial", "seed", "status", "success", "method", "cause", *(["object"] if objects else [])]
     episodes = pd.DataFrame(rows, columns=[*columns, *(metric.name for metric in metrics)])
     episodes.insert(0, "number", np.arange(len(episodes)))
     factors = [Factor("method", tuple(statuses))]

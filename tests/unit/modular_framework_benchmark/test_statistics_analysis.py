@@ -205,6 +205,25 @@ def test_broken_episodes_count_as_failures_and_what_they_decide_is_told() -> Non
     assert of_b.estimate.value == 0.6
 
 
+@pytest.mark.parametrize("last", ["broken", "invalid"])
+def test_an_experiment_that_measured_no_method_says_why_and_claims_nothing(last: str) -> None:
+    results = results_of({"A": ["broken"] * 10, "B": ["broken"] * 9 + [last]})
+    analysis = analyse(results)
+    assert analysis.comparisons == ()
+    assert all(summary.estimate is None for summary in analysis.summaries)
+    (sentence,) = analysis.sentences
+    count = 20 if last == "broken" else 19
+    assert sentence == (
+        "every episode of every method ended for a reason outside the methods, so nothing is compared; the most "
+        f"frequent ({count} of 20): it broken"
+    )
+
+
+@pytest.mark.parametrize("other", ["failed", "timed_out", "succeeded"])
+def test_one_episode_that_measured_a_method_is_enough_for_comparisons(other: str) -> None:
+    assert analyse(results_of({"A": ["broken"] * 10, "B": ["broken"] * 9 + [other]})).comparisons
+
+
 def test_pairs_of_a_seed_count_as_one() -> None:
     # In each of 5 seeds the three objects have the same outcome: 15 pairs for A that are worth 5.
     first, second = np.ones(30, dtype=int), np.repeat([0, 1], 15)

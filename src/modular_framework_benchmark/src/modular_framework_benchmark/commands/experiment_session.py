@@ -11,7 +11,6 @@ from types import FrameType
 
 from modular_framework_benchmark.commands.mode_runners import runner_factory
 from modular_framework_benchmark.commands.stopping_rules import RunSettings, stopping_rule
-from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.results.connection import parse_address, shown_target
 from modular_framework_benchmark.results.database import ResultDatabase
@@ -100,6 +99,7 @@ class ExperimentSession:
         """Prints the first screen of the report and writes the page; fails when no episode says anything."""
         from modular_framework_benchmark.commands.report_command import write_page  # takes seconds to import
         from modular_framework_benchmark.reports.report_source import OpenedExperiment
+        from modular_framework_benchmark.statistics.observations import outside_reason
 
         if end.stopped_because:
             print(f"ended before all trials: {end.stopped_because}")
@@ -111,15 +111,10 @@ class ExperimentSession:
             again = f"{COMMAND} report {shlex.quote(self._shown)} --experiment {self._name} --into FILE"
             print(f"error: no report: {error}; the results are stored. To write it: {again}", file=sys.stderr)
             return EXIT_FAILED
-        episodes = results.episodes
-        if len(episodes) and (episodes["status"] == EpisodeStatus.BROKEN.value).all():
-            print(f"report: {page}")
-            print(
-                f"error: every episode broke, so nothing is compared; the first one: {episodes['cause'].iloc[0]}",
-                file=sys.stderr,
-            )
-            return EXIT_FAILED
         print(answer, f"report: {page}", sep="\n")
+        if reason := outside_reason(results):
+            print(f"error: {reason}", file=sys.stderr)
+            return EXIT_FAILED
         return 0
 
 

@@ -20,6 +20,7 @@ from modular_framework_benchmark.statistics.observations import (
     methods_of,
     metrics_of,
     other_factors,
+    outside_reason,
     pairs_of_methods,
     restricted,
 )
@@ -37,13 +38,15 @@ def analyse(results: ExperimentResults, *, mean_intervals: bool = False) -> Anal
     Raises:
         ValueError: The compared factor is none of the experiment's, or an episode is there twice.
     """
-    comparisons = compare(results, mean_intervals=mean_intervals)
+    outside = outside_reason(results)
+    comparisons = () if outside else compare(results, mean_intervals=mean_intervals)
+    summaries = summarise(results)
     return Analysis(
         methods=methods_of(results),
         metrics=tuple(metric.name for metric in metrics_of(results)),
-        summaries=summarise(results),
+        summaries=tuple(dataclasses.replace(item, estimate=None) for item in summaries) if outside else summaries,
         comparisons=comparisons,
-        sentences=_main_sentences(results, comparisons),
+        sentences=(outside,) if outside else _main_sentences(results, comparisons),
         rule=_rule(results, len(comparisons)),
         scope=_scope(results),
     )

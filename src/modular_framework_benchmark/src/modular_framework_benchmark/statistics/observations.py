@@ -31,6 +31,9 @@ from modular_framework_benchmark.statistics.comparison import EpisodeCounts
 
 SUCCESS = Metric("success", "task", MetricKind.RATE, Direction.HIGHER, description="The episode succeeded.")
 
+OUTSIDE = (EpisodeStatus.BROKEN, EpisodeStatus.INVALID)
+"""Ends of episodes whose cause lies outside the methods where every episode of every method has one."""
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
@@ -257,6 +260,21 @@ class EpisodeTable:
         raise ValueError(
             f"two episodes of method {method} have {found}; an experiment has each combination and trial once"
         )
+
+
+def outside_reason(results: ExperimentResults) -> str:
+    """Returns why nothing was measured: every episode of every method ended for a reason outside the methods, else "".
+
+    Such reasons are a launch that died, a simulation that was never ready, a world that was changed from outside.
+    """
+    episodes = results.episodes
+    if episodes.empty or not episodes["status"].isin([status.value for status in OUTSIDE]).all():
+        return ""
+    causes = episodes["cause"].astype(str).value_counts()
+    return (
+        "every episode of every method ended for a reason outside the methods, so nothing is compared; the most "
+        f"frequent ({causes.iloc[0]:,} of {len(episodes):,}): {causes.index[0] or 'no cause was recorded'}"
+    )
 
 
 def pairs_of_methods(results: ExperimentResults) -> tuple[tuple[str, str], ...]:
