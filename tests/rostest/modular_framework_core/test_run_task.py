@@ -279,6 +279,19 @@ def test_the_generated_module_is_written_below_ros_home(run, ros_session: RosSes
     assert "class Tiny(smach.StateMachine)" in written.read_text()
 
 
+def test_the_generated_module_has_the_file_name_that_is_given(run, ros_session: RosSession) -> None:
+    folder = Path(ros_session.env["ROS_HOME"]) / "modular_framework" / "state_machines"
+    code, output = run(GOOD.replace("tiny", "renamed"), "_generated_state_machine_name:=of_mine.py").end()
+    assert code == 0, output
+    assert "class Renamed(smach.StateMachine)" in (folder / "of_mine.py").read_text()
+    assert not (folder / "renamed.py").exists()
+    code, output = run(None, "_state_machine_to_load:=of_mine.py").end()
+    assert code == 0, output
+    code, output = run(GOOD, "_generated_state_machine_name:=../outside.py").end()
+    assert code == 2 and "generated_state_machine_name: '../outside.py'" in output
+    assert not (folder.parent / "outside.py").exists()
+
+
 def test_a_generated_module_can_be_loaded_instead_of_a_script(run) -> None:
     run(BAD).end()
     code, output = run(None, "_state_machine_to_load:=tiny.py").end()
