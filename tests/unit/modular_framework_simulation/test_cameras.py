@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_simulation.sensors import drawing_choice
 from modular_framework_simulation.sensors.cameras import OPTICAL_IN_BODY, Camera, CameraImage, CameraTopics, Pinhole
 from modular_framework_simulation.sensors.renderer import Drawing, Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneTracker
@@ -58,6 +60,23 @@ def renderer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rendere
 def empty(make_world: Callable[[], PhysicsWorld]) -> PhysicsWorld:
     """A world in which nothing is seen."""
     return make_world()
+
+
+def test_the_renderer_is_resolved_by_what_works_and_not_by_how_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    for code, resolved in ((0, Drawing.EGL), (1, Drawing.TINY), (-11, Drawing.TINY)):
+        done = SimpleNamespace(returncode=code)
+        monkeypatch.setattr(drawing_choice.subprocess, "run", lambda *_, done=done, **__: done)
+        assert drawing_choice.resolved_drawing("auto") is resolved
+        assert drawing_choice.resolved_drawing("opengl") is Drawing.EGL
+        assert drawing_choice.resolved_drawing("tiny") is Drawing.TINY
+
+
+def test_the_trial_of_opengl_succeeds_where_opengl_draws(tmp_path: Path) -> None:
+    try:
+        Renderer(Drawing.EGL, VisualMeshes(tmp_path), print).close()
+    except SimulationError as error:
+        pytest.skip(str(error))
+    assert drawing_choice.main() == 0
 
 
 def look(world: PhysicsWorld, renderer: Renderer, viewer: Camera, tracker: SceneTracker | None = None) -> Any:

@@ -16,7 +16,7 @@ from modular_framework_simulation.gazebo_ros import camera_messages, ros_names
 from modular_framework_simulation.models.mesh_files import default_cache_folder
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
 from modular_framework_simulation.sensors.cameras import Camera
-from modular_framework_simulation.sensors.drawing_choice import fastest_drawing
+from modular_framework_simulation.sensors.drawing_choice import resolved_drawing
 from modular_framework_simulation.sensors.noise import NoiseSource
 from modular_framework_simulation.sensors.renderer import Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneReport, SceneUpdate
@@ -110,10 +110,15 @@ def replaced(publishers: list[CameraPublisher], cameras: tuple[Camera, ...]) -> 
     return [kept.get(camera.name) or CameraPublisher(camera) for camera in cameras]
 
 
-def serve(pipe: Connection) -> None:
+def serve(pipe: Connection, drawing_name: str) -> None:
     """Draws what the simulation at the other end of a pipe asks for.
 
-    It sends the cameras, whenever they change, updates of the scene, and None at the end.
+    It sends the cameras, whenever they change, updates of the scene, and None at the end. What draws is resolved with
+    the first update, and set as the parameter ``~renderer`` of this node.
+
+    Args:
+        pipe: This end of the pipe.
+        drawing_name: Parameter `~renderer` of the simulation.
     """
     publishers: list[CameraPublisher] = []
     renderer: Renderer | None = None
@@ -133,8 +138,9 @@ def serve(pipe: Connection) -> None:
             continue
         if renderer is None:
             meshes = VisualMeshes(default_cache_folder())
-            drawing = fastest_drawing(rospy.loginfo)
-            rospy.set_param("gazebo/renderer", drawing.value)  # for who asks what drew the images
+            drawing = resolved_drawing(drawing_name)
+            rospy.loginfo("cameras are drawn by the renderer '%s'", drawing.value)
+            rospy.set_param("~renderer", drawing.value)  # for records of what drew the images
             renderer = Renderer(drawing, meshes, rospy.logwarn)
         renderer.apply(update)
         for each in publishers:
@@ -152,7 +158,7 @@ def _keep_the_engine_off_the_terminal() -> None:
 
 
 def main() -> int:
-    """Runs the node; argument: number of the open file that leads to the simulation.
+    """Runs the node; arguments: number of the open file that leads to the simulation, renderer.
 
     Returns:
         Exit code: 0.
@@ -164,7 +170,7 @@ def main() -> int:
     # Without simulated time: messages carry that of the simulation, and nothing here waits.
     rospy.init_node(ros_names.CAMERAS_NODE, disable_rostime=True)
     try:
-        serve(Connection(int(arguments[1])))
+        serve(Connection(int(arguments[1])), arguments[2])
     except (EOFError, ConnectionError):
         rospy.logdebug("the simulation has ended")
     return 0

@@ -33,10 +33,11 @@ class CameraProcess:
     Args:
         make_tracker: Makes what describes the things they see; called when there is a camera.
         fixed: Cameras that stay.
+        renderer: Parameter `~renderer`, what draws.
     """
 
-    def __init__(self, make_tracker: Callable[[], SceneTracker], fixed: Sequence[Camera] = ()) -> None:
-        self._make_tracker = make_tracker
+    def __init__(self, make_tracker: Callable[[], SceneTracker], fixed: Sequence[Camera], renderer: str) -> None:
+        self._make_tracker, self._renderer = make_tracker, renderer
         self._tracker: SceneTracker | None = None
         self._fixed = tuple(fixed)
         self._cameras = {camera.name: camera for camera in fixed}
@@ -55,9 +56,9 @@ class CameraProcess:
         self._tracker = self._make_tracker()
         self._pipe, other_end = Pipe()
         remappings = [each for each in sys.argv[1:] if ":=" in each and not each.startswith("__")]
-        command = [sys.executable, "-m", "modular_framework_simulation.gazebo_ros.camera_node", str(other_end.fileno())]
-        name = f"__name:={ros_names.CAMERAS_NODE}"
-        self._process = subprocess.Popen([*command, name, *remappings], pass_fds=[other_end.fileno()])
+        command = [sys.executable, "-m", "modular_framework_simulation.gazebo_ros.camera_node"]
+        arguments = [str(other_end.fileno()), self._renderer, f"__name:={ros_names.CAMERAS_NODE}", *remappings]
+        self._process = subprocess.Popen([*command, *arguments], pass_fds=[other_end.fileno()])
         other_end.close()
         threading.Thread(target=self._listen, args=(self._pipe, self._process), name="cameras", daemon=True).start()
         self._send_cameras(self._pipe)

@@ -189,7 +189,7 @@ class SimulationNode:
             seen = {robot.body.name: read_robot_visuals(description, find_package, rospy.logwarn)} if robot else {}
             return SceneTracker(self._world, seen)
 
-        cameras = CameraProcess(make_tracker, configured_cameras(read("~sensors"), robot, seed))
+        cameras = CameraProcess(make_tracker, configured_cameras(read("~sensors"), robot, seed), read("~renderer"))
         return SensorTopics(self._world, robots, seed, cameras.set_cameras), cameras
 
     def _add_hooks(self, clock_rate_hz: float) -> None:

@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Chooses the fastest way to draw that works on this machine.
+"""Resolves which renderer draws what cameras see: OpenGL wherever it works, whatever the load of the machine is.
 
-A graphics driver that does not work may end the process that tries it, so each way is tried in a process of its own:
-`python3 -m modular_framework_simulation.sensors.drawing_choice EGL` prints the seconds that an image takes.
+A graphics driver that does not work may end the process that tries it, so it is tried in a process of its own:
+`python3 -m modular_framework_simulation.sensors.drawing_choice`.
 """
 
 from __future__ import annotations
 
-import math
-import os
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
+
+import numpy as np
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
@@ -23,71 +21,44 @@ from modular_framework_simulation.sensors.cameras import Pinhole
 from modular_framework_simulation.sensors.renderer import Drawing, Renderer
 from modular_framework_simulation.sensors.visible_scene import SceneUpdate
 
-_TIMEOUT_S = 60.0
-_IMAGES = 4
-"""The first ones load shapes into the graphics memory; the fastest counts."""
+AUTO = "auto"
+"""Name of the rule: OpenGL if it draws on this machine, TinyRenderer otherwise."""
+_TIMEOUT_S = 300.0
+"""Longest trial [s]; only a driver that hangs takes so long, also on a busy machine."""
 
 
-def fastest_drawing(log: Callable[[str], None]) -> Drawing:
-    """Measures all ways to draw, and returns the one that takes the least time for an image.
-
-    Args:
-        log: Takes a line that names the choice and the times.
-    """
-    times = {drawing: _time_in_new_process(drawing) for drawing in Drawing}
-    best = min(times, key=lambda drawing: times[drawing])
-    if math.isinf(times[best]):
-        best = Drawing.TINY  # its error, if there is one, is reported where it draws
-    measured = ", ".join(
-        f"{drawing.value} {'does not work here' if math.isinf(seconds) else f'{seconds * 1e3:.0f} ms'}"
-        for drawing, seconds in times.items()
-    )
-    log(f"cameras are drawn by {best.value} (an image of 640 x 480 pixels: {measured})")
-    return best
+def resolved_drawing(name: str) -> Drawing:
+    """Returns the renderer that the value of the parameter ``~renderer`` of the simulation stands for; the same on the same machine."""
+    if name != AUTO:
+        return Drawing(name)
+    return Drawing.EGL if _opengl_draws() else Drawing.TINY
 
 
-def image_time_s(drawing: Drawing) -> float:
-    """Measures how long an image takes once everything is loaded [s].
-
-    Raises:
-        SimulationError: This machine cannot draw that way.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        renderer = Renderer(drawing, VisualMeshes(Path(folder)), print)
-        floor = specs.Visual("floor", Pose(), specs.Plane((0.0, 0.0, 1.0), (10.0, 10.0)), (0.8, 0.8, 0.8, 1.0))
-        box = specs.Visual("box", Pose(), specs.Box((0.2, 0.2, 0.2)), (0.8, 0.1, 0.1, 1.0))
-        renderer.apply(SceneUpdate(0, {1: ((floor, box),)}, (), {1: (Pose(),)}, {}))
-        above_floor = Pose((0.0, 0.0, 1.5), (1.0, 0.0, 0.0, 0.0))
-        fastest = math.inf
-        for _ in range(_IMAGES):
-            begun = time.perf_counter()
-            renderer.image(Pinhole(), above_floor)
-            fastest = min(fastest, time.perf_counter() - begun)
-        renderer.close()
-    return fastest
-
-
-def _time_in_new_process(drawing: Drawing) -> float:
-    command = [sys.executable, "-m", __name__, drawing.name]
+def _opengl_draws() -> bool:
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S)
-        return float(done.stdout) if done.returncode == 0 else math.inf
-    except (subprocess.TimeoutExpired, ValueError):
-        return math.inf
+        return subprocess.run([sys.executable, "-m", __name__], capture_output=True, timeout=_TIMEOUT_S).returncode == 0
+    except subprocess.TimeoutExpired:
+        return False
 
 
 def main() -> int:
-    """Prints the time of an image [s]; argument: the name of a `Drawing`.
+    """Draws a box on a floor by OpenGL.
 
     Returns:
-        Exit code: 0.
+        Exit code: 0 if the box is in the image, 1 otherwise.
+
+    Raises:
+        SimulationError: OpenGL cannot be loaded.
     """
-    # The engine and graphics drivers write to the standard output.
-    answer = os.dup(1)
-    os.dup2(2, 1)
-    seconds = image_time_s(Drawing[sys.argv[1]])
-    os.write(answer, f"{seconds:.6f}\n".encode())
-    return 0
+    with tempfile.TemporaryDirectory() as folder:
+        renderer = Renderer(Drawing.EGL, VisualMeshes(Path(folder)), print)
+        floor = specs.Visual("floor", Pose(), specs.Plane((0.0, 0.0, 1.0), (10.0, 10.0)), (0.8, 0.8, 0.8, 1.0))
+        box = specs.Visual("box", Pose(), specs.Box((0.2, 0.2, 0.2)), (0.8, 0.1, 0.1, 1.0))
+        renderer.apply(SceneUpdate(0, {1: ((floor, box),)}, (), {1: (Pose(),)}, {}))
+        pinhole = Pinhole()
+        depth = renderer.image(pinhole, Pose((0.0, 0.0, 1.5), (1.0, 0.0, 0.0, 0.0))).depth
+        renderer.close()
+    return 0 if np.isclose(depth[pinhole.height // 2, pinhole.width // 2], 1.4, atol=0.01) else 1
 
 
 if __name__ == "__main__":

@@ -27,8 +27,8 @@ _OPENGL_IN_OPTICAL = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 class Drawing(Enum):
     """PyBullet's ways to draw without a window."""
 
-    EGL = "OpenGL through EGL"
-    TINY = "TinyRenderer"
+    EGL = "opengl"  # through EGL, also without a graphics card
+    TINY = "tiny"  # TinyRenderer, on the processor
 
 
 class Renderer:
