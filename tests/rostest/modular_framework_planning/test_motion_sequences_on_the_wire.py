@@ -57,7 +57,7 @@ def to(home: Pose, x: float, y: float, z: float, planner: str = "LIN", **changes
     goal = pose_constraints(home.position.x + x, home.position.y + y, home.position.z + z, home.orientation)
     return request(
         goal,
-        pipeline_id=PILZ,
+        pipeline_id=changes.pop("pipeline_id", PILZ),
         planner_id=planner,
         max_velocity_scaling_factor=0.2,
         max_acceleration_scaling_factor=0.2,
@@ -186,6 +186,16 @@ def test_a_change_of_group_begins_another_trajectory(home: Pose) -> None:
 def test_an_empty_sequence_is_done_at_once() -> None:
     answer = solve(MotionSequenceRequest())
     assert answer.error_code.val == OK and not answer.planned_trajectories
+
+
+def test_a_sequence_reports_what_planned_each_motion_also_one_that_fails(home: Pose) -> None:
+    lost = to(home, 0, 3.0, 0, "BKPIECEE", pipeline_id="ompl")
+    answer, report = report_of(lambda: solve(sequence((to(home, 0.1, 0, 0), 0.0), (lost, 0.0))))
+    assert answer.error_code.val != OK
+    assert [(run["pipeline"], run["planner"], run["replaced"]) for run in report["runs"]] == [
+        (PILZ, "LIN", ""),
+        ("ompl", "RRTConnect", "BKPIECEE"),
+    ]
 
 
 def test_rules_of_a_sequence_are_kept_and_reported(home: Pose) -> None:

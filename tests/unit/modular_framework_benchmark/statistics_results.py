@@ -48,7 +48,8 @@ def results_of(
             trial, number = divmod(place, max(len(objects), 1))
             row: dict[str, object] = {
                 "trial": trial, "seed": 1 + (place if seed_per_pair else trial), "status": status,
-                "success": status == "succeeded", "method": method, "cause": "" if status == "succeeded" else f"it {status}",
+                "success": status == "succeeded", "method": method,
+                "cause": "" if status == "succeeded" else f"it {status}",
             }  # fmt: skip
             if objects:
                 row["object"] = objects[number]

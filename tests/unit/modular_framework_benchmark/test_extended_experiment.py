@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from sample_experiment import sample_description, sample_episodes
 
+from modular_framework_benchmark.episodes.ros_stack_launch import loaded_stack
 from modular_framework_benchmark.modes.ros_run_digests import run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.results.database import open_database
@@ -36,6 +37,7 @@ class Stack:
 
     def digests(self) -> dict[str, str]:
         settings = {"launch": str(self.launch), "arguments": {"planner_configuration": str(self.configuration)}}
+        loaded_stack.cache_clear()  # as in another process
         return run_digests("task", [EpisodeSpec(0, {}, 0, 1, settings)])
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ def stack(tmp_path: Path, *plans: dict[str, Any]) -> dict[str, Any]:
         "gazebo": {"world_file": str(tmp_path / "table.world"), "physics_engine": "mujoco"},
     }
     ran = running_stack(parameters, {"arm": "position_controllers/JointTrajectoryController"}, [], plans)
-    return dict(json.loads(json.dumps(ran)))  # as it comes from the other process
+    return dict(json.loads(json.dumps(asdict(ran))))  # as it comes from the other process
 
 
 def record_of(tmp_path: Path, ran: dict[str, Any]) -> Any:
@@ -49,20 +50,28 @@ def test_a_record_says_planner_settings_implementation_and_digests(tmp_path: Pat
     assert set(snapshot["digests"]) == {"robot description", "world"}
     (tmp_path / "table.world").write_text("<sdf version='1.7'/>")
     parameters = {"gazebo": {"world_file": str(tmp_path / "table.world")}}
-    assert running_stack(parameters, {}, [], [])["digests"]["world"] != snapshot["digests"]["world"]
+    assert running_stack(parameters, {}, [], []).digests["world"] != snapshot["digests"]["world"]
 
 
 def test_a_documented_substitution_is_recorded_and_the_episode_counts(tmp_path: Path) -> None:
     record = record_of(tmp_path, stack(tmp_path, plan("PRM", "CBiRRT"), plan("PRM", "OMPL")))
     assert record.status is EpisodeStatus.SUCCEEDED
     assert record.snapshot["planners"]["PRM of ompl"]["implementation"] == "CBiRRT, OMPL"
-    assert record.snapshot["substitutions"] == ["CBiRRT for PRM, which cannot keep path constraints"]
+    assert record.snapshot["substitutions"] == ("CBiRRT for PRM, which cannot keep path constraints",)
 
 
 def test_an_episode_in_which_another_planner_ran_is_invalid_and_says_which(tmp_path: Path) -> None:
     record = record_of(tmp_path, stack(tmp_path, plan("RRTConnect", "compiled", replaced="BKPIECEE")))
     assert record.status is EpisodeStatus.BROKEN
     assert record.cause == ("what ran is not what was named: planner 'BKPIECEE' was named, and RRTConnect planned")
+
+
+def test_a_sequence_that_failed_says_what_planned_its_motions(tmp_path: Path) -> None:
+    runs = [plan("LIN", "")["run"], plan("RRTConnect", "compiled", replaced="BKPIECEE")["run"]]
+    record = record_of(tmp_path, stack(tmp_path, {"kind": "sequence", "error_code": -1, "runs": runs}))
+    assert set(record.snapshot["planners"]) == {"LIN of ompl", "RRTConnect of ompl"}
+    assert record.status is EpisodeStatus.BROKEN
+    assert record.cause == "what ran is not what was named: planner 'BKPIECEE' was named, and RRTConnect planned"
 
 
 def test_the_digest_of_a_method_changes_with_its_sources_and_not_with_caches(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +83,7 @@ class EpisodeEnd:
 def make_record(end: EpisodeEnd) -> EpisodeRecord:
     """Returns the record of an episode; to be called when nothing of it runs any more."""
     wall_s = time.monotonic() - end.begun_monotonic
-    ran = WhatRan(**end.answer.get("ran", {}))
+    ran = WhatRan.from_parts(end.answer.get("ran", {}))
     if ran.replaced:
         end = end.broken(f"what ran is not what was named: {'; '.join(ran.replaced)}")
     recording = read_recording(end.folder)
@@ -124,7 +124,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         simulated_s=answer.get("simulated_s"),
         metrics={name: None if invalid else value for name, value in measured.values.items()},
         spans=tuple(sorted(spans, key=lambda span: span.started_s)),
-        snapshot=_snapshot(end, measured.faults) | asdict(ran),
+        snapshot=_snapshot(end, measured.faults) | ran.as_json(),
         folder=str(end.folder),
     )
 

@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +135,7 @@ class EpisodeRecorder:
         parameters, answer["parameters_digest"] = write_parameters(folder)
         controllers = _running_controllers() if request.controllers else {}
         plans = [report for _, report in self._samples.planning]
-        answer["ran"] = running_stack(parameters, controllers, _publishers(GENERATION_SIGNAL), plans)
+        answer["ran"] = asdict(running_stack(parameters, controllers, _publishers(GENERATION_SIGNAL), plans))
         self._reached(request, answer, "recorded")
         return answer
 

@@ -7,7 +7,6 @@ import hashlib
 import http.client
 import xmlrpc.client
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,8 @@ import rospkg
 import rospy
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
-from modular_framework_benchmark.records.what_ran import WhatRan, description_digests, planners_of
+from modular_framework_benchmark.records.what_ran import RanMethod, WhatRan, description_digests
+from modular_framework_planning.plan_statistics import PlannerRun
 
 FILES = {
     "world": "/gazebo/world_file",
@@ -33,8 +33,8 @@ def running_stack(
     controllers: Mapping[str, str],
     generators: Iterable[str],
     plans: Iterable[Mapping[str, Any]],
-) -> dict[str, Any]:
-    """Returns a `WhatRan` as JSON values.
+) -> WhatRan:
+    """Returns what a stack consists of, and what planned.
 
     Args:
         parameters: All of the parameter server.
@@ -46,16 +46,16 @@ def running_stack(
     described = description_digests(*(str(_value(parameters, name)) for name in DESCRIPTIONS))
     digests = {what: hashlib.sha256(path.read_bytes()).hexdigest() for what, path in files.items() if path.is_file()}
     methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
-    return asdict(
-        WhatRan(
-            methods={name: {"version": version, "sources": digest} for name, (version, digest) in methods.items()},
-            controllers=dict(controllers),
-            physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
-            renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
-            digests=described | digests,
-            **planners_of(plan.get("run") for plan in plans),
-        )
+    found = WhatRan(
+        methods={name: RanMethod(version, digest) for name, (version, digest) in methods.items()},
+        controllers=dict(controllers),
+        physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
+        renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
+        digests=described | digests,
     )
+    # a sequence has a run for each of its motions
+    runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
+    return found.with_plans(PlannerRun(**run) for run in runs)
 
 
 def _value(parameters: Mapping[str, Any], name: str) -> Any:

@@ -3,7 +3,12 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import roslaunch.config
 import roslaunch.core
@@ -13,7 +18,8 @@ import rospkg
 
 from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.episodes.stack import StackLaunch
-from modular_framework_benchmark.episodes.task_settings import TaskSettings
+from modular_framework_benchmark.episodes.task_settings import TaskSettings, read_settings
+from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_core.launching.launch_arguments import (
     METHOD,
     NO_METHOD,
@@ -22,6 +28,7 @@ from modular_framework_core.launching.launch_arguments import (
     known_arguments,
 )
 from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
+from modular_framework_core.launching.ros_launch_preview import LaunchPreview, preview_launch
 
 OWN_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
 """Launch arguments of every episode, where the launch file has them."""
@@ -64,6 +71,39 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         controllers,
         values.get("wait_for_planning", "").lower() in TRUTHS,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class StackPreview:
+    """What an episode would launch, and what that would start."""
+
+    launch: StackLaunch
+    preview: LaunchPreview
+
+
+LAUNCHED = ("launch", "arguments", "task")
+"""Settings that decide what is launched; parameters of an episode are set over those of its launch files."""
+
+
+def preview_stack(settings: Mapping[str, Any]) -> StackPreview:
+    """Returns what an episode with these settings would start; its launch files are loaded once.
+
+    Raises:
+        SettingsError: As of `resolve_launch`, or the launch file cannot be loaded.
+    """
+    return loaded_stack(json.dumps({key: settings[key] for key in LAUNCHED if key in settings}, sort_keys=True))
+
+
+@lru_cache(maxsize=256)
+def loaded_stack(settings: str) -> StackPreview:
+    """As `preview_stack`, of JSON; a process loads the launch files of equal settings once."""
+    launch = resolve_launch(read_settings(EpisodeSpec(0, {}, 0, 1, json.loads(settings))))
+    try:
+        path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (launch.package, launch.launch_file))])[0]
+        found = preview_launch(path, [f"{name}:={value}" for name, value in launch.arguments.items()])
+    except roslaunch.core.RLException as error:
+        raise SettingsError(f"setting 'launch' {launch.package}/{launch.launch_file}: {error}") from error
+    return StackPreview(launch, found)
 
 
 def _nodes_of(method: str) -> tuple[str, ...]:

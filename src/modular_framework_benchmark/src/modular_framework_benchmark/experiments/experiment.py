@@ -62,6 +62,7 @@ class Experiment:
         workers: How many episodes run at the same time.
         record: Which files an episode keeps: `log`, `trajectories`, `bag`, `video`.
         files: SHA-256 of each file beside it that decides the episodes, by what names it.
+        substitutions: What will run in place of what is named where requests need it, known beforehand.
     """
 
     description: ExperimentDescription
@@ -74,6 +75,7 @@ class Experiment:
     workers: int
     record: Mapping[str, bool]
     files: Mapping[str, str]
+    substitutions: tuple[str, ...] = ()
 
     def described(self, digest: str, ran_with: Mapping[str, str]) -> ExperimentDescription:
         """Returns what the result database keeps of it.

@@ -110,6 +110,7 @@ class _Reader:
         checks: SettingChecks,
     ) -> None:
         self._checks = checks
+        self._substitutions: dict[str, None] = {}
         self._text, self._path, self._reading, self._known = text, path, reading, known_metrics
         mode = value_of(root, "mode")
         self._mode = str(mode.value) if isinstance(mode, Scalar) and mode.value in MODES else None
@@ -173,6 +174,7 @@ class _Reader:
             files=_digests(
                 metric_files(measures) + [file for one in combinations for file in model_files(one.settings)]
             ),
+            substitutions=tuple(self._substitutions),
         )
 
     def _factors(self) -> Levels:
@@ -298,6 +300,7 @@ class _Reader:
         checked = CheckedSettings((), settings) if check is None else check(settings)
         for fault in checked.faults:
             self._reading.faults.add(location_below(node, fault.keys), fault.text)
+        self._substitutions.update(dict.fromkeys(checked.substitutions))
         return json.dumps(checked.resolved, sort_keys=True, default=repr) if checked.resolved is not None else ""
 
 

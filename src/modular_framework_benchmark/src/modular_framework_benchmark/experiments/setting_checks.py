@@ -28,10 +28,12 @@ class CheckedSettings:
     Attributes:
         faults: What is wrong with them.
         resolved: What runs, as JSON values; equal for settings that run the same.
+        substitutions: What will run in place of what is named where requests need it, known beforehand.
     """
 
     faults: tuple[SettingFault, ...]
     resolved: Any
+    substitutions: tuple[str, ...] = ()
 
 
 SettingsCheck = Callable[[Mapping[str, Any]], CheckedSettings]

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
@@ -76,7 +76,7 @@ def measured_record(
             "machine": machine(),
             "reference_s": reference_s(),
             **MachineLoad.now().since(watch.load),
-            **asdict(report.ran),
+            **report.ran.as_json(),
             **({"metric_faults": dict(measured.faults)} if measured.faults else {}),
         },
         folder=str(folder),

@@ -25,7 +25,7 @@ from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.what_ran import WhatRan, description_digests
+from modular_framework_benchmark.records.what_ran import RanMethod, WhatRan, description_digests
 from modular_framework_core.grasp_generation.grasp_candidates import (
     GraspCandidate,
     GraspMethod,
@@ -97,7 +97,7 @@ def _ran(method: str, robot: Robot) -> WhatRan:
     package = method.partition(":")[0].partition(".")[0]
     version, sources = package_source(package)
     return WhatRan(
-        methods={package: {"version": version, "sources": sources}},
+        methods={package: RanMethod(version, sources)},
         digests=description_digests(*robot.model.source[:2]),
     )
 

@@ -22,7 +22,7 @@ from modular_framework_benchmark.modes.parameters import merged, parameters_belo
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.what_ran import WhatRan, description_digests, planners_of
+from modular_framework_benchmark.records.what_ran import WhatRan, description_digests
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
@@ -151,8 +151,8 @@ def _read_problem(settings: Mapping[str, Any], model: RobotModel) -> MotionProbl
 
 
 def _ran(statistics: PlanStatistics | None, model: RobotModel) -> WhatRan:
-    run = None if statistics is None else statistics.as_json()["run"]
-    return WhatRan(digests=description_digests(*model.source[:2]), **planners_of([run]))
+    run = None if statistics is None else statistics.run
+    return WhatRan(digests=description_digests(*model.source[:2])).with_plans([] if run is None else [run])
 
 
 def _status(code: ErrorCode) -> EpisodeStatus:

@@ -13,17 +13,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import roslaunch.config
-import roslaunch.rlutil
-import roslaunch.xmlloader
-
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
-from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
+from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCHED, preview_stack
 from modular_framework_benchmark.episodes.snapshot import PACKAGES
-from modular_framework_benchmark.episodes.task_settings import read_settings
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
-LAUNCHED = ("launch", "arguments", "task", "robot", "method")
+LOADED = (*LAUNCHED, "robot", "method")
 """Settings that decide what is launched or loaded."""
 LIBRARIES = ("modular_framework_benchmark", "modular_framework_core", "modular_framework_planning")
 
@@ -39,8 +34,7 @@ def run_digests(mode: str, episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
         SettingsError: A launch file cannot be read.
     """
     found: dict[str, set[str]] = {f"Python package {name}": {_python_version(name)} for name in PACKAGES}
-    # launch files do not see the parameters that an episode sets over theirs
-    stacks = {json.dumps([spec.settings.get(key) for key in LAUNCHED], sort_keys=True): spec for spec in episodes}
+    stacks = {json.dumps([spec.settings.get(key) for key in LOADED], sort_keys=True): spec for spec in episodes}
     for spec in stacks.values():
         for what, digest in _of_launch(spec) if mode == "task" else _of_packages(_named_packages(spec.settings)):
             found.setdefault(what, set()).add(digest[:16])
@@ -66,21 +60,16 @@ def _of_packages(packages: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 
 def _of_launch(spec: EpisodeSpec) -> Iterator[tuple[str, str]]:
-    launch = resolve_launch(read_settings(spec))
-    path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (launch.package, launch.launch_file))])[0]
-    arguments = [f"{name}:={value}" for name, value in launch.arguments.items()]
-    config = roslaunch.config.load_config_default(
-        [(path, arguments)], None, loader=roslaunch.xmlloader.XmlLoader(resolve_anon=False), verbose=False
-    )
-    texts = [str(launch.arguments.get(name, "")) for name in sorted(launch.arguments)]
-    for name, parameter in config.params.items():
-        yield f"parameter {name}", _digest(json.dumps(parameter.value, sort_keys=True, default=str))
-        texts.append(str(parameter.value))
-    words = {word for text in (*texts, *(node.args or "" for node in config.nodes)) for word in text.split()}
+    stack = preview_stack(spec.settings)
+    texts = [str(stack.launch.arguments[name]) for name in sorted(stack.launch.arguments)]
+    for name, value in stack.preview.parameters.items():
+        yield f"parameter {name}", _digest(json.dumps(value, sort_keys=True, default=str))
+        texts.append(str(value))
+    words = {word for text in (*texts, *(node.arguments for node in stack.preview.nodes)) for word in text.split()}
     for file in sorted(Path(word) for word in words if word.startswith("/") and len(word) < 1024):
         if file.is_file():
             yield f"file {file.parent.name}/{file.name}", hashlib.sha256(file.read_bytes()).hexdigest()
-    yield from _of_packages({*LIBRARIES, *(node.package for node in config.nodes)})
+    yield from _of_packages({*LIBRARIES, *(node.package for node in stack.preview.nodes)})
 
 
 def _digest(text: str) -> str:

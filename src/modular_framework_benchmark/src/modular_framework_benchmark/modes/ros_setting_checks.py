@@ -3,29 +3,29 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
 from typing import Any
 
-import roslaunch.core
 import rospkg
 
 from modular_framework_benchmark.episodes.errors import SettingsError
-from modular_framework_benchmark.episodes.ros_stack_launch import resolve_launch
-from modular_framework_benchmark.episodes.task_settings import read_settings
+from modular_framework_benchmark.episodes.ros_stack_launch import preview_stack
 from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
 from modular_framework_benchmark.experiments.setting_checks import CheckedSettings, SettingFault, SettingsCheck
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner, load_method
 from modular_framework_benchmark.modes.ros_kinematics_runner import KinematicsEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
-from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_benchmark.records.what_ran import substitution_text
 from modular_framework_core.files.faults import listing, nearest
-from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves, preview_launch
+from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.kinematics_settings import NUMERIC
-from modular_framework_planning.planning_pipeline.planner_registry import ResolvedPlanner, UnknownNameError
+from modular_framework_planning.planning_pipeline.planner_registry import (
+    PlannerRegistry,
+    ResolvedPlanner,
+    UnknownNameError,
+)
 from modular_framework_urdf.urdf_reader import read_urdf
 
 NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")
@@ -74,10 +74,9 @@ def _checked_by(prepare: Any, settings: Mapping[str, Any]) -> CheckedSettings:
 
 def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
     """Checks the launch and the task of mode `task`."""
-    given = {key: settings[key] for key in ("launch", "arguments", "task")}
     try:
-        launch = _preview(json.dumps(given))
-    except (SettingsError, roslaunch.core.RLException, rospkg.ResourceNotFound) as error:
+        launch = preview_stack(settings).preview
+    except (SettingsError, rospkg.ResourceNotFound) as error:
         return CheckedSettings((SettingFault(("arguments",), str(error)),), None)
     check = LaunchCheck(launch, settings["parameters"], tuple(settings["extra_parameters"]))
     faults = tuple(
@@ -92,15 +91,8 @@ def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
             "nodes": sorted(map(repr, check.launch.nodes)),
             "parameters": {**check.launch.parameters, "/planner_name": repr(check.planner())},
         },
+        _substitutions(check.registry(), check.planner()),
     )
-
-
-@lru_cache(maxsize=256)
-def _preview(settings: str) -> LaunchPreview:
-    """Returns what an episode with these settings launches: JSON with launch, arguments and task."""
-    stack = resolve_launch(read_settings(EpisodeSpec(0, {}, 0, 1, json.loads(settings))))
-    path = roslaunch.rlutil.resolve_launch_arguments([stack.package, stack.launch_file])[0]
-    return preview_launch(path, [f"{name}:={value}" for name, value in stack.arguments.items()])
 
 
 def check_planning(runner: PlanningEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
@@ -124,7 +116,13 @@ def check_planning(runner: PlanningEpisodeRunner, settings: Mapping[str, Any]) -
         hint = f"{listing(groups)}{nearest(settings['group'], groups)}"
         faults.append(SettingFault(("group",), f"there is no planning group '{settings['group']}'; {hint}"))
     found = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS}))
-    return CheckedSettings(tuple(faults), {**settings, "planner": repr(found)})
+    return CheckedSettings(tuple(faults), {**settings, "planner": repr(found)}, _substitutions(check.registry(), found))
+
+
+def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:
+    """Returns what would run in place of a planner, as its records would say."""
+    constrained = registry.constrained_planner(planner) if registry is not None and planner is not None else ""
+    return (substitution_text(planner.planner, constrained),) if planner is not None and constrained else ()
 
 
 def _planner(

@@ -5,8 +5,41 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
+
+from modular_framework_planning.plan_statistics import PlannerRun
+
+
+@dataclass(frozen=True, slots=True)
+class RanPlanner:
+    """A planner that planned.
+
+    Attributes:
+        settings: Its parameters as resolved.
+        request_adapters: Request adapters, outermost first.
+        implementations: Who searched for it: `compiled`, `OMPL`, `CBiRRT`; none where straight motions were enough.
+    """
+
+    settings: Mapping[str, Any]
+    request_adapters: tuple[str, ...]
+    implementations: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Returns its settings and, beside them, how it planned."""
+        return {
+            **self.settings,
+            "request_adapters": ", ".join(self.request_adapters),
+            IMPLEMENTATION: ", ".join(self.implementations),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class RanMethod:
+    """A method that generated grasps: the version of its package, and SHA-256 of its sources."""
+
+    version: str
+    sources: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,9 +47,9 @@ class WhatRan:
     """The parts of an episode; those that a mode does not have are empty.
 
     Attributes:
-        planners: Settings and implementation of each planner, by its name and that of its pipeline.
+        planners: Each planner, by its name and that of its pipeline.
         solver: Inverse kinematics, in the mode that measures it.
-        methods: Version and SHA-256 of the sources of each method that generates grasps, by package.
+        methods: Each method that generates grasps, by package.
         controllers: Type of each controller that ran, by name.
         physics_engine: What moved the bodies.
         renderer: What drew the images of cameras; empty without a camera.
@@ -25,9 +58,9 @@ class WhatRan:
         replaced: What was named and is not there, with what ran instead: such an episode is invalid.
     """
 
-    planners: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    planners: Mapping[str, RanPlanner] = field(default_factory=dict)
     solver: str = ""
-    methods: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    methods: Mapping[str, RanMethod] = field(default_factory=dict)
     controllers: Mapping[str, str] = field(default_factory=dict)
     physics_engine: str = ""
     renderer: str = ""
@@ -35,37 +68,57 @@ class WhatRan:
     substitutions: tuple[str, ...] = ()
     replaced: tuple[str, ...] = ()
 
+    def as_json(self) -> dict[str, Any]:
+        """Returns the part of a snapshot that says what ran."""
+        return asdict(self) | {"planners": {name: planner.as_json() for name, planner in self.planners.items()}}
+
+    @classmethod
+    def from_parts(cls, parts: Mapping[str, Any]) -> WhatRan:
+        """Returns what another process has written by `dataclasses.asdict`, as JSON values."""
+        return cls(
+            **{
+                **parts,
+                "planners": {name: RanPlanner(**planner) for name, planner in parts.get("planners", {}).items()},
+                "methods": {name: RanMethod(**method) for name, method in parts.get("methods", {}).items()},
+                "substitutions": tuple(parts.get("substitutions", ())),
+                "replaced": tuple(parts.get("replaced", ())),
+            }
+        )
+
+    def with_plans(self, runs: Iterable[PlannerRun]) -> WhatRan:
+        """Returns it with what planned.
+
+        Args:
+            runs: What planned each motion, also each one that failed.
+        """
+        planners: dict[str, RanPlanner] = {}
+        substitutions, replaced = set(self.substitutions), set(self.replaced)
+        for run in runs:
+            name = f"{run.planner} of {run.pipeline}"
+            before = planners[name].implementations if name in planners else ()
+            searched = tuple(sorted({*before, run.implementation} - {""}))
+            planners[name] = RanPlanner(run.settings, tuple(run.adapters), searched)
+            if run.implementation == CONSTRAINED != run.planner:
+                substitutions.add(substitution_text(run.planner))
+            if run.replaced:
+                replaced.add(f"planner '{run.replaced}' was named, and {run.planner} planned")
+        return replace(
+            self,
+            planners=planners,
+            substitutions=tuple(sorted(substitutions)),
+            replaced=tuple(sorted(replaced)),
+        )
+
 
 IMPLEMENTATION = "implementation"
-"""Who searched for a planner: `compiled`, `OMPL`, `CBiRRT`; empty where straight motions were enough."""
+"""Key of a planner's implementations in a snapshot."""
 CONSTRAINED = "CBiRRT"
 """The search of plans whose path constraints no other planner can keep."""
 
 
-def planners_of(runs: Iterable[Mapping[str, Any] | None]) -> dict[str, Any]:
-    """Returns the fields of `WhatRan` that planning reports fill.
-
-    Args:
-        runs: The key `run` of each report; None where a request was refused before.
-    """
-    planners: dict[str, dict[str, Any]] = {}
-    searched: dict[str, set[str]] = {}
-    substitutions, replaced = set(), set()
-    for run in filter(None, runs):
-        by, name = run["implementation"], f"{run['planner']} of {run['pipeline']}"
-        planners[name] = {**run["settings"], "request_adapters": ", ".join(run["adapters"])}
-        searched.setdefault(name, set()).update({by} - {""})
-        if by == CONSTRAINED != run["planner"]:
-            substitutions.add(f"{by} for {run['planner']}, which cannot keep path constraints")
-        if run["replaced"]:
-            replaced.add(f"planner '{run['replaced']}' was named, and {run['planner']} planned")
-    for name in planners:
-        planners[name][IMPLEMENTATION] = ", ".join(sorted(searched[name]))
-    return {
-        "planners": planners,
-        "substitutions": tuple(sorted(substitutions)),
-        "replaced": tuple(sorted(replaced)),
-    }
+def substitution_text(planner: str, constrained: str = CONSTRAINED) -> str:
+    """Returns what a record and a dry run say of a planner that another search replaces."""
+    return f"{constrained} for {planner}, which cannot keep path constraints"
 
 
 def description_digests(urdf: str, srdf: str) -> dict[str, str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import roslaunch.config
 import roslaunch.core
+import roslaunch.xmlloader
 
 from modular_framework_core.launching.external_controllers import controller_node
 from modular_framework_ros.node_handle import ParameterError
@@ -74,7 +75,7 @@ def leaves(parameters: Mapping[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
-    """Returns what a launch file would start.
+    """Returns what a launch file would start; equal for equal files, so names of anonymous nodes are as in the file.
 
     Args:
         path: The launch file.
@@ -83,7 +84,10 @@ def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
     Raises:
         roslaunch.core.RLException: The launch file or something that it reads cannot be used.
     """
-    config = roslaunch.config.load_config_default([(path, list(arguments))], None, verbose=False, assign_machines=False)
+    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False)
+    config = roslaunch.config.load_config_default(
+        [(path, list(arguments))], None, loader=loader, verbose=False, assign_machines=False
+    )
     nodes = [
         LaunchedNode(node.package, node.type, f"{node.namespace}{node.name}", node.namespace, str(node.args))
         for node in config.nodes

@@ -6,7 +6,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import rospy
@@ -16,6 +16,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.conversions import state_message, trajectory_message
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.move_group.motion_plan_requests import read_request
+from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planners.pilz.command_planner import DEFAULT_SAMPLING_TIME_S, CommandPlanner
 from modular_framework_planning.planners.pilz.sequence import (
     ItemSpec,
@@ -45,9 +46,10 @@ def solve_sequence(
     """
     begun = time.monotonic()
     response = MotionSequenceResponse()
-    details = {"items": len(message.items), "groups": [item.req.group_name for item in message.items]}
+    runs: list[dict[str, Any]] = []
+    details = {"items": len(message.items), "groups": [item.req.group_name for item in message.items], "runs": runs}
     try:
-        parts = _plan(context, message.items, change, cancelled)
+        parts = _plan(context, message.items, change, cancelled, runs)
     except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
         response.error_code.val = context.reporter.failure("sequence", error, **details)
         return SolvedSequence(response, (), str(error))
@@ -62,9 +64,17 @@ def solve_sequence(
 
 
 def _plan(
-    context: MoveGroupContext, items: Sequence[Any], change: SceneChange, cancelled: Callable[[], bool]
+    context: MoveGroupContext,
+    items: Sequence[Any],
+    change: SceneChange,
+    cancelled: Callable[[], bool],
+    runs: list[dict[str, Any]],
 ) -> tuple[SequencePart, ...]:
-    """Plans each motion from the end of the one before, then joins them; raises PlanningError with the item."""
+    """Plans each motion from the end of the one before, then joins them; raises PlanningError with the item.
+
+    Args: as those of `solve_sequence`, with the items of the message; `runs` takes what planned each of them, also one
+    that failed.
+    """
     radii, warnings = checked_radii(
         [ItemSpec(item.req.group_name, item.blend_radius, _has_start(item.req.start_state)) for item in items]
     )
@@ -80,12 +90,19 @@ def _plan(
             request = read_request(context, scene, _own_request(context, item.req, number), cancelled)
             answer = context.plan(request)
         except PlanningError as error:
+            _note_run(error.statistics, runs)
             raise PlanningError(error.code, f"items[{number}]: {error.reason}") from error
+        _note_run(answer.statistics, runs)
         planned.append(PlannedItem(request, answer, radius))
         scene = request.scene.with_positions(answer.goal)
     pipeline = context.pipeline(_pipeline_of(context, items[0].req))
     period = float(pipeline.settings.parameters.get("sampling_time", DEFAULT_SAMPLING_TIME_S))
     return SequenceJoiner(context.kinematics, pipeline.checker, period, pipeline.settings.motion_step).join(planned)
+
+
+def _note_run(statistics: PlanStatistics | None, runs: list[dict[str, Any]]) -> None:
+    if statistics is not None and statistics.run is not None:
+        runs.append(asdict(statistics.run))
 
 
 def _has_start(state: RobotState) -> bool:

@@ -119,6 +119,11 @@ class PlannerRegistry:
         check = getattr(planner_class(found.plugin), "parameter_faults", None)
         return list(check(found.planner, found.settings if settings is None else settings)) if check else []
 
+    @staticmethod
+    def constrained_planner(found: ResolvedPlanner) -> str:
+        """Returns what searches in place of a planner that cannot keep path constraints; empty if nothing does."""
+        return str(getattr(planner_class(found.plugin), "constrained_planner", ""))
+
     def adapter_faults(self, pipelines: Iterable[str]) -> list[str]:
         """Returns what is wrong with the plugins and request adapters of some pipelines, one sentence each."""
         faults = []

@@ -28,7 +28,7 @@ _TIMEOUT_S = 300.0
 
 
 def resolved_drawing(name: str) -> Drawing:
-    """Returns the renderer that the value of the parameter ``~renderer`` of the simulation stands for; the same on the same machine."""
+    """Returns the renderer of a value of the parameter ``~renderer``; on the same machine always the same one."""
     if name != AUTO:
         return Drawing(name)
     return Drawing.EGL if _opengl_draws() else Drawing.TINY

@@ -51,6 +51,8 @@ class OmplPlanner:
     planner_ids = tuple(PLANNERS)
     improving_ids = ANYTIME
     description = "OMPL"
+    constrained_planner = NAME
+    """Search that replaces any of them where it cannot keep the path constraints of a request."""
 
     @staticmethod
     def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:
