@@ -9,13 +9,12 @@ import pytest
 from joint_sliders.node_parameters import NodeParameters, read_parameters
 
 from modular_framework_ros.node_handle import ParameterError
-from modular_framework_ros.parameter_declarations import ParameterReader, node_declaration
+from modular_framework_ros.parameter_declarations import ParameterReader, existing_declaration
 from modular_framework_urdf.mimics import Mimic
 
 
 def read(**given: Any) -> NodeParameters:
-    declared = node_declaration("joint_state_publisher_gui", "joint_state_publisher_gui")
-    assert declared is not None
+    declared = existing_declaration("joint_state_publisher_gui", "joint_state_publisher_gui")
     return read_parameters(ParameterReader(declared, lambda name: given.get(name[1:]), lambda name: name[1:]))
 
 

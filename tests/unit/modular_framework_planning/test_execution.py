@@ -23,7 +23,7 @@ from modular_framework_planning.move_group.controllers.action_controllers import
 from modular_framework_planning.move_group.controllers.execution import TrajectoryExecution
 from modular_framework_planning.trajectory_execution.controllers import ControllerSpec
 from modular_framework_planning.trajectory_execution.execution_settings import ExecutionSettings
-from modular_framework_ros.parameter_declarations import node_declaration
+from modular_framework_ros.parameter_declarations import existing_declaration
 
 WHEEL = ControllerSpec("base", "follow", "FollowJointTrajectory", ("wheel",))
 ARM = ControllerSpec("arm", "follow", "FollowJointTrajectory", ("elbow",))
@@ -109,8 +109,7 @@ def clock() -> Any:
 
 def execution_settings(**settings: Any) -> ExecutionSettings:
     """Those that move_group declares, but for some."""
-    declared = node_declaration("modular_framework_planning", "move_group")
-    assert declared is not None
+    declared = existing_declaration("modular_framework_planning", "move_group")
     defaults = {
         item.name: declared.parameters[f"~trajectory_execution/{item.name}"].default
         for item in fields(ExecutionSettings)

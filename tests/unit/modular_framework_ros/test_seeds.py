@@ -28,7 +28,7 @@ def test_zero_is_a_seed(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("value", [-1, 1.5, True, "7", 2**31])
 def test_what_is_no_seed_is_refused_with_what_is_allowed(monkeypatch: pytest.MonkeyPatch, value: Any) -> None:
     with_parameter(monkeypatch, value)
-    with pytest.raises(seeds.SeedError, match=r"/seed.*0 to 2147483647"):
+    with pytest.raises(seeds.SeedError, match=r"/seed.*at least 0 and at most 2147483647"):
         seeds.seed_parameter()
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from modular_framework_ros import start_up
+from modular_framework_ros import declared_parameters, start_up
 from modular_framework_ros.start_up import start_timeout, wait_for_start
 
 
@@ -25,13 +25,12 @@ def node(monkeypatch: pytest.MonkeyPatch) -> Any:
         start_up,
         "rospy",
         SimpleNamespace(
-            get_param=state.parameters.get,
             is_shutdown=lambda: False,
-            resolve_name=str,
             logwarn=lambda text, *values: state.warnings.append(text % values),
             logerr_throttle=lambda period_s, text: state.errors.append(text),
         ),
     )
+    monkeypatch.setattr(declared_parameters.rospy, "get_param", state.parameters.get)
     return state
 
 
@@ -52,4 +51,4 @@ def test_the_wait_ends_at_the_limit_that_is_configured(node: Any) -> None:
 def test_a_limit_without_sense_is_named_and_replaced(node: Any, value: object) -> None:
     node.parameters["/start_timeout"] = value
     assert start_timeout() == 300.0
-    assert "/start_timeout" in node.errors[0] and "seconds above 0" in node.errors[0]
+    assert "/start_timeout" in node.errors[0] and "allowed: a number, above 0" in node.errors[0]

@@ -9,7 +9,7 @@ import pytest
 
 from modular_framework_core.task_runner.manipulator_links import manipulator_links
 from modular_framework_ros.node_handle import ParameterError
-from modular_framework_ros.parameter_declarations import ParameterReader, node_declaration
+from modular_framework_ros.parameter_declarations import ParameterReader, existing_declaration
 
 ARM = ("/planner_name", "/robot_speed_factor", "/arm_group_name", "/number_plan_attempt", "/planning_max_time")
 HAND = ("/manipulator_controller_action_server_name", "/max_torque")
@@ -26,8 +26,7 @@ GOOD: dict[str, Any] = {
 
 
 def values(given: dict[str, Any]) -> list[Any]:
-    declared = node_declaration("modular_framework_core", "run_task")
-    assert declared is not None
+    declared = existing_declaration("modular_framework_core", "run_task")
     return ParameterReader(declared, given.get).values(*ARM, *HAND)
 
 

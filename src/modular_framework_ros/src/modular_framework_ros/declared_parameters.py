@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import rospy
 
-from modular_framework_ros.parameter_declarations import DeclarationError, ParameterReader, node_declaration
+from modular_framework_ros.parameter_declarations import ParameterReader, existing_declaration
 
 
 class DeclaredParameters(ParameterReader):
@@ -20,7 +20,6 @@ class DeclaredParameters(ParameterReader):
     """
 
     def __init__(self, package: str, node: str) -> None:
-        found = node_declaration(package, node)
-        if found is None:
-            raise DeclarationError(f"there is no {package}/parameters/{node}.yaml")
-        super().__init__(found, lambda name: rospy.get_param(name, None), rospy.resolve_name)
+        super().__init__(
+            existing_declaration(package, node), lambda name: rospy.get_param(name, None), rospy.resolve_name
+        )

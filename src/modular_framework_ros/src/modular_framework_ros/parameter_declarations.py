@@ -214,9 +214,6 @@ def parameters_below(package: str, name: str, own: NodeHandle, root: NodeHandle)
     Raises:
         DeclarationError: There is no declaration of it, or it cannot be used.
     """
-    found = node_declaration(package, name)
-    if found is None:
-        raise DeclarationError(f"there is no {package}/parameters/{name}.yaml")
 
     def place(declared: str) -> tuple[NodeHandle, str]:
         return (own, declared[1:]) if declared.startswith("~") else (root, declared)
@@ -229,7 +226,15 @@ def parameters_below(package: str, name: str, own: NodeHandle, root: NodeHandle)
         handle, key = place(declared)
         return join_names(handle.namespace, key)
 
-    return ParameterReader(found, get, whole_name)
+    return ParameterReader(existing_declaration(package, name), get, whole_name)
+
+
+def existing_declaration(package: str, node: str) -> NodeDeclaration:
+    """Returns the declared parameters of an executable or a part; raises DeclarationError if there are none."""
+    found = node_declaration(package, node)
+    if found is None:
+        raise DeclarationError(f"there is no {package}/parameters/{node}.yaml")
+    return found
 
 
 @cache

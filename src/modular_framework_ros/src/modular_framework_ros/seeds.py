@@ -7,6 +7,8 @@ import hashlib
 
 import rospy
 
+from modular_framework_ros.parameter_declarations import existing_declaration
+
 SEED_PARAMETER = "/seed"
 LARGEST_SEED = 2**31 - 1
 
@@ -24,12 +26,10 @@ def seed_parameter() -> int | None:
     value = rospy.get_param_cached(SEED_PARAMETER, None)
     if value is None or value in ("", {}):  # {} stands for a parameter that was deleted
         return None
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= LARGEST_SEED:
-        raise SeedError(
-            f"parameter {SEED_PARAMETER} is {value!r}; allowed is a whole number from 0 to {LARGEST_SEED}, or none for "
-            "random numbers that differ every time"
-        )
-    return value
+    fault = existing_declaration("modular_framework_ros", "launch").parameters[SEED_PARAMETER].fault(value)
+    if fault:
+        raise SeedError(f"parameter '{SEED_PARAMETER}' {fault}")
+    return int(value)
 
 
 def derived_seed(seed: int, *purpose: object) -> int:

@@ -16,6 +16,7 @@ import rospy
 from simulation_time_msgs.srv import AdvanceTime, AdvanceTimeRequest, AdvanceTimeResponse, HoldTime, HoldTimeRequest
 
 from modular_framework_ros.calls import CallError, request_service, wait_until
+from modular_framework_ros.declared_parameters import DeclaredParameters
 
 WAIT_PARAMETER = "/wait_for_planning"
 HOLD_SERVICE = "/gazebo/hold_time"
@@ -44,7 +45,7 @@ class SimulatedTime:
     def enabled(self) -> bool:
         """Whether the simulation lets nodes hold its time."""
         if self._enabled is None:
-            self._enabled = bool(rospy.get_param(WAIT_PARAMETER, False))
+            self._enabled = bool(DeclaredParameters("modular_framework_ros", "launch").value(WAIT_PARAMETER))
         return self._enabled
 
     @contextmanager

@@ -3,31 +3,31 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
 import rospy
 
+from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_ros.node_handle import ParameterError
+
 START_TIMEOUT_PARAMETER = "/start_timeout"
-DEFAULT_START_TIMEOUT_S = 300.0
-"""Longest wait of a node for another one [s, wall time]. A node that died ends the launch that requires it, so this is
-for nodes that were never started."""
 REPORT_PERIOD_S = 10.0
 POLL_PERIOD_S = 0.05
 
 
 def start_timeout() -> float:
-    """Returns the longest wait of a node for another one at the start [s]: the parameter ``/start_timeout``."""
-    value = rospy.get_param(START_TIMEOUT_PARAMETER, DEFAULT_START_TIMEOUT_S)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
-        rospy.logerr_throttle(
-            REPORT_PERIOD_S,
-            f"Parameter '{START_TIMEOUT_PARAMETER}' is {value!r}, allowed are "
-            f"seconds above 0; {DEFAULT_START_TIMEOUT_S:g} is used instead.",
-        )
-        return DEFAULT_START_TIMEOUT_S
-    return float(value)
+    """Returns the longest wait of a node for another one at the start [s, wall time]: the parameter ``/start_timeout``.
+
+    A node that died ends the launch that requires it, so this is for nodes that were never started.
+    """
+    launch = DeclaredParameters("modular_framework_ros", "launch")
+    try:
+        return float(launch.value(START_TIMEOUT_PARAMETER))
+    except ParameterError as error:
+        default_s = float(launch.declaration(START_TIMEOUT_PARAMETER).default)
+        rospy.logerr_throttle(REPORT_PERIOD_S, f"{error}; {default_s:g} s is used instead")
+        return default_s
 
 
 class WaitReport:

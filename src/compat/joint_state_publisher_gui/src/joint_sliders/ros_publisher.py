@@ -13,7 +13,7 @@ from joint_sliders.joint_values import JointValues
 from joint_sliders.node_parameters import NodeParameters, read_parameters
 from joint_sliders.slider_joints import SliderJoints, slider_joints
 from modular_framework_ros.node_handle import ParameterError
-from modular_framework_ros.parameter_declarations import NodeDeclaration, ParameterReader, node_declaration
+from modular_framework_ros.parameter_declarations import ParameterReader, existing_declaration
 from modular_framework_ros.publishing import publish
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
@@ -102,9 +102,8 @@ def joint_state_publisher() -> JointStatePublisher | None:
 
 def declared_parameters() -> ParameterReader:
     """Returns the parameters of the node: private, or in its namespace, or the defaults."""
-    declared = node_declaration("joint_state_publisher_gui", "joint_state_publisher_gui")
     return ParameterReader(
-        declared or NodeDeclaration(),
+        existing_declaration("joint_state_publisher_gui", "joint_state_publisher_gui"),
         lambda name: rospy.get_param(name, rospy.get_param(name[1:], None)),
         lambda name: rospy.resolve_name(name if rospy.has_param(name) else name[1:]),
     )

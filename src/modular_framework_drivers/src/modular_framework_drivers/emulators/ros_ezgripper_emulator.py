@@ -14,19 +14,15 @@ from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.emulators.ros_emulator_node import offer_commands, run_emulator
 from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
-from modular_framework_ros.node_handle import read_number
+from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.ros_node_handle import RosNodeHandle
-
-COMMAND_PORT = 29900
 
 
 class EzGripperEmulatorNode:
     """Node `ezgripper_emulator`.
 
-    Parameters: `~port_name`: path under which the serial port is found; `~baudrate` [bit/s] 57600 and `~servo_ids` [1]
-    of the servos; `~position` [rad] 0.5: where the knuckle joint is at first; `~object` [rad] -1: position of the
-    knuckle joint at which an object stops the fingers, once they have been shut and opened, negative for none;
-    `~command_port` 29900: TCP port of the commands.
+    Parameters: see `parameters/ezgripper_emulator.yaml`; the path `~port_name` is where the serial port is found. The
+    object is between the fingers once they have been shut and opened.
 
     Services (std_srvs/Trigger): `~<command>` for every command that needs no argument.
     """
@@ -34,14 +30,15 @@ class EzGripperEmulatorNode:
     def __init__(self) -> None:
         handle = RosNodeHandle("~")
         settings = read_gripper_settings(handle, handle)
-        opening = ticks_from_joint(read_number(handle, "position", 0.5))
+        read = DeclaredParameters("modular_framework_drivers", "ezgripper_emulator").values
+        position, held_at, command_port = read("~position", "~object", "~command_port")
+        opening = ticks_from_joint(position)
         word = round(2e6 / settings.baudrate) - 1
         fingers = [Finger(DynamixelServo(servo_id, word), opening=opening) for servo_id in settings.servo_ids]
         self._line = DynamixelLine(fingers, Path(settings.port_name))
-        held_at = read_number(handle, "object", -1.0, None)
         if held_at >= 0.0:
             self._line.offer_object(held_at)
-        self._commands = CommandPort(self._line.commands, int(read_number(handle, "command_port", COMMAND_PORT)))
+        self._commands = CommandPort(self._line.commands, command_port)
         self._services: list[rospy.Service] = []
 
     def connect(self) -> None:

@@ -6,29 +6,23 @@ from __future__ import annotations
 import rospy
 
 from modular_framework_drivers.emulators.ros_emulator_node import offer_commands, run_emulator
-from modular_framework_drivers.emulators.ur_controller import HOME
-from modular_framework_drivers.emulators.ur_emulator import COMMAND_PORT, UrEmulator
+from modular_framework_drivers.emulators.ur_emulator import UrEmulator
+from modular_framework_ros.declared_parameters import DeclaredParameters
 
 
 class UrEmulatorNode:
     """Node `ur_emulator`.
 
-    Parameters: `~address` "127.0.0.1": where it listens; `~model` UR5 [UR5, UR5e]: decides software version and rate;
-    `~positions`: of the joints at the beginning [rad], six numbers; `~unlock_delay` 5.0: time after a protective stop
-    before it can be unlocked [s]; `~command_port` 29901; `~log` "": file for the commanded path.
+    Parameters: see `parameters/ur_emulator.yaml`.
 
     Services (std_srvs/Trigger): `~<command>` for every command that needs no argument; the others are available at the
     command port only.
     """
 
     def __init__(self) -> None:
-        self._emulator = UrEmulator(
-            str(rospy.get_param("~address", "127.0.0.1")),
-            str(rospy.get_param("~model", "UR5")),
-            [float(value) for value in rospy.get_param("~positions", list(HOME))],
-            float(rospy.get_param("~unlock_delay", 5.0)),
-            int(rospy.get_param("~command_port", COMMAND_PORT)),
-        )
+        read = DeclaredParameters("modular_framework_drivers", "ur_emulator").values
+        *arm, self._log = read("~address", "~model", "~positions", "~unlock_delay", "~command_port", "~log")
+        self._emulator = UrEmulator(*arm)
 
     def connect(self) -> None:
         """Listen, and offer the services.
@@ -37,9 +31,8 @@ class UrEmulatorNode:
             OSError: a port is taken; the text names it.
         """
         self._emulator.connect()
-        log = str(rospy.get_param("~log", ""))
-        if log:
-            self._emulator.commands["log"](path=log)
+        if self._log:
+            self._emulator.commands["log"](path=self._log)
         offer_commands(self._emulator.commands)
 
     def run(self) -> None:
