@@ -43,7 +43,6 @@ def test_every_solution_reaches_the_pose_and_the_state_it_came_from_is_among_the
     model: RobotModel, solver: InverseKinematics
 ) -> None:
     rng = np.random.default_rng(1)
-    assert solver.is_analytic
     for _ in range(60):
         positions = random_positions(model, rng)
         target = model.link_transforms(positions)[TIP]
@@ -168,7 +167,6 @@ def seven() -> RobotModel:
 @pytest.mark.parametrize("method", ["", NUMERIC])
 def test_seven_joints_are_solved_by_holding_one_and_numerically(seven: RobotModel, method: str) -> None:
     solver = InverseKinematics(seven, seven.group("arm"), KinematicsSettings(method, timeout_s=2.0))
-    assert solver.locked_joint == ("" if method else "joint7")
     rng = np.random.default_rng(8)
     low, high = np.array([bounds for _, _, bounds in SEVEN_JOINTS]).T
     for _ in range(100):

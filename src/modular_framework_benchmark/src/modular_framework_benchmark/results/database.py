@@ -233,15 +233,6 @@ class ResultDatabase:
             )
             return [read_spec(row) for row in connection.execute(statement)]
 
-    def finished_keys(self, number: int) -> frozenset[str]:
-        """Returns the keys of an experiment's finished episodes."""
-        with self._reading() as connection:
-            self._description(connection, number)
-            statement = (
-                select(EPISODES.c.key).join(RUNS, RUNS.c.id == EPISODES.c.id).where(EPISODES.c.descriptionid == number)
-            )
-            return frozenset(connection.execute(statement).scalars())
-
     def write(self, number: int, record: EpisodeRecord) -> bool:
         """Writes what an episode gave, in one transaction.
 

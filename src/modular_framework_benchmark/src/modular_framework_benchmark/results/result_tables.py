@@ -17,7 +17,6 @@ from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES
 from modular_framework_benchmark.results.schema import EPISODES, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
 
 SPAN_COLUMNS = ("number", "kind", "name", "started_s", "ended_s", "outcome", "failed", "reason")
-_TEXTS = ("outcome", "cause", "folder", "worker")
 
 
 def load_results(

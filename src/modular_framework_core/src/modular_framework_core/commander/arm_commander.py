@@ -120,7 +120,6 @@ class ArmCommander:
             limit_s = start_timeout() if timeout_s is None else timeout_s
             self._plan_service = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
             self._ik_service = rospy.ServiceProxy("compute_ik", GetPositionIK)
-            self._validity_service = rospy.ServiceProxy("check_state_validity", GetStateValidity)
             self._execute_client = SteadyActionClient(EXECUTE_ACTION, ExecuteTrajectoryAction)
             self._joints.connect()
             self._reports.connect()

@@ -15,8 +15,6 @@ from modular_framework_core.grasp_generation import solid_meshes, surface_points
 from modular_framework_core.grasp_generation.surface_points import Surface
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
-BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
-
 
 class SceneObjectError(ValueError):
     """A collision object cannot be understood; the text says which part."""

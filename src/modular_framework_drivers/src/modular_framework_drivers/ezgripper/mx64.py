@@ -25,8 +25,6 @@ UNWATCHED_TORQUE = 100
 """Torque that the motor may apply for any length of time, by its maker."""
 WARM = 70.0
 """Temperature from which on a user should know of it [deg C]; the motor switches itself off at 80."""
-LARGEST_ID = 252
-"""Largest identifier of a servo on the bus."""
 CLOCKWISE = 1 << 10
 """Bit of the speed, load and torque words that holds the direction."""
 MULTI_TURN_LIMIT = 4095

@@ -28,7 +28,6 @@ from modular_framework_planning.kinematics.kinematics_settings import NUMERIC, K
 from modular_framework_planning.robot_model.multi_dof_joint import UNBOUNDED_M
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-POSE_TOLERANCE = 1.0e-6  # [m] and [rad]; every returned solution reaches the pose at least this well
 ACCURACY = 1.0e-8  # what the compiled steps are asked for
 SAME_SOLUTION = 1.0e-5  # [rad or m]
 BOUND_SLACK = 0.05  # [rad]; how far out of bounds a candidate may be before it is polished
@@ -67,17 +66,6 @@ class InverseKinematics:
         self._is_continuous = np.array([model.is_continuous(int(number)) for number in group.indices])
         self._closed = self._try_closed_form()
         self.reach = self._max_reach()
-
-    @property
-    def is_analytic(self) -> bool:
-        """Whether the closed form is used."""
-        return self._closed is not None
-
-    @property
-    def locked_joint(self) -> str:
-        """The joint of a seven-joint chain whose values are tried in turn; empty where there is none."""
-        number = self._closed.locked if self._closed else None
-        return "" if number is None else self.group.joints[number]
 
     def _try_closed_form(self) -> ClosedForm | None:
         between = [

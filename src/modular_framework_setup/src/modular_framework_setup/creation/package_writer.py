@@ -110,10 +110,6 @@ def _values(plan: RobotPlan) -> dict[str, Any]:
     }
 
 
-def _folders(plan: RobotPlan, has_hand: bool) -> list[str]:
-    return ["urdf", "controllers", "launch", *(["meshes"] if plan.copies else []), *(["config"] if has_hand else [])]
-
-
 def _end_effector(plan: RobotPlan, arm: Arm) -> dict[str, str]:
     gripper = plan.parts.gripper_of(arm)
     palm = gripper.palm if gripper else arm.tip
