@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import rospy
 from control_msgs.msg import GripperCommandActionGoal, JointTrajectoryControllerState
+from gazebo_msgs.msg import ModelStates
+from geometry_msgs.msg import Point, Pose
 from sensor_msgs.msg import JointState
 
 from modular_framework_benchmark.episodes.ros_recording import joint_states_in_turn, missing_turns, write_recording
@@ -51,6 +53,23 @@ def test_lost_states_are_counted() -> None:
     assert missing_turns(times_s, RATE) == 0
     assert missing_turns(np.delete(times_s, [10, 11, 40]), RATE) == 3
     assert missing_turns(times_s[:0], RATE) == 0
+
+
+@pytest.mark.parametrize(
+    ("lost", "fault"),
+    [(0, ""), (3, "17 messages of the models came instead of 20: their poses have the times at which these came")],
+)
+def test_lost_messages_of_the_models_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: int, fault: str
+) -> None:
+    monkeypatch.setattr(rospy, "get_time", lambda: 0.0)
+    samples = Samples()
+    samples.joints = states(published(0.4))
+    models = [ModelStates(name=["cube"], pose=[Pose(position=Point(z=0.1 * number))]) for number in range(20)]
+    early = (0.0, ModelStates(name=["table"], pose=[Pose()]))  # from before the cube was put into the world
+    samples.models = [early, *((0.02 * number, message) for number, message in enumerate(models[lost:]))]
+    written = write_recording(tmp_path, samples, {"cube": "cube"}, {"zero": 0.0, "simulated_s": 0.4}, RATE)
+    assert written["recording_fault"] == fault
 
 
 def test_the_action_of_a_learner_has_the_gripper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

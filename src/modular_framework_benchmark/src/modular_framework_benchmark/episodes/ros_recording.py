@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,8 +64,16 @@ def write_recording(
     checked_s = float(answer.get("checked_s", np.inf))
     final = {name: _at(rows, checked_s) for name, rows in poses.items() if len(rows)}
     missing = 0 if turns is None else missing_turns(trajectory["time_s"].to_numpy() + zero, turns)
-    fault = f"{missing} joint states of {len(trajectory) + missing} did not arrive" if missing else ""
-    return {"final": final, "recording_fault": fault}
+    faults = [f"{missing} joint states of {len(trajectory) + missing} did not arrive"] if missing else []
+    if turns is not None and math.isfinite(end_s):
+        faults += _model_faults(len(_model_messages(samples, spawned)), model_samples(zero, end_s)[1])
+    return {"final": final, "recording_fault": "; ".join(faults)}
+
+
+def _model_faults(came: int, expected: int) -> list[str]:
+    if came == expected:
+        return []
+    return [f"{came} messages of the models came instead of {expected}: their poses have the times at which these came"]
 
 
 def write_parameters(folder: Path) -> tuple[dict[str, Any], str]:
@@ -95,8 +103,7 @@ def _at(rows: pd.DataFrame, time_s: float) -> list[float]:
 
 def _object_poses(samples: Samples, names: Sequence[str], answer: Mapping[str, Any]) -> dict[str, pd.DataFrame]:
     """Returns the poses of all models, by name; what stands still all the time has one row."""
-    # a message from before the episode has not all objects yet
-    messages = [(stamp, message) for stamp, message in samples.models if set(names) <= set(message.name)]
+    messages = _model_messages(samples, names)
     rows: dict[str, list[tuple[float, ...]]] = {}
     for time_s, (_, message) in zip(_sample_times(messages, answer), messages, strict=True):
         for name, pose in zip(message.name, message.pose, strict=True):
@@ -107,6 +114,11 @@ def _object_poses(samples: Samples, names: Sequence[str], answer: Mapping[str, A
         name: frame if len(frame[list(POSE_COLUMNS)].drop_duplicates()) > 1 else frame.iloc[[0]]
         for name, frame in frames.items()
     }
+
+
+def _model_messages(samples: Samples, names: Collection[str]) -> list[tuple[float, Any]]:
+    """Returns the messages of the models; one from before the episode has not all objects yet."""
+    return [(stamp, message) for stamp, message in samples.models if set(names) <= set(message.name)]
 
 
 def model_samples(zero: float, end_s: float) -> tuple[int, int]:
