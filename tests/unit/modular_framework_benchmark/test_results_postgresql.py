@@ -3,62 +3,25 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from postgresql_server import Server, require_server, running_server
 from sample_experiment import sample_description, sample_episodes, sample_record
 
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.results.errors import RecordNotStoredError
 
-pytest.importorskip("psycopg", reason="PostgreSQL's driver is not installed: pip install 'psycopg[binary]'")
-PROGRAMS = next(iter(sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)), Path("/nonexistent"))
-pytestmark = pytest.mark.skipif(
-    not (PROGRAMS / "initdb").is_file() or os.geteuid() != 0,
-    reason="no PostgreSQL server, or no root to become its user",
-)
+require_server()
 EPISODES = sample_episodes(3)
 
 
-class Server:
-    """A server of its own folder, on a socket there alone."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.url = f"postgresql+psycopg://postgres@/postgres?host={folder}"
-        self._run("initdb", "-D", f"{folder}/data", "-A", "trust", "--no-sync")
-
-    def _run(self, program: str, *arguments: str) -> None:
-        command = ["runuser", "-u", "postgres", "--", str(PROGRAMS / program), *arguments]
-        subprocess.run(command, check=True, capture_output=True, timeout=300, cwd=self.folder)
-
-    def start(self) -> None:
-        options = f"-c listen_addresses= -c unix_socket_directories={self.folder} -c fsync=off"
-        self._run("pg_ctl", "-D", f"{self.folder}/data", "-w", "-l", f"{self.folder}/log", "-o", options, "start")
-
-    def stop(self, mode: str = "immediate") -> None:
-        self._run("pg_ctl", "-D", f"{self.folder}/data", "-w", "-m", mode, "stop")
-
-
 @pytest.fixture
-def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
-    folder = Path(tempfile.mkdtemp())
-    shutil.chown(folder, "postgres")
-    monkeypatch.setenv("ROS_HOME", str(folder / "ros_home"))
-    made = Server(folder)
-    made.start()
-    try:
+def server(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Server]:
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros_home"))
+    with running_server() as made:
         yield made
-    finally:
-        with contextlib.suppress(subprocess.CalledProcessError):  # it is stopped already
-            made.stop()
-        shutil.rmtree(folder)
 
 
 def test_a_server_that_is_restarted_or_stopped_loses_nothing_and_stores_nothing_twice(server: Server) -> None:
