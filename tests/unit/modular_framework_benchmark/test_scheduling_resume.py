@@ -100,6 +100,26 @@ def test_an_experiment_whose_every_episode_broke_compares_nothing(folder: Path) 
     assert "report: " in printed and "no difference" not in printed
 
 
+def test_a_disk_limit_ends_the_command_cleanly_and_it_can_go_on(folder: Path) -> None:
+    process = start(folder, "run_experiment", "experiment.yaml", "--disk-limit", "1e-6", runner="QuickRunner")
+    printed, errors = process.communicate(timeout=300)
+    assert process.returncode == 1, errors
+    assert "stopped: the next episode would exceed --disk-limit 1e-06" in errors and "To go on: rosrun" in errors
+    assert 0 < finished(folder) < 120
+    process = start(folder, "resume", "plans.db", runner="QuickRunner")
+    printed, errors = process.communicate(timeout=300)
+    assert process.returncode == 0 and finished(folder) == 120, errors
+    assert "--disk-limit is 0; allowed: more than 0 [GB]" in refused(folder, "--disk-limit", "0")
+
+
+def refused(folder: Path, *arguments: str) -> str:
+    """What a command says that ends with exit code 2."""
+    process = start(folder, "resume", "plans.db", *arguments)
+    _, errors = process.communicate(timeout=300)
+    assert process.returncode == 2, errors
+    return errors
+
+
 def test_kills_at_random_moments_lose_nothing_and_run_nothing_twice(folder: Path) -> None:
     generator = random.Random(5)
     mark = RunLock(str(folder / "plans.db")).run

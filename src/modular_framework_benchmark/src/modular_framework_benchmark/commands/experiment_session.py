@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import signal
 import sys
@@ -14,6 +15,7 @@ from modular_framework_benchmark.commands.stopping_rules import RunSettings, sto
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.results.connection import parse_address, shown_target
 from modular_framework_benchmark.results.database import ResultDatabase
+from modular_framework_benchmark.scheduling.disk_guard import GB, DiskGuard
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import LocalPool, Pool
 from modular_framework_benchmark.scheduling.progress import Progress
@@ -31,12 +33,14 @@ class SessionOptions:
         workers: Episodes at the same time; None: as the file says.
         scheduler: Address of a Dask scheduler; None: workers on this machine.
         runner: MODULE:NAME of the user's own runner; empty for that of the mode.
+        disk_limit_gb: What the files of its episodes may take [GB].
     """
 
     target: str
     workers: int | None
     scheduler: str | None
     runner: str
+    disk_limit_gb: float = math.inf
 
 
 class ExperimentSession:
@@ -67,7 +71,8 @@ class ExperimentSession:
         """Runs it and prints the results; returns the exit code."""
         make_runner = runner_factory(self._stored.description.mode, self._options.runner)
         rule = stopping_rule(self._settings.stopping)
-        run = ExperimentRun(self._database, self._number, self._folder, rule)
+        disk = DiskGuard(self._folder, self._options.disk_limit_gb * GB)
+        run = ExperimentRun(self._database, self._number, self._folder, rule, disk)
         progress = Progress(self._stored.planned, self._stored.finished, sys.stderr)
 
         def make_pool() -> Pool:
@@ -85,15 +90,20 @@ class ExperimentSession:
             try:
                 end = run.run(make_pool, progress)
             except KeyboardInterrupt:
-                return self._interrupted()
+                return self._ended_early("", EXIT_INTERRUPTED)
+        if end.disk_full:
+            return self._ended_early(
+                f": {end.disk_full}. '{COMMAND} prune {shlex.quote(self._shown)}' deletes files of episodes",
+                EXIT_FAILED,
+            )
         return self._print_results(end)
 
-    def _interrupted(self) -> int:
+    def _ended_early(self, why: str, exit_code: int) -> int:
         resume = f"{COMMAND} resume {shlex.quote(self._shown)} --experiment {self._name}"
         if self._options.runner:
             resume += f" --runner {self._options.runner}"
-        print(f"\nstopped; every episode that had ended is stored. To go on: {resume}", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        print(f"\nstopped{why}; every episode that had ended is stored. To go on: {resume}", file=sys.stderr)
+        return exit_code
 
     def _print_results(self, end: RunEnd) -> int:
         """Prints the first screen of the report and writes the page; fails when no episode says anything."""

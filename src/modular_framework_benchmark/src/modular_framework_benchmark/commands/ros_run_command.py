@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from modular_framework_benchmark.experiments.design_text import design_text
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.modes.ros_disk_estimate import disk_text
 from modular_framework_benchmark.modes.ros_run_digests import run_digests
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_benchmark.results.connection import shown_target
@@ -62,6 +64,9 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, help="episodes at the same time; default: that of the file")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
     parser.add_argument(
+        "--disk-limit", type=float, default=math.inf, metavar="GB", help="end cleanly before its files exceed this"
+    )
+    parser.add_argument(
         "--runner", default="", metavar="MODULE:NAME", help="what runs the episodes; default: the mode's"
     )
 
@@ -71,6 +76,8 @@ def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Nam
     try:
         if options.workers is not None and options.workers < 1:
             raise CommandError(f"--workers is {options.workers}; allowed: 1 or more")
+        if not options.disk_limit > 0.0:
+            raise CommandError(f"--disk-limit is {options.disk_limit:g}; allowed: more than 0 [GB]")
         return command(options)
     except (RecordNotStoredError, WorkerStartError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -94,6 +101,7 @@ def _run(options: argparse.Namespace) -> int:
         from modular_framework_benchmark.statistics.planned_power import power_text  # takes a second to import
 
         print(design_text(experiment, episodes))
+        print(disk_text(experiment.description.mode, episodes))
         print(power_text(experiment.description, episodes))
         return 0
     target = options.database or f"{experiment.description.name}.db"
@@ -126,7 +134,7 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _session_options(options: argparse.Namespace, target: str) -> SessionOptions:
-    return SessionOptions(target, options.workers, options.scheduler, options.runner)
+    return SessionOptions(target, options.workers, options.scheduler, options.runner, options.disk_limit)
 
 
 def _session(

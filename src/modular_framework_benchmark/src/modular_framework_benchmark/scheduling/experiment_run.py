@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results.database import ResultDatabase
+from modular_framework_benchmark.scheduling.disk_guard import DiskGuard
 from modular_framework_benchmark.scheduling.earlier_tries import forget_tries
 from modular_framework_benchmark.scheduling.episode_queue import EpisodeQueue
 from modular_framework_benchmark.scheduling.local_pool import Pool
@@ -31,10 +32,12 @@ class RunEnd:
     Attributes:
         episodes: How many episodes it ran.
         stopped_because: Why the stopping rule ended it early; empty when it did not.
+        disk_full: Why the disk ended it early; empty when it did not.
     """
 
     episodes: int
     stopped_because: str = ""
+    disk_full: str = ""
 
 
 class ExperimentRun:
@@ -45,12 +48,19 @@ class ExperimentRun:
         experiment: Its identifier there.
         folder: Where the folders of the episodes are made; below the folder of the database.
         rule: When to stop; None: when all episodes have ended.
+        disk: Ends the run before the disk is full; None: at the default limit.
     """
 
     def __init__(
-        self, database: ResultDatabase, experiment: int, folder: Path, rule: StoppingRule | None = None
+        self,
+        database: ResultDatabase,
+        experiment: int,
+        folder: Path,
+        rule: StoppingRule | None = None,
+        disk: DiskGuard | None = None,
     ) -> None:
         self._database, self._experiment, self._folder = database, experiment, folder
+        self._disk, self._disk_full = disk or DiskGuard(folder), ""
         self._pending = database.pending(experiment)
         self._watch = TrialWatch(rule, self._results, self._pending)
 
@@ -91,11 +101,14 @@ class ExperimentRun:
             pool.close()
         finally:
             pool.kill()
-        return RunEnd(progress.ended, reason if len(queue) else "")
+        return RunEnd(progress.ended, reason, self._disk_full) if len(queue) else RunEnd(progress.ended)
 
     def _fill(self, pool: Pool, queue: EpisodeQueue, running: int) -> int:
-        """Gives an episode to each free slot that can take one; returns how many run then."""
+        """Gives an episode to each free slot that can take one while the disk has room; returns how many run then."""
         for slot in pool.free():
+            self._disk_full = self._disk_full or self._disk.reason_to_stop(running)
+            if self._disk_full:
+                break
             spec = queue.next_for(slot, alone=not running)
             if spec is not None:
                 pool.submit(slot, spec, self._folder_of(spec))
@@ -107,6 +120,7 @@ class ExperimentRun:
 
     def _store(self, record: EpisodeRecord) -> None:
         folder = self._folder_of(record.spec)
+        self._disk.ended(folder)
         has_files = folder.is_dir() and any(folder.iterdir())
         if folder.is_dir() and not has_files:
             folder.rmdir()

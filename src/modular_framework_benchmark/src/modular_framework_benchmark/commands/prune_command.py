@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command `prune`: deletes files of finished episodes; what the database holds of the episodes stays."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from modular_framework_benchmark.commands.reporting import database_parser, run_reporting
+from modular_framework_benchmark.records.episode import EpisodeStatus
+from modular_framework_benchmark.reports.errors import ReportError
+from modular_framework_benchmark.reports.report_source import open_source
+from modular_framework_benchmark.scheduling.disk_guard import GB, tree_size
+
+KINDS = {
+    "bag": ("episode.bag", "bag.txt"),
+    "video": ("video.mp4",),
+    "log": ("log.txt",),
+    "recording": ("trajectory.parquet", "tracking.parquet", "recording.json", "parameters.json", "task_records"),
+}
+"""Files of an episode, by the names that `--files` takes."""
+EVERYTHING = "all"
+DAY_S = 86400.0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Deletes files of episodes, or says what it would delete; returns 0, or 2 when it could not."""
+    return run_reporting(_parser(), arguments, _prune)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = database_parser(
+        "prune",
+        "Deletes files of finished episodes. Their outcomes, metrics and spans stay in the database. Without --delete "
+        "nothing is deleted, and the command says what would be.",
+    )
+    parser.add_argument(
+        "--files",
+        nargs="+",
+        default=["bag", "video"],
+        choices=[*KINDS, EVERYTHING],
+        metavar="KIND",
+        help=f"what to delete: {', '.join(KINDS)}, or {EVERYTHING}: whole folders; default: bag video",
+    )
+    parser.add_argument("--older-than", type=float, default=0.0, metavar="DAYS", help="only episodes that are older")
+    parser.add_argument("--keep-failures", action="store_true", help="only episodes that succeeded")
+    parser.add_argument("--delete", action="store_true", help="delete them")
+    return parser
+
+
+def _prune(given: argparse.Namespace) -> int:
+    with open_source(given.database, given.experiment) as opened:
+        root = opened.database.folder.resolve()
+        episodes = opened.results.episodes
+        name = opened.results.description.name
+    chosen = episodes[(episodes["begun"] < time.time() - DAY_S * given.older_than) & (episodes["folder"] != "")]
+    if given.keep_failures:
+        chosen = chosen[chosen["status"] == EpisodeStatus.SUCCEEDED.value]
+    paths = _paths(chosen, root, given.files)
+    size = sum(tree_size(path) if path.is_dir() else path.lstat().st_size for path in paths)
+    for path in paths if given.delete else ():
+        try:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        except OSError as error:
+            raise ReportError(f"{path} cannot be deleted: {error.strerror}; what came before is deleted") from error
+    verb, hint = ("deleted", "") if given.delete else ("would be deleted", "; add --delete to delete them")
+    print(f"{name}: {size / GB:.3g} GB in {len(paths)} files and folders of {len(chosen)} episodes {verb}{hint}")
+    return 0
+
+
+def _paths(episodes: pd.DataFrame, root: Path, kinds: Sequence[str]) -> list[Path]:
+    """Returns what is deleted; nothing outside the folder of the database."""
+    found = []
+    for text in episodes["folder"]:
+        folder = (root / str(text)).resolve()
+        if root not in folder.parents or not folder.is_dir():
+            continue
+        if EVERYTHING in kinds:
+            found.append(folder)
+        else:
+            found += [folder / name for kind in kinds for name in KINDS[kind] if (folder / name).exists()]
+    return found

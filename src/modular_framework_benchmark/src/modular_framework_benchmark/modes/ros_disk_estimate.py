@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Estimates how much disk the records of an experiment take, before any episode runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from modular_framework_benchmark.episodes.ros_stack_launch import preview_stack
+from modular_framework_benchmark.records.episode import EpisodeSpec
+from modular_framework_simulation.sensors.camera_config import read_cameras
+from modular_framework_simulation.sensors.cameras import POINT, Camera
+
+SIMULATED_S = 10.0
+"""Length of an episode: that of the shipped pick, of which the following figures are, too [s of simulated time]."""
+TEXT_BYTES, MOTION_BYTES_PER_S = 230e3, 34e3
+"""Log, parameters and reports of an episode; samples of 10 joints [B per s]. Both grow with the robot."""
+BAG_BYTES_PER_S, VIDEO_BYTES_PER_S = 0.4e6, 6e3
+DATABASE_BYTES, PLAN_BYTES = 10e3, 20e3
+"""An episode in the database; the motion of a plan in the mode `planning`."""
+SENSORS = "/gazebo/sensors"
+UNITS = ("B", "kB", "MB", "GB", "TB")
+
+
+def disk_text(mode: str, episodes: Sequence[EpisodeSpec]) -> str:
+    """Returns a line with the disk that the records of an experiment take, and the figures behind it.
+
+    Args:
+        mode: Mode of the experiment.
+        episodes: All its episodes.
+
+    Raises:
+        SettingsError: A launch file cannot be read.
+    """
+    parts: dict[str, float] = {}
+    for spec in episodes:
+        for name, size in _of_task(spec) if mode == "task" else _of_model(mode, spec):
+            parts[name] = parts.get(name, 0.0) + size
+    named = ", ".join(f"{name} {size_text(size)}" for name, size in parts.items())
+    basis = f", each {SIMULATED_S:g} s of simulated time long like the shipped pick" if mode == "task" else ""
+    return f"  disk: about {size_text(sum(parts.values()))} for {len(episodes)} episodes{basis}: {named}"
+
+
+def size_text(size: float) -> str:
+    """Returns a size [B] with two digits and a unit."""
+    power = min(int(math.log10(max(size, 1.0)) // 3), 4)
+    value = size / 1000**power
+    return f"{value:.0f} {UNITS[power]}" if value >= 10.0 else f"{value:.2g} {UNITS[power]}"
+
+
+def _of_task(spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
+    record = spec.settings["record"]
+    yield "database", DATABASE_BYTES
+    yield "logs and recordings", TEXT_BYTES + MOTION_BYTES_PER_S * SIMULATED_S
+    if record.get("video"):
+        yield "videos", VIDEO_BYTES_PER_S * SIMULATED_S
+    if record.get("bag"):
+        yield "bags without cameras", BAG_BYTES_PER_S * SIMULATED_S
+        for camera in _cameras(spec):
+            pinhole = camera.pinhole
+            name = (
+                f"camera '{camera.name}' in bags at most ({pinhole.width} x {pinhole.height} at {camera.rate_hz:g} Hz)"
+            )
+            yield name, _image_bytes(camera) * camera.rate_hz * SIMULATED_S
+
+
+def _of_model(mode: str, spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
+    yield "database", DATABASE_BYTES
+    if mode == "planning" and spec.settings["record"].get("trajectories", True):
+        yield "trajectories", PLAN_BYTES
+
+
+def _cameras(spec: EpisodeSpec) -> list[Camera]:
+    """Returns the cameras of the launch's sensors_config.yaml; those of models and robots are not looked for."""
+    settings = preview_stack(spec.settings).preview.below(SENSORS)
+    return read_cameras(settings, SENSORS, lambda frame: "world")[0]
+
+
+def _image_bytes(camera: Camera) -> float:
+    topics, pixels = camera.topics, camera.pinhole.width * camera.pinhole.height
+    return float(pixels * (3 * bool(topics.image) + 4 * bool(topics.depth) + POINT.itemsize * bool(topics.points)))
