@@ -70,3 +70,25 @@ def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
         reader(tmp_path, rate=-1, mode="idle").values()
     for text in ("'/node/rate' is -1", "'/node/mode' is 'idle'", "parameter 'group' is not set; allowed: a text"):
         assert text in str(caught.value)
+
+
+SOURCES = Path(__file__).resolve().parents[3] / "src"
+
+
+@pytest.mark.parametrize("file", sorted(SOURCES.glob("**/parameters/*.yaml")), ids=lambda file: file.stem)
+def test_every_declared_default_is_allowed_itself(file: Path) -> None:
+    declared = read_declaration(file).parameters
+    assert declared
+    for item in declared.values():
+        assert item.default is None or (item.required and item.default == "") or not item.fault(item.default), item
+        assert item.doc.endswith("."), f"{item.name} has no sentence of its meaning"
+
+
+def test_no_node_reads_a_private_parameter_past_its_declaration() -> None:
+    found = [
+        f"{file}: {line.strip()}"
+        for file in SOURCES.glob("**/*.py")
+        for line in file.read_text(encoding="utf-8").splitlines()
+        if 'get_param("~' in line and 'get_param("~", {})' not in line
+    ]
+    assert not found
