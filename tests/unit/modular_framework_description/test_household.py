@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from modular_framework_description.household import GRASP_TABLE, HOUSEHOLD, YCB_TABLE
+from modular_framework_description.catalogue import read_catalogue
 from modular_framework_description.scene_writer import scene_text
 from modular_framework_description.sdf_world import read_world
 from modular_framework_simulation.models.mesh_files import ConvexParts
@@ -16,6 +16,8 @@ from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 
+CATALOGUE = Path(__file__).resolve().parents[3] / "src" / "modular_framework_description" / "config" / "catalogue.yaml"
+HOUSEHOLD = read_catalogue(CATALOGUE)["household"]
 # name: mass [g], edges of the bounding box in any order [mm], friction; as the tables have them
 PUBLISHED = {
     "toy_cube": (12.2, (31.0, 31.0, 31.0), 0.31),
@@ -56,7 +58,7 @@ def text(package: Path, name: str, path: str) -> str:
 
 def test_every_object_of_the_tables_is_there() -> None:
     assert {body.name for body in HOUSEHOLD} == set(PUBLISHED)
-    assert all(GRASP_TABLE in body.description or YCB_TABLE in body.description for body in HOUSEHOLD)
+    assert all(" Source: Development of Grasps" in body.description or "YCB" in body.description for body in HOUSEHOLD)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from modular_framework_description.catalogue import FURNITURE, GRASPABLE
-from modular_framework_description.household import HOUSEHOLD
+from modular_framework_description.catalogue import CatalogueError, read_catalogue
 from modular_framework_description.model_writer import write_model
 
-NAMES = [body.name for body in GRASPABLE]
+CATALOGUE = Path(__file__).resolve().parents[3] / "src" / "modular_framework_description" / "config" / "catalogue.yaml"
+BODIES = read_catalogue(CATALOGUE)
+NAMES = [body.name for body in BODIES["graspable"]]
 OPENING_M = 0.142
 
 
@@ -54,7 +55,9 @@ def test_there_are_boxes_cylinders_a_sphere_and_something_that_is_not_convex(pac
     assert any(not collision_mesh(sdf(package, name)).is_convex for name in ("l_bracket", "mug"))
 
 
-@pytest.mark.parametrize("folder", [*NAMES, *(body.name for body in (*HOUSEHOLD, *FURNITURE)), "ground_plane"])
+@pytest.mark.parametrize(
+    "folder", [*NAMES, *(body.name for group in ("household", "furniture") for body in BODIES[group]), "ground_plane"]
+)
 def test_the_files_of_a_model_name_each_other(package: Path, folder: str) -> None:
     config = ElementTree.parse(package / "models" / folder / "model.config").getroot()
     assert config.findtext("name") == folder
@@ -109,7 +112,7 @@ def test_the_visual_mesh_is_the_collision_shape(package: Path, name: str) -> Non
 
 
 def test_the_committed_models_are_what_the_generator_writes(package: Path, tmp_path: Path) -> None:
-    for body in (*GRASPABLE, *HOUSEHOLD, *FURNITURE):
+    for body in (body for bodies in BODIES.values() for body in bodies):
         write_model(body, tmp_path)
         for name in ("model.sdf", "model.config"):
             written, committed = ((root / body.name / name).read_text() for root in (tmp_path, package / "models"))
@@ -124,3 +127,21 @@ def test_only_the_ball_resists_rolling(package: Path) -> None:
     rolling = {name for name in NAMES if sdf(package, name).find(".//rolling_friction") is not None}
     assert rolling == {"ball"}
     assert math.isclose(numbers(sdf(package, "ball"), ".//rolling_friction")[0], 0.001)
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        ("{name: brick, description: A brick., mass: 1.0, parts: [{cube: [1, 1, 1]}]}", "got 'cube', allowed"),
+        ("{name: brick, description: A brick., mass: 1.0, parts: [{box: [1, 1]}]}", "allowed 3 positive lengths"),
+        ("{name: brick, description: A brick., parts: [{box: [1, 1, 1]}]}", "'mass'"),
+        ("{name: brick, weight: 1.0, description: A brick., mass: 1.0, parts: [{box: [1, 1, 1]}]}", "'weight'"),
+        ("{name: brick, source: hearsay, description: A brick., mass: 1.0, parts: [{box: [1, 1, 1]}]}", "'hearsay'"),
+    ],
+)
+def test_a_faulty_model_of_a_catalogue_is_named_with_the_file(tmp_path: Path, entry: str, text: str) -> None:
+    file = tmp_path / "own.yaml"
+    file.write_text(f"graspable:\n- {entry}\n")
+    with pytest.raises(CatalogueError) as caught:
+        read_catalogue(file)
+    assert str(caught.value).startswith(f"{file}: model 'brick': ") and text in str(caught.value)
