@@ -94,6 +94,7 @@ def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_st
 
     assert warm.status is EpisodeStatus.SUCCEEDED, f"{warm.cause}\n{(tmp_path / 'warm/log.txt').read_text()}"
     assert warm.snapshot["final_objects"] == cold.snapshot["final_objects"]
+    assert cold.snapshot["cold_start"] and "cold_start" not in warm.snapshot
     generations = [(tmp_path / name / "log.txt").read_text().count(" were stored.") for name in ("cold", "warm")]
     assert generations == [2, 1]  # once to warm up, and then once in each episode
     for record in (cold, warm):

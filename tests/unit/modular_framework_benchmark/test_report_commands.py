@@ -7,12 +7,16 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from report_pages import Loads, Page
 from reported_experiment import ReportedExperiment
 
 from modular_framework_benchmark.commands.compare_command import main as compare
 from modular_framework_benchmark.commands.report_command import main as report
+from modular_framework_benchmark.episodes.snapshot import COLD_START
+from modular_framework_benchmark.results.database import open_database
+from modular_framework_ros.reported_figures import Clock
 
 RUN = ReportedExperiment(trials=24, with_files=False, with_spans=False)
 SMALL = replace(RUN, trials=4)
@@ -109,6 +113,49 @@ def test_a_planner_that_got_worse_is_found_and_fails_the_comparison(
     assert "rrt_connect" in text and "worse" in text
     assert compare([after, before, "--fail-on-regression"]) == 0  # the other way round it got better
     assert not re.match(r"\d+ metrics of methods got worse, 0 better", capsys.readouterr().out)
+
+
+def stored_with_block(path: Path, block: int, delay_s: float = 0.0, *, starts_known: bool = True) -> str:
+    """Stores an experiment whose planning takes 0.1 s longer in the first episode of a stack, as after a cold start.
+
+    Args:
+        path: Database.
+        block: Trials for which a stack is kept; the next trial has another method, and then a stack of its own.
+        delay_s: Time that planning takes longer in every episode [s].
+        starts_known: Whether the records say which episodes were the first of their stack.
+    """
+    description = RUN.description()
+    timed = tuple(
+        replace(metric, clock=Clock.WALL) if metric.name == "planning_time" else metric
+        for metric in description.metrics
+    )
+    noise = np.random.default_rng(block)
+    with open_database(path, create=True) as database:
+        number = database.add_experiment(replace(description, metrics=timed), RUN.specs())
+        for record in RUN.records():
+            cold = record.spec.trial % block == 0
+            planning_s = 0.2 + 0.1 * cold + delay_s + noise.normal(0.0, 0.01)
+            snapshot = {**record.snapshot, **({COLD_START: True} if cold and starts_known else {})}
+            metrics = {**record.metrics, "planning_time": planning_s}
+            database.write(number, replace(record, metrics=metrics, snapshot=snapshot))
+    return str(path)
+
+
+def test_the_same_code_with_another_block_shows_no_change(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = stored_with_block(tmp_path / "before.db", 5)
+    after = stored_with_block(tmp_path / "after.db", 2)
+    assert compare([before, after, "--fail-on-regression"]) == 0, capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert said.startswith("0 metrics of methods got worse, 0 better")
+    assert "both, or neither, were the first one of their stack" in said
+
+
+def test_cold_and_warm_starts_mixed_would_show_a_change_and_a_slower_planner_does(tmp_path: Path) -> None:
+    before = stored_with_block(tmp_path / "before.db", 5, starts_known=False)
+    mixed = stored_with_block(tmp_path / "mixed.db", 2, starts_known=False)
+    assert compare([before, mixed, "--fail-on-regression"]) == 1
+    slower = stored_with_block(tmp_path / "slower.db", 2, 0.05)
+    assert compare([stored_with_block(tmp_path / "known.db", 5), slower, "--fail-on-regression"]) == 1
 
 
 def test_two_experiments_of_one_database_are_compared_by_name(

@@ -49,7 +49,9 @@ def _compare(given: argparse.Namespace) -> int:
         open_source(given.after or given.before, given.other or given.experiment) as after,
     ):
         differing = differences_of(before.snapshots, after.snapshots)
-        regression = dataclasses.replace(compare_experiments(before.results, after.results), differing=differing)
+        regression = dataclasses.replace(
+            compare_experiments(before.results_by_start, after.results_by_start), differing=differing
+        )
         print(regression_text(regression), end="")
         if given.into is not None:
             write_file(given.into, regression_page(regression, before.database.label, after.database.label).encode())

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
-from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
+from modular_framework_benchmark.episodes.snapshot import COLD_START, MachineLoad, machine, reference_s, versions
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
 from modular_framework_benchmark.metrics.recording_files import (
     objects_of,
@@ -28,7 +28,7 @@ from modular_framework_benchmark.records.what_ran import WhatRan
 TASK_RECORDS = "task_records"
 PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
 """Parts of an episode in their order, and the moment at which each ends."""
-KEPT_OF_ANSWER = ("shake_fault", "video_fault", "recording_fault", "world_digest")
+KEPT_OF_ANSWER = ("shake_fault", "video_fault", "recording_fault", "world_digest", COLD_START)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,7 @@ from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, FoulError, WorldError, judge, spawn
+from modular_framework_benchmark.episodes.snapshot import COLD_START
 from modular_framework_core.task_runner.ros_episode import (
     GENERATE_SERVICE,
     EpisodeError,
@@ -115,6 +116,7 @@ class EpisodeRecorder:
         turns = _joint_state_rate() if self._time.enabled and request.controllers else None
         self._samples.connect()
         folder = Path(request.folder)
+        answer[COLD_START] = not self._warm
         with self._bag(folder, request.bag), self._time.held("episode"):
             try:
                 with stoppable(self._aborted.is_set):

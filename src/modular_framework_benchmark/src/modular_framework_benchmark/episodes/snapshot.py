@@ -19,7 +19,9 @@ import numpy as np
 PACKAGES = ("coal", "numpy", "ompl", "pin", "pybullet", "scipy", "toppra")
 """Packages whose versions change results."""
 
-NOT_SHOWN = ("seed", "settings", "parameters", "final_objects")
+COLD_START = "cold_start"
+"""Part of the snapshot of an episode that was the first one of its stack."""
+NOT_SHOWN = ("seed", "settings", "parameters", "final_objects", COLD_START)
 """Parts of a snapshot that differ between episodes by nature."""
 RUN_MARK = "MODULAR_FRAMEWORK_RUN"
 """Environment variable of every process that a run has started: RUN/WORKER."""

@@ -8,17 +8,20 @@ the same scene. The statistics are those of a comparison of two methods.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 import pandas as pd
 
+from modular_framework_benchmark.episodes.snapshot import COLD_START
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.statistics.analysis import compare
 from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
 from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of
+from modular_framework_ros.reported_figures import Clock
 
 SIDE = "side"
 AFTER, BEFORE = "after", "before"
@@ -107,6 +110,11 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
             f"all {len(methods)} methods."
         )
     changes, pairs, episodes = [], 0, 0
+    if any(COLD_START in results.episodes and results.episodes[COLD_START].any() for results in (before, after)):
+        notes.append(
+            "Metrics in real or processor time are compared between episodes of which both, or neither, were the first "
+            "one of their stack."
+        )
     for method in methods:
         merged = _merged(before, after, method, metrics, of_method)
         comparisons = {item.metric: item for item in compare(merged)}
@@ -181,6 +189,8 @@ def _merged(
         sides.append(rows.assign(**{SIDE: side}))
     key = [factor.name for factor in others] + ["trial"]
     sides[1] = _unpaired_where_seeds_differ(sides[0], sides[1], key)
+    if all(COLD_START in side for side in sides):
+        sides = _without_unlike_starts(sides, key, metrics)
     factors = (Factor(SIDE, (AFTER, BEFORE)), *_all_levels(others, sides))
     description = dataclasses.replace(
         before.description,
@@ -194,6 +204,20 @@ def _merged(
     episodes = pd.concat(sides, ignore_index=True)
     finished = all(len(item.episodes) >= item.planned for item in (before, after))
     return ExperimentResults(description, episodes, before.spans.iloc[:0], len(episodes) + (0 if finished else 1))
+
+
+def _without_unlike_starts(
+    sides: Sequence[pd.DataFrame], key: list[str], metrics: Sequence[Metric]
+) -> list[pd.DataFrame]:
+    """Returns the episodes of both sides; pairs of a cold and a warm start have no values in real or processor time."""
+    names = [metric.name for metric in metrics if metric.clock in (Clock.WALL, Clock.PROCESSOR)]
+    starts = [side.set_index(key)[COLD_START] for side in sides]
+    kept = []
+    for side, own, other in zip(sides, starts, reversed(starts), strict=True):
+        partners = other.reindex(own.index)
+        unlike = (partners.notna() & (partners != own)).to_numpy()
+        kept.append(side.assign(**{name: side[name].mask(unlike) for name in names}))
+    return kept
 
 
 def _all_levels(factors: tuple[Factor, ...], sides: list[pd.DataFrame]) -> list[Factor]:

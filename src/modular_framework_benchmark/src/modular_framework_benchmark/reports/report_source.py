@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from modular_framework_benchmark.episodes.snapshot import NOT_SHOWN
+from modular_framework_benchmark.episodes.snapshot import COLD_START, NOT_SHOWN
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_content import ReportSource
@@ -34,6 +34,13 @@ class OpenedExperiment:
     def snapshots(self) -> SnapshotValues:
         """Returns what the episodes ran with: the different values of each name, each with its number of episodes."""
         return self.database.snapshot_values(self.number, NOT_SHOWN)
+
+    @property
+    def results_by_start(self) -> ExperimentResults:
+        """Returns the results with the column `cold_start`: whether an episode was the first one of its stack."""
+        cold = self.database.flagged_episodes(self.number, COLD_START)
+        episodes = self.results.episodes
+        return replace(self.results, episodes=episodes.assign(**{COLD_START: episodes["number"].isin(cold)}))
 
     def source(self, report_folder: Path) -> ReportSource:
         """Returns what a report reads beside the episodes.

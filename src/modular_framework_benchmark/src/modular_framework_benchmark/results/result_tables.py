@@ -157,6 +157,27 @@ def snapshot_values(
     return {name: sorted(values, key=lambda each: -each[1]) for name, values in sorted(found.items())}
 
 
+def flagged_episodes(connection: Connection, number: int, name: str) -> frozenset[int]:
+    """Returns the numbers of the episodes whose snapshots have a part that is true.
+
+    Args:
+        connection: The database.
+        number: Identifier of the experiment.
+        name: Name of the part.
+    """
+    columns = SNAPSHOT_VALUES.c
+    found = connection.execute(select(columns.id).where(columns.name == name, columns.value == json.dumps(True)))
+    true = set(found.scalars())
+    if not true:
+        return frozenset()
+    rows = connection.execute(
+        select(EPISODES.c.number, RECORDS.c.snapshot)
+        .join_from(EPISODES, RECORDS, RECORDS.c.runid == EPISODES.c.id)
+        .where(EPISODES.c.descriptionid == number)
+    )
+    return frozenset(row.number for row in rows if json.loads(row.snapshot).get(name) in true)
+
+
 def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, Any]:
     result = connection.execute(statement)
     names = list(result.keys())
