@@ -264,6 +264,8 @@ CASES = [
     in_parameters(f"{PIPELINE}/request_adapters", "AddTimeOptimal", "AddTimeOptimal' is not known; known are"),
     in_parameters(f"{PIPELINE}/planning_plugin", "ompl_interface/OMPL", "known are ompl_interface/OMPLPlanner"),
     in_parameters(f"{PIPELINE}/jiggle_fraction", 3, "is 3; allowed: a number, at least 0 and at most 1"),
+    in_parameters(f"{PIPELINE}/path_tolerance", -1, "is -1; allowed: a number, at least 0"),
+    in_parameters(f"{PIPELINE}/resample_dt", 0, "is 0; allowed: a number, at least 0.004"),
     in_parameters("/move_group/trajectory_execution/allowed_start_tolerance", -1, "allowed: a number, at least 0"),
     # Launch arguments of an experiment
     in_experiment(TASK, ("arguments",), {"world_fil": "ur5_table.world"}, "did you mean 'world_file'"),

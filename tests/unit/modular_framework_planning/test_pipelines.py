@@ -335,7 +335,9 @@ def test_seeded_plans_fail_with_a_reason_and_can_be_cancelled(
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, "two", True])
 def test_a_number_of_search_threads_that_is_none_is_refused_with_what_is_allowed(value: object) -> None:
-    with pytest.raises(PlanningError, match=r"pipeline 'ompl': search_threads is .*; allowed are whole numbers from 1"):
+    with pytest.raises(
+        PlanningError, match=r"pipeline 'ompl': search_threads is .*; allowed: a whole number, at least 1"
+    ):
         read_pipeline_spec("ompl", {"search_threads": value}, {}, {})
 
 

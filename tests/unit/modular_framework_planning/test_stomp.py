@@ -91,16 +91,21 @@ def test_time_and_cancelling_end_the_search(model: RobotModel) -> None:
 
 
 def test_parameters_of_both_moveits_are_read_and_checked() -> None:
-    assert read_settings({}) == StompSettings(60, 40, 0, 30, 30, 0.8, 0.1, 0.1)
+    assert read_settings({}) == StompSettings(60, 40, 0, 30, 30, 0.8, 0.1, 0.1, 0.3, 4)
     assert read_settings({"stomp_moveit": {"num_timesteps": 30}}).num_timesteps == 30
     assert read_settings({"stomp": {"arm": {"optimization": {"num_rollouts": 7}}}}, "arm").num_rollouts == 7
-    with pytest.raises(PlanningError, match=r"num_timesteps is 2\.5.*num_rollouts is -1"):
+    with pytest.raises(
+        PlanningError, match=r"'num_timesteps' is 2\.5; allowed: a whole number, at least 5.*'num_rollouts' is -1"
+    ):
         read_settings({"num_timesteps": 2.5, "num_rollouts": -1})
 
 
 def test_update_moves_towards_the_cheaper_copies_and_keeps_the_ends() -> None:
     optimiser = Optimiser(
-        StompSettings(exponentiated_cost_sensitivity=10.0), np.full(2, -5.0), np.full(2, 5.0), np.random.default_rng(1)
+        read_settings({"exponentiated_cost_sensitivity": 10.0}),
+        np.full(2, -5.0),
+        np.full(2, 5.0),
+        np.random.default_rng(1),
     )
     line = optimiser.line(np.zeros(2), np.ones(2))
     copies = optimiser.disturbed(line, np.full(200, 0.3))

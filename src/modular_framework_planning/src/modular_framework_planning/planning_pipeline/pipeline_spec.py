@@ -22,6 +22,7 @@ from modular_framework_planning.planning_pipeline.plugins import (
     make_planner,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_ros.parameter_declarations import existing_declaration
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +96,9 @@ def read_pipeline_spec(
         PlanningError: `search_threads` is not a whole number above 0.
     """
     threads = parameters.get("search_threads", node.get("search_threads"))
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        raise PlanningError(
-            ErrorCode.PLANNING_FAILED,
-            f"pipeline '{name}': search_threads is {threads!r}; allowed are whole numbers from 1: of searches of "
-            "RRTConnect that run at the same time",
-        )
+    declared = existing_declaration("modular_framework_planning", "planning_pipeline").parameters["search_threads"]
+    if threads is not None and declared.fault(threads):
+        raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline '{name}': search_threads {declared.fault(threads)}")
     known = {item.name for item in fields(PipelineSettings)}
     values: dict[str, Any] = {}
     for source in (planning, node, parameters):

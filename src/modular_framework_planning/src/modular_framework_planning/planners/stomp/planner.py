@@ -46,7 +46,7 @@ class StompPlanner:
         Raises:
             PlanningError: no attempt gave a valid path; says how many states of the best one are invalid and why.
         """
-        settings = self._settings.get(problem.group.name, StompSettings())
+        settings = self._settings.get(problem.group.name) or read_settings({})
         goals = problem.goal_states()
         best: Array | None = None
         fewest = 0
