@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, GroupSyncWrite, PacketHandler, PortHandler, port_handler
 
+from modular_framework_drivers.emulators import dynamixel_line
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.ezgripper import dynamixel_bus, mx64
 from modular_framework_drivers.ezgripper.dynamixel_bus import (
@@ -152,6 +153,15 @@ def test_a_servo_out_of_reach_is_an_error_that_says_why(
     with pytest.raises(error, match=hint):
         bus.read(1, mx64.READING)
     assert time.monotonic() - start_s < 1.5
+
+
+def test_answers_to_earlier_instructions_are_no_damaged_packets(
+    bus: DynamixelBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer_to_a_write = b"\xff\xff\x01\x02\x00\xfc"
+    monkeypatch.setattr(dynamixel_line, "answer_bus", lambda servos, instruction: answer_to_a_write)
+    with pytest.raises(NoAnswerError, match="does not answer"):
+        bus.read(1, mx64.READING)
 
 
 def test_another_baud_rate_is_named(line: DynamixelLine) -> None:

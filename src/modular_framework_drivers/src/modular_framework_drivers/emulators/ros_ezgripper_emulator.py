@@ -7,6 +7,7 @@ from pathlib import Path
 
 import rospy
 
+from modular_framework_control.realtime.scheduling import run_in_real_time
 from modular_framework_drivers.emulators.command_port import CommandPort
 from modular_framework_drivers.emulators.dynamixel_finger import Finger
 from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
@@ -16,6 +17,8 @@ from modular_framework_drivers.ezgripper.gripper_servos import ticks_from_joint
 from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_settings
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.ros_node_handle import RosNodeHandle
+
+_PRIORITY = 40  # the thread of the serial line gets 30, like the emulated arm
 
 
 class EzGripperEmulatorNode:
@@ -55,7 +58,8 @@ class EzGripperEmulatorNode:
         )
 
     def run(self) -> None:
-        """Serves until the node is shut down, then pulls the plug."""
+        """Serves until the node is shut down, in real time where that is permitted, then pulls the plug."""
+        run_in_real_time(_PRIORITY)  # a servo answers on time, however busy the computer is
         rospy.spin()
         self._commands.close()
         self._line.close()

@@ -161,7 +161,8 @@ class DynamixelBus:
             if result == COMM_SUCCESS and len(answer) == size + 6 and not errors & ServoErrors.CHECKSUM:
                 self._check(servo_id, errors, what)
                 return bytes(answer[5 : 5 + size]), errors
-            damaged |= result in (COMM_RX_CORRUPT, COMM_SUCCESS)
+            # an intact answer of another size is a late answer to an earlier instruction
+            damaged |= result == COMM_RX_CORRUPT or bool(errors & ServoErrors.CHECKSUM)
         raise NoAnswerError(self._silence(servo_id, damaged, tries))
 
     @staticmethod
