@@ -20,6 +20,7 @@ POINTS = 100_000
 STEP_S = 1e-3
 CANCEL_DELAY_S = 0.01
 ANSWER_S = 60.0
+WATCHED_S = 3.0  # from the goal on, also where the answer comes at once: a busy machine is late now and then
 MAX_LATE_S = 2e-3  # of a cycle, while such a goal is received, checked and followed
 MAX_CANCEL_S = 0.02
 NOISE = "ten points, valid"
@@ -205,7 +206,7 @@ class LongGoalBench:
         if not ended.wait(ANSWER_S) or not self._answered.wait(ANSWER_S):
             raise RuntimeError(f"no answer to a goal of {POINTS} points, or to a cancel, within {ANSWER_S:g} s")
         answered_s = time.monotonic()
-        time.sleep(0.2)
+        time.sleep(max(0.2, sent_s + WATCHED_S - answered_s))
         late_s = latest_cycle_s()
         self._cancels.publish(GoalID(id=name))
         sender.join()
