@@ -67,7 +67,7 @@ def joint(loop: Any, family: str, name: str = "a") -> Any:
 
 def goal(*rows: tuple[float, tuple[float, ...]]) -> TrajectoryGoal:
     points = tuple(TrajectoryPoint(time_s, row, (0.0, 0.0), (0.0, 0.0)) for time_s, row in rows)
-    return TrajectoryGoal(JointTrajectory(("a", "b"), points))
+    return TrajectoryGoal(JointTrajectory.of_points(("a", "b"), points))
 
 
 @pytest.mark.parametrize("family", ["velocity", "effort"])

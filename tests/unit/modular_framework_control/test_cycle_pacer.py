@@ -210,7 +210,7 @@ def test_ten_thousand_cycles_with_moving_controllers_use_up_no_memory(make_loop:
     for part, controller in (("j0", "one"), ("j6", "two")):
         joints = tuple(names[int(part[1:]) : int(part[1:]) + 6])
         points = tuple(TrajectoryPoint(float(i), (0.1 * (i % 2),) * 6, (0.0,) * 6) for i in range(1, 400))
-        loop.controllers[controller].submit(TrajectoryGoal(JointTrajectory(joints, points)))
+        loop.controllers[controller].submit(TrajectoryGoal(JointTrajectory.of_points(joints, points)))
         loop.controllers[controller].on_state = lambda snapshot: None
     loop.controllers["states"].on_state = lambda snapshot: None
     loop.step(1000)

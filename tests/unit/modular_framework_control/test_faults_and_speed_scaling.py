@@ -90,7 +90,7 @@ def start(make_loop: Callable[..., Any]) -> Callable[..., Any]:
 def send(loop: Any, *points: tuple[float, Sequence[float]]) -> TrajectoryGoalHandle:
     goal_handle = TrajectoryGoalHandle()
     rows = tuple(TrajectoryPoint(time_s, tuple(row), ZEROS, ZEROS) for time_s, row in points)
-    loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(("a", "b"), rows)), goal_handle)
+    loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory.of_points(("a", "b"), rows)), goal_handle)
     return goal_handle
 
 

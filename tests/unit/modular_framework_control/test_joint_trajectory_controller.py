@@ -83,13 +83,13 @@ def send(
     **more: Any,
 ) -> TrajectoryGoalHandle:
     goal_handle = TrajectoryGoalHandle()
-    trajectory = JointTrajectory(names, points(*rows), stamp_s)
+    trajectory = JointTrajectory.of_points(names, points(*rows), stamp_s)
     loop.controllers["arm"].submit(TrajectoryGoal(trajectory, **more), goal_handle)
     return goal_handle
 
 
 def command(loop: Any, *rows: tuple[float, tuple[float, ...]], stamp_s: float = 0.0) -> None:
-    trajectory = JointTrajectory(("a", "b", "c"), points(*rows), stamp_s)
+    trajectory = JointTrajectory.of_points(("a", "b", "c"), points(*rows), stamp_s)
     loop.controllers["arm"].submit(TrajectoryGoal(trajectory))
 
 
@@ -105,7 +105,7 @@ def test_a_random_trajectory_of_ten_points_is_tracked_to_a_millionth(make_loop: 
     states = rng.uniform(-0.3, 0.3, (10, 3, 3)) * np.array([1.0, 0.5, 0.5])[:, np.newaxis]
     sent = tuple(TrajectoryPoint(float(t), *map(tuple, state)) for t, state in zip(times, states, strict=True))
     goal_handle = TrajectoryGoalHandle()
-    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory(("a", "b", "c"), sent)), goal_handle)
+    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory.of_points(("a", "b", "c"), sent)), goal_handle)
     begun_s = loop.time_s
     knots = np.concatenate([[0.0], times])
     splines = [BPoly.from_derivatives(knots, np.concatenate([[ZEROS], states[:, :, joint]])) for joint in range(3)]
@@ -310,7 +310,7 @@ def test_an_empty_goal_stops_and_succeeds_and_an_empty_command_stops(loop: Any) 
     assert commands(loop) == held
     command(loop, (1.0, (0.0, 0.0, 0.0)))
     loop.run(0.5)
-    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory((), ())))
+    loop.controllers["arm"].submit(TrajectoryGoal(JointTrajectory.of_points((), ())))
     loop.step(2)
     assert not loop.controllers["arm"].desired_at(loop.time_s)[1].any()
 

@@ -9,11 +9,11 @@ import genpy
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from modular_framework_control.controllers.joint_state_controller import JointStateSnapshot
 from modular_framework_control.realtime.loop_time import NOTICED_STEP_S, LoopTime
 from modular_framework_control.ros.conversions import joint_state_to_msg, trajectory_from_msg
+from modular_framework_control.ros.trajectory_messages import CompactJointTrajectory
 
 
 class Clocks:
@@ -83,9 +83,9 @@ def test_a_step_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
 
 
 def test_stamps_of_messages_differ_from_the_time_of_the_loop_by_what_the_clock_is_ahead() -> None:
-    sent = JointTrajectory(points=[JointTrajectoryPoint()])
+    sent = CompactJointTrajectory()
     sent.header.stamp = genpy.Time(1500)
     assert trajectory_from_msg(sent, 400.0).stamp_s == 1100.0
-    assert trajectory_from_msg(JointTrajectory(), 400.0).stamp_s == 0.0, "now stays now"
+    assert trajectory_from_msg(CompactJointTrajectory(), 400.0).stamp_s == 0.0, "now stays now"
     message = joint_state_to_msg(JointStateSnapshot(1100.0, ["a"], [0.0], [0.0], [0.0]), 400.0)
     assert message.header.stamp == genpy.Time(1500)

@@ -107,7 +107,7 @@ def send(loop: Any, *points: tuple[float, Sequence[float], Sequence[float]]) -> 
         for time_s, position, velocity in points
     )
     try:
-        loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory(JOINTS, rows)), goal_handle)
+        loop.controllers["c"].submit(TrajectoryGoal(JointTrajectory.of_points(JOINTS, rows)), goal_handle)
     except GoalRejectedError as error:
         goal_handle.finish(GoalStatus.REJECTED, error.code, str(error))
     loop.step()
@@ -223,7 +223,7 @@ def test_a_motion_that_is_broken_off_goes_on_by_no_more_than_its_ramp(
         assert loop.switch([], ["c"]) is None
     else:
         names = JOINTS if end == "empty goal" else ()
-        goal = TrajectoryGoal(JointTrajectory(names, ()))
+        goal = TrajectoryGoal(JointTrajectory.of_points(names, ()))
         loop.controllers["c"].submit(goal, RealtimeGoalHandle() if end == "empty goal" else None)
     if family == "effort" and end == "switch":
         return  # a body without friction rolls on when nothing brakes it

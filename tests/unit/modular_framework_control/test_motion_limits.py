@@ -31,7 +31,7 @@ def point(
 
 
 def refusal(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int = 0, here: float = 0.0) -> str:
-    spline = Spline(JointTrajectory(("a",), points))
+    spline = Spline(JointTrajectory.of_points(("a",), points))
     return limit_violations(spline, ("a",), limits, np.array([here])).text(first, first + 1)
 
 

@@ -33,7 +33,7 @@ def random_states(points: int) -> tuple[np.ndarray, np.ndarray]:
 
 def trajectory_of(times: np.ndarray, states: np.ndarray, rows: int) -> JointTrajectory:
     """Points giving the first `rows` of position, velocity and acceleration."""
-    return JointTrajectory(
+    return JointTrajectory.of_points(
         NAMES,
         tuple(
             TrajectoryPoint(float(time_s), *(tuple(state[row]) for row in range(rows)))
@@ -108,7 +108,7 @@ def test_a_trajectory_that_starts_where_the_joints_are_is_followed_as_sent() -> 
 
 
 def test_a_joint_without_end_goes_the_short_way() -> None:
-    trajectory = JointTrajectory(("a",), (TrajectoryPoint(1.0, (0.1,)), TrajectoryPoint(2.0, (0.4,))))
+    trajectory = JointTrajectory.of_points(("a",), (TrajectoryPoint(1.0, (0.1,)), TrajectoryPoint(2.0, (0.4,))))
     state = np.array([[4.0 * math.pi - 0.1], [0.0], [0.0]])
     track = splice(Spline(trajectory), [0], 0.0, 0.0, state, [True])
     assert track.sample(1.0)[0, 0] == pytest.approx(4.0 * math.pi + 0.1)
@@ -125,7 +125,7 @@ def test_a_track_without_some_joints_keeps_the_others() -> None:
 
 
 def test_all_faults_of_a_trajectory_are_listed() -> None:
-    trajectory = JointTrajectory(
+    trajectory = JointTrajectory.of_points(
         ("a", "b"),
         (
             TrajectoryPoint(-math.inf, (0.0, math.nan)),
@@ -151,16 +151,16 @@ def test_all_faults_of_a_trajectory_are_listed() -> None:
 
 
 def test_of_very_many_faults_the_first_are_reported_and_the_others_counted() -> None:
-    trajectory = JointTrajectory(("a",), tuple(TrajectoryPoint(i + 1.0, (math.nan,)) for i in range(1000)))
+    trajectory = JointTrajectory.of_points(("a",), tuple(TrajectoryPoint(i + 1.0, (math.nan,)) for i in range(1000)))
     with pytest.raises(InvalidTrajectoryError, match="point 7: .* and 992 more$"):
         check_points(trajectory)
 
 
 def test_values_so_large_that_the_curve_would_not_be_finite_are_refused() -> None:
     with pytest.raises(InvalidTrajectoryError, match=r"position of joint 'a' \(index 0\) is 2e\+09; expected"):
-        check_points(JointTrajectory(("a",), (TrajectoryPoint(1.0, (2e9,)),)))
+        check_points(JointTrajectory.of_points(("a",), (TrajectoryPoint(1.0, (2e9,)),)))
     largest = Spline(
-        JointTrajectory(
+        JointTrajectory.of_points(
             ("a",), (TrajectoryPoint(0.0, (1e9,), (1e9,), (1e9,)), TrajectoryPoint(1e-9, (-1e9,), (-1e9,), (-1e9,)))
         )
     )

@@ -131,11 +131,7 @@ class JointTrajectoryController(Controller):
             if warning:
                 LOGGER.warning("%s: %s", self._namespace, warning)
         here = np.array([handle.position for handle in self._handles])
-        try:
-            self._mailbox.put(validate_goal(replace(goal, trajectory=trajectory), goal_handle, self._rules, here))
-        finally:
-            if trajectory is not goal.trajectory:
-                trajectory.release()
+        self._mailbox.put(validate_goal(replace(goal, trajectory=trajectory), goal_handle, self._rules, here))
         if not self._running:
             self._reject_waiting("the controller was stopped")
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Asks the operating system to let the control loop run on time, where it permits that.
 
-The jitter that Python itself causes is reduced too: another thread releases the interpreter after a
-fraction of a cycle, and the garbage collector ignores all objects that exist when the loop begins, or that it has seen
-twice: to go through all of them takes many cycles while a goal of very many points is there.
+The jitter that Python itself causes is reduced too: another thread releases the interpreter to the loop after a
+fraction of a cycle, and the loop keeps the interpreter during its cycle. The garbage collector ignores all objects that
+exist when the loop begins, or that it has seen twice.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ import os
 import resource
 import sys
 import threading
+from collections.abc import Iterator
 
 PRIORITY = 80
 OTHERS_BELOW = 10
 """By how much the priority of the other threads of a process is lower than that of the loop."""
 _SWITCH_INTERVAL_S = 2e-4
+_CYCLE_SWITCH_INTERVAL_S = 2e-3  # longer than the work of a cycle
 _NO_FULL_COLLECTIONS = 2**31 - 1
 LATENCY_DEVICE = "/dev/cpu_dma_latency"
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
@@ -31,6 +33,20 @@ def prepare_interpreter() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(*gc.get_threshold()[:2], _NO_FULL_COLLECTIONS)
+
+
+@contextlib.contextmanager
+def keeping_the_interpreter() -> Iterator[None]:
+    """Lets the calling thread keep the interpreter during a cycle, unless it waits for something itself.
+
+    A thread that comes to wait for the interpreter asks for it only after the switch interval at that time. Without
+    this a cycle beside a busy thread hands the interpreter to and fro many times.
+    """
+    sys.setswitchinterval(_CYCLE_SWITCH_INTERVAL_S)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(_SWITCH_INTERVAL_S)
 
 
 def run_in_real_time(priority: int = PRIORITY) -> list[str]:

@@ -9,7 +9,6 @@ from typing import Any
 
 import rospy
 from control_msgs.msg import (
-    FollowJointTrajectoryAction,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     GripperCommandAction,
@@ -18,7 +17,6 @@ from control_msgs.msg import (
 )
 from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateRequest, QueryTrajectoryStateResponse
 from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
 from modular_framework_control.controllers.gripper_action_controller import (
@@ -46,6 +44,10 @@ from modular_framework_control.ros.mobile_base_interfaces import (
 )
 from modular_framework_control.ros.outbox import Outbox
 from modular_framework_control.ros.sensor_interfaces import SensorRosInterface
+from modular_framework_control.ros.trajectory_messages import (
+    CompactFollowJointTrajectoryAction,
+    CompactJointTrajectory,
+)
 from modular_framework_control.trajectory.trajectory_goal import (
     GoalRejectedError,
     TrajectoryErrorCode,
@@ -104,7 +106,7 @@ class JointTrajectoryRosInterface:
             opened.callback(self._state.unregister)
             self._action = ControllerActionServer(
                 f"{self._name}/follow_joint_trajectory",
-                FollowJointTrajectoryAction,
+                CompactFollowJointTrajectoryAction,
                 self._submit,
                 controller.cancel,
                 _trajectory_result,
@@ -113,7 +115,7 @@ class JointTrajectoryRosInterface:
             opened.callback(self._action.close)
             query = rospy.Service(f"{self._name}/query_state", QueryTrajectoryState, self._on_query)
             opened.callback(query.shutdown, "controller unloaded")
-            command = rospy.Subscriber(f"{self._name}/command", JointTrajectoryMsg, self._on_command, queue_size=1)
+            command = rospy.Subscriber(f"{self._name}/command", CompactJointTrajectory, self._on_command, queue_size=1)
             opened.callback(command.unregister)
             self._opened = opened.pop_all()
         controller.on_state = lambda snapshot: outbox.publish(
@@ -129,22 +131,16 @@ class JointTrajectoryRosInterface:
 
     def _submit(self, message: FollowJointTrajectoryGoal, goal_handle: TrajectoryGoalHandle) -> None:
         try:
-            self._hand_over(conversions.goal_from_msg(message, self._loop_time.ahead_s), goal_handle)
+            self._controller.submit(conversions.goal_from_msg(message, self._loop_time.ahead_s), goal_handle)
         except GoalRejectedError as error:
             result = conversions.trajectory_result_to_msg(error.code, str(error))
             raise GoalRefusedError(result, str(error)) from error
 
-    def _on_command(self, message: JointTrajectoryMsg) -> None:
+    def _on_command(self, message: CompactJointTrajectory) -> None:
         try:
-            self._hand_over(TrajectoryGoal(conversions.trajectory_from_msg(message, self._loop_time.ahead_s)))
+            self._controller.submit(TrajectoryGoal(conversions.trajectory_from_msg(message, self._loop_time.ahead_s)))
         except GoalRejectedError as error:
             rospy.logwarn("%s/command ignored: %s", self._name, error)
-
-    def _hand_over(self, goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None = None) -> None:
-        try:
-            self._controller.submit(goal, goal_handle)
-        finally:
-            goal.trajectory.release()
 
     def _on_query(self, request: QueryTrajectoryStateRequest) -> QueryTrajectoryStateResponse:
         try:

@@ -21,29 +21,22 @@ from control_msgs.msg import (
 )
 from controller_manager_msgs.msg import ControllerState, ControllerStatistics, HardwareInterfaceResources
 from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory as JointTrajectoryMsg
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_control.controller_manager.controller_manager import ControllerReport
 from modular_framework_control.controller_manager.controller_switch import ControllerState as LoadedState
 from modular_framework_control.controllers.gripper_action_controller import GripperState
 from modular_framework_control.controllers.joint_state_controller import JointStateSnapshot
-from modular_framework_control.trajectory.joint_trajectory import Array, JointTrajectory, TrajectoryPoint, parts
+from modular_framework_control.ros.trajectory_messages import CompactJointTrajectory
+from modular_framework_control.trajectory.joint_trajectory import Array, JointTrajectory
 from modular_framework_control.trajectory.tolerances import JointTolerance
 from modular_framework_control.trajectory.trajectory_goal import TrajectoryErrorCode, TrajectoryGoal, TrajectorySnapshot
 
 
-def trajectory_from_msg(message: JointTrajectoryMsg, ahead_s: float = 0.0) -> JointTrajectory:
-    """A trajectory_msgs/JointTrajectory as sent, not checked; takes its points, which are freed one by one."""
-    points = []
-    message.points.reverse()
-    for part in parts(len(message.points)):
-        for _ in range(part.start, part.stop):
-            sent = message.points.pop()
-            values = (tuple(sent.positions), tuple(sent.velocities), tuple(sent.accelerations))
-            points.append(TrajectoryPoint(sent.time_from_start.to_sec(), *values))
+def trajectory_from_msg(message: CompactJointTrajectory, ahead_s: float = 0.0) -> JointTrajectory:
+    """A trajectory as it was received; it is not checked here."""
     stamp = message.header.stamp
-    return JointTrajectory(tuple(message.joint_names), points, stamp.to_sec() - ahead_s if stamp else 0.0)
+    return JointTrajectory(tuple(message.joint_names), message.points, stamp.to_sec() - ahead_s if stamp else 0.0)
 
 
 def _tolerances_from_msg(messages: Sequence[Any]) -> dict[str, JointTolerance]:
@@ -51,7 +44,7 @@ def _tolerances_from_msg(messages: Sequence[Any]) -> dict[str, JointTolerance]:
 
 
 def goal_from_msg(message: FollowJointTrajectoryGoal, ahead_s: float = 0.0) -> TrajectoryGoal:
-    """A control_msgs/FollowJointTrajectoryGoal as sent; it is not checked here."""
+    """A control_msgs/FollowJointTrajectoryGoal as received in a CompactTrajectoryActionGoal; it is not checked here."""
     return TrajectoryGoal(
         trajectory_from_msg(message.trajectory, ahead_s),
         _tolerances_from_msg(message.path_tolerance),

@@ -19,6 +19,7 @@ from modular_framework_control.realtime.cycle_pacer import CyclePacer, LoopStati
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.realtime.scheduling import (
     keep_processors_awake,
+    keeping_the_interpreter,
     prepare_interpreter,
     run_in_real_time,
 )
@@ -161,9 +162,12 @@ class RobotHwNode:
         if rospy.rostime.is_wallclock():
             self._last_s = self._loop_time.now()
             pacer = CyclePacer(self._period_s)
-            pacer.run(
-                lambda late_s, missed: self._cycle(manager, self._loop_time.now(), late_s, missed, pacer.woken_late_s)
-            )
+
+            def cycle(late_s: float, missed: int) -> bool:
+                with keeping_the_interpreter():
+                    return self._cycle(manager, self._loop_time.now(), late_s, missed, pacer.woken_late_s)
+
+            pacer.run(cycle)
             return
         self._last_s = rospy.get_time()
         while self._cycle(manager, rospy.get_time(), 0.0, 0):  # how late it is, is not known

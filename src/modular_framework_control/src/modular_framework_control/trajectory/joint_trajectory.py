@@ -23,6 +23,7 @@ POSITION, VELOCITY, ACCELERATION = 0, 1, 2
 SHORTEST_SEGMENT_S = 1e-6
 ITEMS_AT_ONCE = 256
 PAUSE_S = 1e-4
+PAUSE_SHARE = 1.0
 
 
 class InvalidTrajectoryError(Exception):
@@ -46,6 +47,26 @@ class TrajectoryPoint:
     accelerations: tuple[float, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TrajectoryPoints:
+    """The points of a trajectory as they were sent, not checked.
+
+    Attributes:
+        times_s: time of each point from the start of the trajectory [s], shape (points,).
+        values: positions, velocities and accelerations of each point, 0 where none were sent, shape
+            (points, 3, joints); values beyond the number of joint names are left out, and all values if points lack
+            positions for certain.
+        counts: numbers of positions, velocities and accelerations that were sent, shape (points, 3).
+    """
+
+    times_s: Array
+    values: Array
+    counts: NDArray[np.int32]
+
+    def __len__(self) -> int:
+        return len(self.times_s)
+
+
 @dataclass(frozen=True, slots=True)
 class JointTrajectory:
     """A trajectory as it was sent.
@@ -57,13 +78,23 @@ class JointTrajectory:
     """
 
     joint_names: tuple[str, ...]
-    points: Sequence[TrajectoryPoint]
+    points: TrajectoryPoints
     stamp_s: float = 0.0
 
-    def release(self) -> None:
-        """Drops the points of a list, a few at a time: Python frees an object with all its parts in one go."""
-        while isinstance(self.points, list) and self.points:
-            del self.points[-ITEMS_AT_ONCE:]
+    @classmethod
+    def of_points(
+        cls, joint_names: tuple[str, ...], points: Sequence[TrajectoryPoint], stamp_s: float = 0.0
+    ) -> JointTrajectory:
+        """A trajectory of few points, given one by one."""
+        rows = [(point.positions, point.velocities, point.accelerations) for point in points]
+        values = np.zeros((len(points), 3, len(joint_names)))
+        for i, row in enumerate(rows):
+            for kind, sent in enumerate(row):
+                kept = sent[: len(joint_names)]
+                values[i, kind, : len(kept)] = kept
+        times_s = np.array([point.time_s for point in points], float)
+        counts = np.array([[len(sent) for sent in row] for row in rows], np.int32).reshape(-1, 3)
+        return cls(joint_names, TrajectoryPoints(times_s, values, counts), stamp_s)
 
 
 def segment_coefficients(start: Array, end: Array, duration_s: Array | float, order: int) -> Array:
@@ -102,12 +133,14 @@ def segment_coefficients(start: Array, end: Array, duration_s: Array | float, or
 def parts(count: int) -> Iterator[slice]:
     """Divides `count` items among slices, with a pause between two.
 
-    A slice is short enough for one call of NumPy, in which the control loop cannot have the interpreter. Without
-    pauses a thread with real-time priority would use a processor up, and Linux would stop the process for 50 ms.
+    A slice is short enough for one call of NumPy, in which the control loop cannot have the interpreter. A thread with
+    real-time priority must pause: Linux stops real-time threads for 50 ms if they use a processor up for 0.95 s.
     """
+    begun_s = time.monotonic()
     for begin in range(0, count, ITEMS_AT_ONCE):
         if begin > 0:
-            time.sleep(PAUSE_S)
+            time.sleep(PAUSE_S + PAUSE_SHARE * (time.monotonic() - begun_s))
+            begun_s = time.monotonic()
         yield slice(begin, min(begin + ITEMS_AT_ONCE, count))
 
 
@@ -119,7 +152,8 @@ class Spline:
 
     Attributes:
         times_s: time of each point from the start [s], shape (points,).
-        states: what each point gives, missing values 0, shape (points, 3, joints).
+        states: what each point gives, missing values 0, shape
+            (points, 3, joints).
         orders: highest order each point allows: 1, 3 or 5, shape (points,).
         coefficients: of the segment from point i to point i + 1, shape (points - 1, 6, joints).
     """
@@ -128,19 +162,10 @@ class Spline:
 
     def __init__(self, trajectory: JointTrajectory) -> None:
         points = trajectory.points
-        none = (0.0,) * len(trajectory.joint_names)
-        self.times_s = np.empty(len(points))
-        self.states = np.empty((len(points), 3, len(none)))
-        self.orders = np.empty(len(points), int)
-        self.coefficients = np.empty((len(points) - 1, 6, len(none)))
-        for part in parts(len(points)):
-            self.times_s[part] = [point.time_s for point in points[part]]
-            self.states[part] = [
-                (point.positions, point.velocities or none, point.accelerations or none) for point in points[part]
-            ]
-            self.orders[part] = [
-                1 if not point.velocities else 5 if point.accelerations else 3 for point in points[part]
-            ]
+        self.times_s = points.times_s
+        self.states = points.values
+        self.orders = np.where(points.counts[:, VELOCITY] == 0, 1, np.where(points.counts[:, ACCELERATION] == 0, 3, 5))
+        self.coefficients = np.empty((len(points) - 1, 6, len(trajectory.joint_names)))
         for part in parts(len(points) - 1):
             self._compute_segments(part, slice(part.start + 1, part.stop + 1))
 
@@ -164,7 +189,7 @@ class Track:
     Attributes:
         joints: indices of the joints in the controller.
         start_s: start of the first segment [s of the controller's time].
-        ends_s: end of each segment [s], shape (segments,).
+        ends_s: end of each segment [s after origin_s], shape (segments,).
         first: coefficients of the first segment, shape (6, columns).
         others: coefficients of the other segments, shape (segments - 1, 6, columns).
         end_position: where it ends, shape (columns,).
@@ -185,7 +210,7 @@ class Track:
     end_s: float = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "end_s", float(self.ends_s[-1]))
+        object.__setattr__(self, "end_s", self.origin_s + float(self.ends_s[-1]))
 
     @classmethod
     def hold(cls, joints: Sequence[int], position: Array, time_s: float) -> Track:
@@ -199,7 +224,9 @@ class Track:
         cls, joints: Sequence[int], start_s: float, end_s: float, coefficients: Array, end_position: Array
     ) -> Track:
         """One segment with coefficients of shape (6, joints), from `start_s` to `end_s` [s]."""
-        return cls(list(joints), start_s, np.array([end_s]), coefficients, coefficients[:0], end_position, start_s)
+        return cls(
+            list(joints), start_s, np.array([end_s - start_s]), coefficients, coefficients[:0], end_position, start_s
+        )
 
     def sample(self, time_s: float) -> Array:
         """Position, velocity and acceleration at `time_s`, shape (3, joints)."""
@@ -207,8 +234,8 @@ class Track:
             state = np.zeros((3, len(self.end_position)))
             state[POSITION] = self.end_position
         else:
-            i = min(bisect_right(self.ends_s, time_s), len(self.ends_s) - 1)
-            t = max(0.0, time_s - (float(self.ends_s[i - 1]) if i > 0 else self.start_s))
+            i = min(bisect_right(self.ends_s, time_s - self.origin_s), len(self.ends_s) - 1)
+            t = max(0.0, time_s - (self.origin_s + float(self.ends_s[i - 1]) if i > 0 else self.start_s))
             t2 = t * t
             t3 = t2 * t
             basis = (
@@ -246,14 +273,14 @@ def splice(
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
-    ends_s = origin_s + spline.times_s[first:]
+    ends_s = spline.times_s[first:]
     if first > 0 and _agrees(spline, first - 1, splice_s - origin_s, state, offset):
         bridge = spline.coefficients[first - 1].copy()
         bridge[POSITION] += offset
     else:
         target = spline.states[first].copy()
         target[POSITION] += offset
-        bridge = segment_coefficients(state, target, float(ends_s[0]) - splice_s, int(spline.orders[first]))
+        bridge = segment_coefficients(state, target, origin_s + float(ends_s[0]) - splice_s, int(spline.orders[first]))
     end_position = spline.states[-1, POSITION] + offset
     return Track(list(joints), splice_s, ends_s, bridge, spline.coefficients[first:], end_position, origin_s, offset)
 

@@ -98,6 +98,15 @@ class LimitViolations:
             indices: NDArray[np.int64] = np.argwhere(beyond) + (first_point, 0)
             self._found.append((kind, indices, values[beyond]))
 
+    def merge(self) -> None:
+        """Joins the violations of each kind: the control loop, which asks for the text, has no time for many parts."""
+        kinds = {kind: [(indices, values) for other, indices, values in self._found if other is kind] for kind in _Kind}
+        self._found = [
+            (kind, np.concatenate([indices for indices, _ in found]), np.concatenate([values for _, values in found]))
+            for kind, found in kinds.items()
+            if found
+        ]
+
     def text(self, first: int = 0, first_segment: int = 1) -> str:
         """Describes the violations in one text, of very many only the first few; "" if there are none.
 
@@ -107,7 +116,7 @@ class LimitViolations:
         """
         described: list[str] = []
         count = 0
-        for kind, indices, values in self._found:  # there may be very many, and the control loop calls this
+        for kind, indices, values in self._found:
             begin = first if kind in (_Kind.POINT_POSITION, _Kind.POINT_VELOCITY) else first_segment
             skipped = bisect_left(indices[:, 0], begin)
             count += len(indices) - skipped
@@ -169,6 +178,7 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
             too_fast = np.abs(ways.velocities) > VELOCITY_SHARE * limits.fastest
             found.add(_Kind.CURVE_VELOCITY, ways.velocities, too_fast, part.start + 1)
             _add_positions(found, ways, limits, part.start + 1)
+    found.merge()
     return found
 
 
@@ -186,7 +196,7 @@ def first_segment_violations(
     """
     found = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
-    duration_s = float(track.ends_s[0]) - track.start_s
+    duration_s = track.origin_s + float(track.ends_s[0]) - track.start_s
     ways = _SegmentExtremes(track.first[np.newaxis], np.array([duration_s]))
     speeds = np.abs(ways.velocities)
     late = (speeds - limits.fastest) * duration_s > CURVE_MARGIN
@@ -222,11 +232,12 @@ class _SegmentExtremes:
 
     def __init__(self, coefficients: Array, durations_s: Array) -> None:
         scaled = coefficients * durations_s[:, np.newaxis, np.newaxis] ** np.arange(6)[:, np.newaxis]
+        scaled = np.ascontiguousarray(scaled.transpose(2, 1, 0))  # one product a joint
         positions = _POSITION_BASIS @ scaled
-        self.lowest: Array = positions.min(axis=1)
-        self.highest: Array = positions.max(axis=1)
-        begin, end = positions[:, 0], positions[:, -1]
+        self.lowest: Array = positions.min(axis=1).T
+        self.highest: Array = positions.max(axis=1).T
+        begin, end = positions[:, 0].T, positions[:, -1].T
         self.overshoots = (self.lowest < np.minimum(begin, end)) | (self.highest > np.maximum(begin, end))
-        velocities = _VELOCITY_BASIS @ scaled / durations_s[:, np.newaxis, np.newaxis]
-        upper, lower = velocities.max(axis=1), velocities.min(axis=1)
-        self.velocities: Array = np.where(upper > -lower, upper, lower)
+        velocities = _VELOCITY_BASIS @ scaled
+        upper, lower = velocities.max(axis=1).T, velocities.min(axis=1).T
+        self.velocities: Array = np.where(upper > -lower, upper, lower) / durations_s[:, np.newaxis]

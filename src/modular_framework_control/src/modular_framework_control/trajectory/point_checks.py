@@ -6,18 +6,24 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import islice, pairwise
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
 
 from modular_framework_control.trajectory.joint_trajectory import (
+    Array,
     InvalidTrajectoryError,
     JointTrajectory,
-    TrajectoryPoint,
+    TrajectoryPoints,
     parts,
 )
 
 # Coefficients of a segment as short as they come stay finite with values up to this.
 LARGEST_VALUE = 1e9
 _MOST_FAULTS_LISTED = 8
+_NOUNS = ("position", "velocity", "acceleration")
 
 
 def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool) -> str:
@@ -42,7 +48,11 @@ def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool
         faults.append(
             f"joints missing: {', '.join(missing)} (allow_partial_joints_goal is {str(allow_partial).lower()})"
         )
-    return f"{_joined(iter(faults))}; joints of the controller: {', '.join(known)}" if faults else ""
+    if not faults:
+        return ""
+    listed = _Faults()
+    listed.add(len(faults), iter(faults))
+    return f"{listed.text()}; joints of the controller: {', '.join(known)}"
 
 
 def drop_surplus_values(trajectory: JointTrajectory) -> tuple[JointTrajectory, str]:
@@ -52,21 +62,15 @@ def drop_surplus_values(trajectory: JointTrajectory) -> tuple[JointTrajectory, s
         The trajectory with one value a joint, and what was left out, or "".
     """
     count = len(trajectory.joint_names)
-    sizes = {
-        len(values)
-        for point in trajectory.points
-        for values in (point.positions, point.velocities, point.accelerations)
-        if values
-    }
-    if len(sizes) != 1 or max(sizes) <= count:
+    points = trajectory.points
+    sent = points.counts[points.counts > 0]
+    size = int(sent.max(initial=0))
+    if size <= count or sent.min() < size:
         return trajectory, ""
-    points = [
-        TrajectoryPoint(point.time_s, point.positions[:count], point.velocities[:count], point.accelerations[:count])
-        for point in trajectory.points
-    ]
+    kept = TrajectoryPoints(points.times_s, points.values, np.minimum(points.counts, count))
     return (
-        JointTrajectory(trajectory.joint_names, points, trajectory.stamp_s),
-        f"points have {max(sizes)} values each, only the first {count} are used, for: "
+        replace(trajectory, points=kept),
+        f"points have {size} values each, only the first {count} are used, for: "
         f"{', '.join(trajectory.joint_names)}; send one value a joint",
     )
 
@@ -77,54 +81,69 @@ def check_points(trajectory: JointTrajectory) -> None:
     Raises:
         InvalidTrajectoryError: lists the faults: which point, which joint, what was got, what is allowed.
     """
-    faults = _joined(_faults_of(trajectory))
-    if faults:
-        raise InvalidTrajectoryError(faults)
-
-
-def _joined(faults: Iterator[str]) -> str:
-    """Joins the faults to one text; of very many only the first, and the number of the others."""
-    listed = list(islice(faults, _MOST_FAULTS_LISTED))
-    more = sum(1 for _ in faults)
-    return "; ".join(listed) + (f"; and {more} more" if more else "")
-
-
-def _faults_of(trajectory: JointTrajectory) -> Iterator[str]:
-    points = trajectory.points
+    faults = _Faults()
+    points, names = trajectory.points, trajectory.joint_names
     for part in parts(len(points)):
-        for number in range(part.start, part.stop):
-            for fault in _faults_of_point(points[number], trajectory.joint_names):
-                yield f"point {number}: {fault}"
-    if points and not math.isfinite(points[0].time_s):
-        yield f"point 0: time_from_start is {points[0].time_s:.9g} s; expected a time"
-    for number, (before, point) in enumerate(pairwise(points)):
-        if not point.time_s > before.time_s:
-            yield (
-                f"point {number + 1}: time_from_start {point.time_s:.9g} s does not come after {before.time_s:.9g} s"
-                f" of point {number}; times must increase strictly"
-            )
+        _check_values(faults, points, part, names)
+    if points and not math.isfinite(points.times_s[0]):
+        faults.add(1, iter([f"point 0: time_from_start is {points.times_s[0]:.9g} s; expected a time"]))
+    early = np.flatnonzero(~(np.diff(points.times_s) > 0.0))
+    faults.add(len(early), (_early(points.times_s, int(number)) for number in early))
     if not abs(trajectory.stamp_s) < float("inf"):
-        yield f"header stamp is {trajectory.stamp_s}; expected a time, or 0 for now"
+        faults.add(1, iter([f"header stamp is {trajectory.stamp_s}; expected a time, or 0 for now"]))
+    if faults.count:
+        raise InvalidTrajectoryError(faults.text())
 
 
-def _faults_of_point(point: TrajectoryPoint, names: Sequence[str]) -> Iterator[str]:
-    for noun, values, optional in (
-        ("position", point.positions, False),
-        ("velocity", point.velocities, True),
-        ("acceleration", point.accelerations, True),
-    ):
-        if optional and not values:
-            continue
-        if len(values) != len(names):
+class _Faults:
+    """Describes the first of very many faults, and counts the others."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._listed: list[str] = []
+
+    def add(self, count: int, texts: Iterator[str]) -> None:
+        """Adds `count` faults; `texts` describes them when asked."""
+        self.count += count
+        self._listed += islice(texts, _MOST_FAULTS_LISTED - len(self._listed))
+
+    def text(self) -> str:
+        """Joins the faults to one text."""
+        more = self.count - len(self._listed)
+        return "; ".join(self._listed) + (f"; and {more} more" if more else "")
+
+
+def _check_values(faults: _Faults, points: TrajectoryPoints, part: slice, names: Sequence[str]) -> None:
+    counts = points.counts[part]
+    missized = counts != len(names)
+    missized[:, 1:] &= counts[:, 1:] > 0
+    beyond = ~(np.abs(points.values[part]) <= LARGEST_VALUE) & ~missized[:, :, np.newaxis]
+    count = int(np.count_nonzero(missized)) + int(np.count_nonzero(beyond))
+    if count:
+        faults.add(count, _value_faults(points, part, missized, beyond, names))
+
+
+def _value_faults(
+    points: TrajectoryPoints, part: slice, missized: NDArray[np.bool_], beyond: NDArray[np.bool_], names: Sequence[str]
+) -> Iterator[str]:
+    for i, kind in np.argwhere(missized | beyond.any(axis=2)).tolist():
+        point, noun = part.start + i, _NOUNS[kind]
+        if missized[i, kind]:
             plural = noun.replace("y", "ie") + "s"
             yield (
-                f"has {len(values)} {plural}; expected {len(names)}{' or none' if optional else ''}, in the order "
-                "of the joint names"
+                f"point {point}: has {points.counts[point, kind]} {plural}; expected {len(names)}"
+                f"{' or none' if kind else ''}, in the order of the joint names"
             )
-        elif not all(-LARGEST_VALUE <= value <= LARGEST_VALUE for value in values):
-            yield from (
-                f"{noun} of joint '{names[i]}' (index {i}) is {value:.9g}; expected a finite number of at most "
-                f"{LARGEST_VALUE:.0e} in size"
-                for i, value in enumerate(values)
-                if not abs(value) <= LARGEST_VALUE
+        for joint in np.flatnonzero(beyond[i, kind]).tolist():
+            yield (
+                f"point {point}: {noun} of joint '{names[joint]}' (index {joint}) is "
+                f"{points.values[point, kind, joint]:.9g}; expected a finite number of at most {LARGEST_VALUE:.0e} "
+                "in size"
             )
+
+
+def _early(times_s: Array, number: int) -> str:
+    return (
+        f"point {number + 1}: time_from_start {times_s[number + 1]:.9g} s does not come after {times_s[number]:.9g} s"
+        f" of point {number}; times must increase strictly"
+    )
