@@ -67,6 +67,22 @@ def test_an_unknown_name_is_answered_with_the_known_ones_and_the_faults(
         index.load("lab_arms/LabArm", RobotHW)
 
 
+@pytest.mark.parametrize(
+    ("tag", "base"), [("hardware_interface", ROBOT_HW_BASE), ("controller_interface", CONTROLLER_BASE)]
+)
+def test_a_cpp_class_is_refused_as_such(lab: Callable[..., PluginIndex], tmp_path: Path, tag: str, base: str) -> None:
+    index = lab(("lab_arms/Cpp", "lab_arms::Cpp", base), module="lib/liblab_arms", base=base)
+    manifest = tmp_path / "package.xml"
+    manifest.write_text(manifest.read_text().replace("modular_framework_control", tag))
+    assert index.names == []
+    with pytest.raises(
+        PluginError, match=r"lab_arms/Cpp is a C\+\+ class \(library lib/liblab_arms, offered by .*p.xml\)"
+    ):
+        index.load("lab_arms/Cpp", RobotHW)
+    with pytest.raises(PluginError, match="no package of this workspace offers"):
+        index.load("lab_arms/Other", RobotHW)
+
+
 def test_a_module_that_was_changed_is_imported_anew_after_a_reload(
     lab: Callable[..., PluginIndex], tmp_path: Path
 ) -> None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -25,6 +25,8 @@ from typing import Any
 from modular_framework_urdf import xml_text
 
 EXPORT_TAG = "modular_framework_control"
+CPP_EXPORT_TAGS = ("hardware_interface", "controller_interface")
+"""Tags under which packages offer C++ classes to ros_control."""
 ROBOT_HW_BASE = "hardware_interface::RobotHW"
 CONTROLLER_BASE = "controller_interface::ControllerBase"
 
@@ -40,7 +42,7 @@ class Plugin:
     Attributes:
         name: what users write, package/Class.
         base: its base class, as in `base_class_type`.
-        module: Python module it is in.
+        module: Python module it is in, or library of a C++ class.
         class_name: its name in that module.
         origin: the description that offers it.
     """
@@ -101,6 +103,7 @@ class PluginIndex:
         """
         plugin = self._plugins().get(name)
         if plugin is None:
+            self._refuse_cpp_class(name, expected)
             faults = f"; faulty descriptions: {'; '.join(self._faults)}" if self._faults else ""
             raise PluginError(
                 f"no package of this workspace offers a {self._base} named {name!r}; known: "
@@ -118,6 +121,19 @@ class PluginIndex:
             )
         return loaded
 
+    def _refuse_cpp_class(self, name: str, expected: type[Any]) -> None:
+        """Raises PluginError if a package offers a C++ class under `name`."""
+        for package, folder in sorted(self._packages().items()):
+            for plugin in self._of_package(package, folder, [], CPP_EXPORT_TAGS):
+                if plugin.name == name:
+                    raise PluginError(
+                        f"{name} is a C++ class (library {plugin.module}, offered by {plugin.origin}), and only Python "
+                        f"classes can be loaded; derive a Python class from {expected.__module__}.{expected.__name__}, "
+                        "as docs/robots.md and docs/contributing.md show, or keep the C++ code in a node of its own "
+                        "that serves the action of its controller, which controllers.yaml of the moveit_config package "
+                        "names"
+                    )
+
     def reload(self) -> None:
         """Makes the next use search again, also for modules that were installed or changed since their import."""
         self._stale |= {plugin.module for plugin in (self._found or {}).values()}
@@ -134,7 +150,7 @@ class PluginIndex:
             found: dict[str, Plugin] = {}
             faults: list[str] = []
             for package, folder in sorted(self._packages().items()):
-                for plugin in self._of_package(package, folder, faults):
+                for plugin in self._of_package(package, folder, faults, (EXPORT_TAG,)):
                     first = found.setdefault(plugin.name, plugin)
                     if first is not plugin:
                         faults.append(f"{plugin.origin}: {plugin.name} is already offered by {first.origin}")
@@ -142,12 +158,15 @@ class PluginIndex:
             return found
         return self._found
 
-    def _of_package(self, package: str, folder: Path, faults: list[str]) -> list[Plugin]:
+    def _of_package(self, package: str, folder: Path, faults: list[str], tags: Sequence[str]) -> list[Plugin]:
         manifest = folder / "package.xml"
-        if not manifest.is_file() or EXPORT_TAG not in manifest.read_text(encoding="utf-8", errors="replace"):
+        if not manifest.is_file():
+            return []
+        text = manifest.read_text(encoding="utf-8", errors="replace")
+        if not any(tag in text for tag in tags):
             return []
         plugins: list[Plugin] = []
-        for path in _descriptions(package, manifest, faults):
+        for path in _descriptions(package, manifest, faults, tags):
             try:
                 plugins += [plugin for plugin in read_description(path) if plugin.base == self._base]
             except PluginError as error:
@@ -155,12 +174,13 @@ class PluginIndex:
         return plugins
 
 
-def _descriptions(package: str, manifest: Path, faults: list[str]) -> list[Path]:
+def _descriptions(package: str, manifest: Path, faults: list[str], tags: Sequence[str]) -> list[Path]:
     try:
-        exports = xml_text.read(manifest).findall(f"export/{EXPORT_TAG}")
+        root = xml_text.read(manifest)
     except xml_text.XmlError as error:
         faults.append(f"{manifest} of package {package}: {error}")
         return []
+    exports = [export for tag in tags for export in root.findall(f"export/{tag}")]
     return [Path(export.get("plugin", "").replace("${prefix}", str(manifest.parent))) for export in exports]
 
 
