@@ -21,8 +21,8 @@ from point_cloud_grasps.ros_transforms import Transforms
 
 Array = npt.NDArray[np.float64]
 
-TRANSFORM_TIMEOUT_S, HELD_TRANSFORM_TIMEOUT_S = 2.0, 0.3
-"""Longest wait for transforms [s of real time]; the second where nodes hold simulated time."""
+TRANSFORM_TIMEOUT_S = 5.0
+"""Longest wait for the transforms of a cloud's time [s of real time]; a fault ends it, also on a busy machine."""
 STANDSTILL_S = 300.0
 """Longest wait for a cloud in real time [s], for a world that is paused, or whose time is held while a camera draws."""
 WARNING_PERIOD_S = 30.0
@@ -104,8 +104,7 @@ class CloudSource:
         return {link: self._transforms.matrix(frame, link, at) for link, at in stamps.items()}
 
     def _stamps(self, frame: str, others: Sequence[str], stamp: rospy.Time) -> dict[str, rospy.Time]:
-        timeout_s = HELD_TRANSFORM_TIMEOUT_S if self._time.enabled else TRANSFORM_TIMEOUT_S
-        return self._transforms.stamps(frame, others, stamp, timeout_s)
+        return self._transforms.stamps(frame, others, stamp, TRANSFORM_TIMEOUT_S)
 
     def _message(self, topic: str, timeout_s: float) -> PointCloud2:
         """Returns the first message that shows the world as it is now, or later.
