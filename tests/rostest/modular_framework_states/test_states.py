@@ -187,10 +187,29 @@ def test_a_false_signal_is_negative_and_its_reason_is_passed_on(monkeypatch) -> 
     assert "nothing there" in state.reason
 
 
+def test_the_timeout_counts_from_when_a_node_that_starts_publishes_the_topic() -> None:
+    state = WaitForSignal("late", timeout=1.0)
+    outcomes: list[str] = []
+    thread = threading.Thread(target=lambda: outcomes.append(run(state)[0]))
+    thread.start()
+    time.sleep(2.0)  # the node that starts takes longer than the timeout
+    publisher = rospy.Publisher("late", Bool, queue_size=1, latch=True)
+    publisher.publish(True)
+    thread.join(30.0)
+    assert outcomes == ["success"]
+
+
 def test_waiting_ends_at_the_timeout_or_when_stopped() -> None:
+    rospy.set_param("/start_timeout", 0.3)
+    state = WaitForSignal("nowhere", timeout=0.2)
+    assert run(state)[0] == "fail"
+    assert "no node publishes topic '/nowhere' after 0.3 s" in state.reason
+    rospy.delete_param("/start_timeout")
+    publisher = rospy.Publisher("silent", Bool, queue_size=1)
     state = WaitForSignal("silent", timeout=0.2)
     assert run(state)[0] == "fail"
-    assert "/silent" in state.reason
+    assert "no signal came on topic '/silent'" in state.reason
+    publisher.unregister()
     endless = WaitForSignal("silent", outcomes=("success", "preempted", "fail"))
     threading.Timer(0.3, endless.request_preempt).start()
     assert run(endless)[0] == "preempted"

@@ -16,6 +16,7 @@ from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
 from modular_framework_ros.calls import CallError, call_service
+from modular_framework_ros.start_up import WaitReport, start_timeout
 
 REASON_WAIT_S = 0.5
 
@@ -28,6 +29,9 @@ class WaitForSignal(FrameworkState):
 
     A latched signal may be left from an earlier task. A component that offers the service ``<topic_name>/renew``
     (std_srvs/Trigger) makes it true again, or answers why it cannot; its answer counts instead of the signal.
+
+    A component that is still starting has the time that every node has for another one at the start, the parameter
+    ``/start_timeout``; `timeout` counts from when it publishes the topic.
 
     Args:
         topic_name: Topic of the signal (std_msgs/Bool).
@@ -49,15 +53,22 @@ class WaitForSignal(FrameworkState):
 
     def execute(self, userdata: Any) -> str:
         """Waits for a signal that was not read yet."""
+        topic = rospy.resolve_name(self._topic)
+        if self._timeout_s is not None and not self._is_published():
+            limit_s = start_timeout()
+            report = WaitReport(f"a publisher of topic '{topic}'", limit_s)
+
+            def is_published() -> bool:
+                report.remind()
+                return self._is_published()
+
+            if not self.wait_until(is_published, limit_s):
+                return self.fail(f"no node publishes topic '{topic}' after {limit_s:g} s, start the one that does")
         if not self.wait_until(lambda: self._signal is not None, self._timeout_s):
             publishers = self._subscribers[0].get_num_connections()
-            hint = (
-                f"the log of its {publishers} publishers says what they wait for"
-                if publishers
-                else "no node publishes it, start the one that does"
-            )
             return self.fail(
-                f"no signal came on topic '{rospy.resolve_name(self._topic)}' within {self._timeout_s} s; {hint}"
+                f"no signal came on topic '{topic}' within {self._timeout_s} s; "
+                f"the log of its {publishers} publishers says what they wait for"
             )
         with self._lock:
             signal, self._signal = self._signal, None
@@ -72,7 +83,11 @@ class WaitForSignal(FrameworkState):
             return self.succeed()
         self.wait_until(lambda: bool(self._explanation), REASON_WAIT_S)
         because = f": {self._explanation}" if self._explanation else ""
-        return self.fail(f"topic '{rospy.resolve_name(self._topic)}' signalled failure{because}")
+        return self.fail(f"topic '{topic}' signalled failure{because}")
+
+    def _is_published(self) -> bool:
+        """Returns whether a node publishes the topic, or has done so."""
+        return self._signal is not None or self._subscribers[0].get_num_connections() > 0
 
     def _on_signal(self, message: Bool) -> None:
         with self._lock:
