@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import time
+import tty
 from collections.abc import Callable
 from pathlib import Path
 
@@ -162,6 +163,21 @@ def test_answers_to_earlier_instructions_are_no_damaged_packets(
     monkeypatch.setattr(dynamixel_line, "answer_bus", lambda servos, instruction: answer_to_a_write)
     with pytest.raises(NoAnswerError, match="does not answer"):
         bus.read(1, mx64.READING)
+
+
+def test_a_port_that_takes_no_bytes_is_not_called_unplugged() -> None:
+    reader, port = os.openpty()
+    tty.setraw(port)
+    os.set_blocking(port, False)
+    with pytest.raises(BlockingIOError):
+        while True:  # nobody reads: until the port is full
+            os.write(port, b"\xff" * 1024)
+    bus = DynamixelBus(os.ttyname(port), 57600)
+    bus.open()
+    with pytest.raises(PortLostError, match="took no bytes for 0.5 s"):
+        bus.read(1, mx64.READING)
+    os.close(port)
+    os.close(reader)
 
 
 def test_another_baud_rate_is_named(line: DynamixelLine) -> None:

@@ -154,6 +154,12 @@ class DynamixelBus:
                 silent += result == COMM_RX_TIMEOUT
                 if silent and result == COMM_SUCCESS:
                     self._discard_late(self._port, silent * (size + 6), sent_s + LATE_S)
+            except serial.SerialTimeoutException as error:
+                self.close()
+                raise PortLostError(
+                    f"port {self._name} took no bytes for {WRITE_TIMEOUT_S:g} s; check the adapter, and what else "
+                    "this computer does"
+                ) from error
             except (OSError, termios.error) as error:
                 self.close()
                 raise PortLostError(f"port {self._name} is gone: {_reason(error)}; check the cable") from error
