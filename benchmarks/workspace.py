@@ -35,7 +35,8 @@ def _enter() -> None:
         os.execv(ROOT / "install.sh", ["install.sh", "exec", *sys.argv])
     sys.path += [str(ROOT / path) for path in SHARED]
     os.environ[MARK] = uuid.uuid4().hex
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell that starts it in the background ignores SIGINT
+        signal.signal(number, signal.default_int_handler)
     os.register_at_fork(after_in_child=lambda: signal.signal(signal.SIGTERM, signal.SIG_DFL))
     atexit.register(_kill_what_is_left, os.getpid(), os.environ[MARK])
 

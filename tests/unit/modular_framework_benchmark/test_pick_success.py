@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.machinery
 import importlib.util
+import sys
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable
@@ -36,6 +37,7 @@ def chosen() -> Callable[..., list[EpisodeSpec]]:
     spec = importlib.util.spec_from_loader(loader.name, loader)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
+    sys.path.append(str(SCRIPT.parent))
     loader.exec_module(module)
     return lambda **options: module.chosen_episodes(Namespace(**DEFAULTS | options))[1]
 

@@ -26,6 +26,7 @@ PULL_N = 60.0
 def benchmark() -> ModuleType:
     """benchmarks/held_objects."""
     path = Path(__file__).resolve().parents[3] / "benchmarks" / "held_objects"
+    sys.path.append(str(path.parent))
     loader = SourceFileLoader("held_objects", str(path))
     spec = importlib.util.spec_from_loader("held_objects", loader)
     assert spec is not None

@@ -207,6 +207,7 @@ def test_sigterm_ends_the_suites_that_run_and_what_they_started(runner: ModuleTy
             runner.main(["unit/steady"])
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     thread.join()
     assert psutil.wait_procs(children, 30.0) == (children, [])
 

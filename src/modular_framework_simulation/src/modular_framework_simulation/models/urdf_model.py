@@ -75,6 +75,7 @@ def read_urdf_model(text: str, source: str, resources: Resources) -> specs.Model
     known = [link.name for link in links] + [specs.WORLD]
     joints = tuple(_read_joint(joint, known, extensions, notes) for joint in joint_nodes)
     _refuse_two_parents(joint_nodes)
+    _refuse_mimic_circles(joint_nodes)
     fastened = all(each.kind is specs.JointType.FIXED for each in joints) and any(j.parent == "world" for j in joints)
     static = fastened or extensions.flag("", "static") is True
     self_collide = extensions.flag("", "self_collide", "selfCollide") is True
@@ -91,6 +92,18 @@ def collision_name(given: str, link: str, number: int) -> str:
         number: Which one of the link it is, from 0.
     """
     return given or (f"{link}_collision_{number}" if number else f"{link}_collision")
+
+
+def _refuse_mimic_circles(joint_nodes: list[XmlNode]) -> None:
+    mimics = {joint.name(): mimic for joint in joint_nodes if (mimic := joint.find("mimic")) is not None}
+    for name, mimic in mimics.items():
+        visited, leader = [name], mimic.attributes.get("joint", "")
+        while leader in mimics and leader not in visited:
+            visited.append(leader)
+            leader = mimics[leader].attributes.get("joint", "")
+        if leader in visited:
+            circle = " -> ".join([*visited, leader])
+            raise DescriptionError(mimic.where, f"joint '{name}' mimics itself ({circle})", "break the circle")
 
 
 def _refuse_two_parents(joints: list[XmlNode]) -> None:
