@@ -67,7 +67,7 @@ def test_curve_is_the_one_a_joint_trajectory_controller_runs() -> None:
         )
         for row in zip(motion.times, motion.positions, motion.velocities, motion.accelerations, strict=True)
     )
-    spline = control.Spline(control.JointTrajectory(JOINTS, points))
+    spline = control.Spline(control.JointTrajectory.of_points(JOINTS, points))
     assert np.allclose(motion.coefficients, spline.coefficients, rtol=1e-6, atol=1e-6)
 
 
