@@ -175,7 +175,7 @@ def test_a_trajectory_controller_moves_it_along_a_curve(line: DynamixelLine, loo
     loop.switch(["swing"], ["grip"])
     goal_handle: TrajectoryGoalHandle = TrajectoryGoalHandle()
     points = (TrajectoryPoint(0.5, (1.2,)), TrajectoryPoint(1.0, (1.7,)))
-    loop.controllers["swing"].submit(TrajectoryGoal(JointTrajectory((JOINT,), points)), goal_handle)
+    loop.controllers["swing"].submit(TrajectoryGoal(JointTrajectory.of_points((JOINT,), points)), goal_handle)
     loop.run(lambda: not goal_handle.open, 10.0)
     loop.switch(["grip"], ["swing"])
     assert goal_handle.status is GoalStatus.SUCCEEDED, goal_handle.text
@@ -216,7 +216,7 @@ def test_fingers_of_which_nothing_is_heard_hold_nothing(line: DynamixelLine, loo
         loop.switch([name], ["grip"])
         goal_handle = TrajectoryGoalHandle()
         points = (TrajectoryPoint(1.2, (1.9,)),)
-        loop.controllers[name].submit(TrajectoryGoal(JointTrajectory((JOINT,), points)), goal_handle)
+        loop.controllers[name].submit(TrajectoryGoal(JointTrajectory.of_points((JOINT,), points)), goal_handle)
     handle = loop.robot_hw.get(PositionJointInterface).get_handle(JOINT)
     loop.run(lambda: handle.position > 1.1)
     line.commands[fault]()
