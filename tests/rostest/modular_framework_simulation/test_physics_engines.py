@@ -86,4 +86,4 @@ def test_an_unknown_engine_ends_the_node_and_the_log_says_what_is_allowed(ros_se
     simulation.stop()
     launch = ros_session.launch(UNKNOWN)
     launch.wait(60.0)
-    assert "physics_engine: got 'ode'; allowed: pybullet, mujoco" in launch.log()
+    assert "physics_engine' is 'ode'; allowed: pybullet, mujoco" in launch.log()
