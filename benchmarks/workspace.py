@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import os
 import signal
 import sys
@@ -43,12 +42,10 @@ def _enter() -> None:
 
 def _kill_what_is_left(benchmark: int, mark: str) -> None:
     """Kills the programs of a benchmark; does nothing in a process that was forked from it."""
-    from modular_framework_core.launching.launch_session import processes_with
+    from modular_framework_core.launching.launch_session import kill_processes_with
 
-    while os.getpid() == benchmark and (left := processes_with(MARK, mark)):
-        for process in left:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
+    if os.getpid() == benchmark:
+        kill_processes_with(MARK, mark)
 
 
 if __name__ != "__main__":

@@ -16,7 +16,13 @@ import rosgraph
 import roslib.packages
 import rospkg
 
-from modular_framework_core.launching.launch_session import Launch, LaunchSession, free_port, processes_with
+from modular_framework_core.launching.launch_session import (
+    Launch,
+    LaunchSession,
+    free_port,
+    kill_processes_with,
+    processes_with,
+)
 
 __all__ = [
     "Launch",
@@ -24,6 +30,7 @@ __all__ = [
     "executable",
     "free_port",
     "hears",
+    "kill_processes_with",
     "processes_with",
     "pytest_runtest_makereport",
     "until",

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import socket
@@ -28,14 +29,52 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def processes_with(variable: str, value: str) -> list[int]:
-    """Returns the other processes that were started with a variable of the environment at a value."""
+def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]:
+    """Returns the other processes that were started with a variable of the environment at a value.
+
+    Args:
+        variable: Name of the variable.
+        value: Its value.
+        prefix: Whether the value may go on after `value`.
+    """
     mark, found = f"{variable}={value}".encode(), []
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # ended meanwhile, or another user's
-            if mark in (folder / "environ").read_bytes().split(b"\0") and int(folder.name) != os.getpid():
+            entries = (folder / "environ").read_bytes().split(b"\0")
+            marked = any(entry.startswith(mark) for entry in entries) if prefix else mark in entries
+            if marked and int(folder.name) != os.getpid():
                 found.append(int(folder.name))
     return found
+
+
+def kill_processes_with(variable: str, value: str, prefix: bool = False, timeout_s: float = math.inf) -> int:
+    """Kills those that `processes_with` returns until there are none: one may start another meanwhile.
+
+    Args:
+        variable: Name of the variable.
+        value: Its value.
+        prefix: Whether the value may go on after `value`.
+        timeout_s: Longest time until they are gone [s].
+
+    Returns:
+        How many there were.
+
+    Raises:
+        TimeoutError: Some are still there.
+    """
+    killed: set[int] = set()
+    end_s = time.monotonic() + timeout_s
+    while left := processes_with(variable, value, prefix):
+        if time.monotonic() > end_s:
+            raise TimeoutError(
+                f"processes {left} with {variable}={value} do not end within {timeout_s:g} s; end them by hand"
+            )
+        for process in left:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        killed.update(left)
+        time.sleep(KILL_POLL_S)
+    return len(killed)
 
 
 class Launch:
@@ -154,11 +193,7 @@ class LaunchSession:
 
     def kill(self) -> None:
         """Kills everything at once: for a stack in simulation, which loses nothing by it. May be called twice."""
-        while processes := self.processes():  # one may start another meanwhile
-            for process in processes:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(process, signal.SIGKILL)
-            time.sleep(KILL_POLL_S)
+        kill_processes_with("ROS_HOME", self.env["ROS_HOME"])
         for launch in self._launches:
             launch.process.wait()
         with contextlib.suppress(OSError):
