@@ -67,7 +67,7 @@ def test_a_parameter_is_required_with_another(tmp_path: Path) -> None:
 
 def test_all_faults_are_named_at_once(tmp_path: Path) -> None:
     with pytest.raises(ParameterError) as caught:
-        reader(tmp_path, rate=-1, mode="idle").values()
+        reader(tmp_path, rate=-1, mode="idle").all()
     for text in ("'/node/rate' is -1", "'/node/mode' is 'idle'", "parameter 'group' is not set; allowed: a text"):
         assert text in str(caught.value)
 

@@ -175,8 +175,12 @@ class ParameterReader:
         """
         return self.values(name)[0]
 
+    def all(self) -> dict[str, Any]:
+        """Returns all declared parameters by name, as `values` does."""
+        return dict(zip(self._declared, self.values(*self._declared), strict=True))
+
     def values(self, *names: str, required: Container[str] = ()) -> list[Any]:
-        """Returns several parameters, all that are declared if none is named, as `value` does.
+        """Returns several parameters, as `value` does.
 
         Args:
             names: As they are declared.
@@ -187,7 +191,7 @@ class ParameterReader:
             KeyError: One is not declared.
         """
         found, faults = [], []
-        for name in names or self._declared:
+        for name in names:
             declared = self._declared[name].beside(self._get)
             declared = replace(declared, required=True) if name in required else declared
             value = self._get(declared.name)

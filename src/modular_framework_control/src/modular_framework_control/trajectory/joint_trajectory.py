@@ -152,8 +152,7 @@ class Spline:
 
     Attributes:
         times_s: time of each point from the start [s], shape (points,).
-        states: what each point gives, missing values 0, shape
-            (points, 3, joints).
+        states: what each point gives, missing values 0, shape (points, 3, joints).
         orders: highest order each point allows: 1, 3 or 5, shape (points,).
         coefficients: of the segment from point i to point i + 1, shape (points - 1, 6, joints).
     """

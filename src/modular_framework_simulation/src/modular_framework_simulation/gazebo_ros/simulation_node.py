@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -63,10 +63,10 @@ _SWITCH_INTERVAL_S = 0.0005
 _STOP_TIMEOUT_S = 5.0
 
 
-def _pacer(read: Callable[[str], Any], requests: RequestQueue) -> Pacer:
+def _pacer(parameters: Mapping[str, Any], requests: RequestQueue) -> Pacer:
     """Returns the pacer; between episodes simulated time leaves the processor to nodes that start or compute."""
-    idle_limit = 1.0 if read("/wait_for_planning") else None
-    return Pacer(read("~real_time_factor"), sleep=requests.serve, idle_limit=idle_limit)
+    idle_limit = 1.0 if parameters["/wait_for_planning"] else None
+    return Pacer(parameters["~real_time_factor"], sleep=requests.serve, idle_limit=idle_limit)
 
 
 def _resources(model_path: str) -> Resources:
@@ -89,7 +89,7 @@ class SimulationNode:
     controllers, `RosControllerManager`.
 
     Args:
-        read: Reads a parameter.
+        parameters: The declared parameters by name.
 
     Raises:
         SimulationError: The world or the robot cannot be built.
@@ -97,64 +97,64 @@ class SimulationNode:
         ParameterError: A joint limit parameter has a wrong type.
     """
 
-    def __init__(self, read: Callable[[str], Any]) -> None:
-        self._resources = _resources(read("/gazebo_model_path"))
-        self._settings = PhysicsSettings(round(read("~time_step") * 1e9))
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        self._resources = _resources(parameters["/gazebo_model_path"])
+        self._settings = PhysicsSettings(round(parameters["~time_step"] * 1e9))
         self._parts = ConvexParts(default_cache_folder(), rospy.loginfo)
-        self._world = self._build_world(read)
+        self._world = self._build_world(parameters)
         self._controllers: RosControllerManager | None = None
-        actors = self._build_robot(read)
+        actors = self._build_robot(parameters)
         self._clock = ClockTopic(self._world)
-        self._topics = WorldTopics(self._world) if read("~enable_ros_network") else None
+        self._topics = WorldTopics(self._world) if parameters["~enable_ros_network"] else None
         requests = RequestQueue()
         self._loop = SimulationLoop(
             self._world,
-            _pacer(read, requests),
+            _pacer(parameters, requests),
             requests,
             actors,
             self._on_paused_tick,
             TimeHolds(rospy.logwarn),
         )
-        if read("~paused"):
+        if parameters["~paused"]:
             self._loop.pause()
         self._visible = VisibleSceneTopics(self._world, lambda: self._loop.paused) if self._topics else None
         self._services = GazeboServices(self._loop, self._resources)
         self._scene = PlanningScenePublisher()
-        digest = WorldDigest(self._world, actors.robot if actors else None) if read("~state_digest") else None
+        digest = WorldDigest(self._world, actors.robot if actors else None) if parameters["~state_digest"] else None
         self._time_services = TimeServices(
             self._loop,
             self._scene,
             self._snapshot,
-            read("/wait_for_planning"),
+            parameters["/wait_for_planning"],
             digest,
             self._services.refresh,
         )
-        self._sensors, self._cameras = self._build_sensors(read, actors)
-        self._add_hooks(read("~pub_clock_frequency"))
+        self._sensors, self._cameras = self._build_sensors(parameters, actors)
+        self._add_hooks(parameters["~pub_clock_frequency"])
         self._thread = threading.Thread(target=self._run_loop, name="simulation loop", daemon=True)
         self._failed = False
 
-    def _build_world(self, read: Callable[[str], Any]) -> PhysicsWorld:
+    def _build_world(self, parameters: Mapping[str, Any]) -> PhysicsWorld:
         spec = sdf_specs.World("empty", STANDARD_GRAVITY, (), ())
-        if read("~world_file"):
+        if parameters["~world_file"]:
             own_worlds = Path(rospkg.RosPack().get_path(_PACKAGE))
-            file = find_world_file(read("~world_file"), (*self._resources.resource_folders, own_worlds))
+            file = find_world_file(parameters["~world_file"], (*self._resources.resource_folders, own_worlds))
             spec = read_world(file, self._resources)
             if spec.ignored:
                 rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))
-        engine = read("~physics_engine")
+        engine = parameters["~physics_engine"]
         world = PhysicsWorld(
             self._settings,
             self._parts,
             spec.gravity,
-            read("~gui"),
+            parameters["~gui"],
             rospy.logwarn,
             engine,
-            read("~weld_grasps"),
+            parameters["~weld_grasps"],
         )
-        if read("~weld_grasps"):
+        if parameters["~weld_grasps"]:
             rospy.logwarn("~weld_grasps is true: what a gripper holds is fastened to it, and cannot slip")
-        if read("~gui_required") and not world.engine.has_window:
+        if parameters["~gui_required"] and not world.engine.has_window:
             raise SimulationError("~gui_required is true and there is no window; set it to false to run without one")
         for model in spec.models:
             world.spawn(model, keep=True)
@@ -162,18 +162,18 @@ class SimulationNode:
         rospy.loginfo("world '%s' with %d models, physics engine %s: %s", spec.name, len(spec.models), engine, names)
         return world
 
-    def _build_robot(self, read: Callable[[str], Any]) -> Actors | None:
-        if not read("/robot_description"):
+    def _build_robot(self, parameters: Mapping[str, Any]) -> Actors | None:
+        if not parameters["/robot_description"]:
             rospy.logwarn("no parameter robot_description: the world has no robot")
             return None
         description = read_robot(
-            read("/robot_description"),
+            parameters["/robot_description"],
             self._resources.find_package,
             self._parts,
             self._world.engine.has_window,
         )
-        name = read("~robot_name") or description.name
-        positions = description.initial_positions | parse_starting_pose(read("~starting_pose"))
+        name = parameters["~robot_name"] or description.name
+        positions = description.initial_positions | parse_starting_pose(parameters["~starting_pose"])
         robot = RobotBody(self._world, description, name, Pose(), positions)
         hardware = SimulatedRobotHW(robot)
         handle = RosNodeHandle("/")
@@ -181,8 +181,10 @@ class SimulationNode:
         self._controllers = RosControllerManager(hardware)
         return Actors(robot, hardware, self._controllers)
 
-    def _build_sensors(self, read: Callable[[str], Any], actors: Actors | None) -> tuple[SensorTopics, CameraProcess]:
-        description = read("/robot_description")
+    def _build_sensors(
+        self, parameters: Mapping[str, Any], actors: Actors | None
+    ) -> tuple[SensorTopics, CameraProcess]:
+        description = parameters["/robot_description"]
         robot, find_package, seed = actors.robot if actors else None, self._resources.find_package, noise_seed()
         robots = [read_robot_sensors(description, robot.body.name, find_package, seed)] if robot else []
 
@@ -190,7 +192,9 @@ class SimulationNode:
             seen = {robot.body.name: read_robot_visuals(description, find_package, rospy.logwarn)} if robot else {}
             return SceneTracker(self._world, seen)
 
-        cameras = CameraProcess(make_tracker, configured_cameras(read("~sensors"), robot, seed), read("~renderer"))
+        cameras = CameraProcess(
+            make_tracker, configured_cameras(parameters["~sensors"], robot, seed), parameters["~renderer"]
+        )
         return SensorTopics(self._world, robots, seed, cameras.set_cameras), cameras
 
     def _add_hooks(self, clock_rate_hz: float) -> None:
@@ -311,13 +315,12 @@ def main() -> int:
     init_node()
     widen_backlog()
     try:
-        parameters = DeclaredParameters(_PACKAGE, "simulation")
-        parameters.values()
-        if parameters.value("~verbose"):
+        parameters = DeclaredParameters(_PACKAGE, "simulation").all()
+        if parameters["~verbose"]:
             logging.getLogger("rosout").setLevel(logging.DEBUG)
-        if parameters.value("~unsupported"):
-            rospy.logwarn("without effect in this simulation: %s", parameters.value("~unsupported"))
-        node = SimulationNode(parameters.value)
+        if parameters["~unsupported"]:
+            rospy.logwarn("without effect in this simulation: %s", parameters["~unsupported"])
+        node = SimulationNode(parameters)
     except (SimulationError, HardwareInterfaceError, ParameterError, ValueError) as error:
         rospy.logfatal("the simulation cannot start: %s", error)
         return 1
