@@ -6,6 +6,8 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
+import subprocess
+import sys
 import threading
 import tracemalloc
 from collections.abc import Callable
@@ -194,6 +196,29 @@ def test_where_the_loop_itself_may_not_be_urgent_nothing_else_is(monkeypatch: py
     monkeypatch.setattr(os, "sched_setscheduler", schedule)
     permit_locking(monkeypatch)
     assert len(scheduling.run_in_real_time()) == 1 and given == {}
+
+
+LEAVES_REAL_TIME = """
+import os, threading
+from modular_framework_control.realtime.scheduling import leave_real_time, run_in_real_time
+end = threading.Event()
+threading.Thread(target=end.wait).start()
+def policies():
+    return sorted({os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task")})
+run_in_real_time()
+print(*policies())
+leave_real_time()
+print(*policies())
+end.set()
+"""
+
+
+def test_a_process_that_ends_leaves_real_time_with_all_its_threads() -> None:
+    printed = subprocess.run([sys.executable, "-c", LEAVES_REAL_TIME], stdout=subprocess.PIPE, text=True, check=True)
+    before, after = printed.stdout.splitlines()
+    if before != str(os.SCHED_FIFO):
+        pytest.skip("the system does not permit real-time scheduling")
+    assert after == str(os.SCHED_OTHER)
 
 
 def test_ten_thousand_cycles_with_moving_controllers_use_up_no_memory(make_loop: Callable[..., Any]) -> None:

@@ -83,6 +83,13 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
     return refused
 
 
+def leave_real_time() -> None:
+    """Gives all threads of this process ordinary scheduling, once nothing moves: to end takes much processor time."""
+    for thread in map(int, os.listdir("/proc/self/task")):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
+
+
 def keep_processors_awake(latency_device: str = LATENCY_DEVICE) -> list[str]:
     """Keeps idle processors from sleep states that take long to leave, while this process lives (it costs power).
 

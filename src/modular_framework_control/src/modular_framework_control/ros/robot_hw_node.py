@@ -20,6 +20,7 @@ from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.realtime.scheduling import (
     keep_processors_awake,
     keeping_the_interpreter,
+    leave_real_time,
     prepare_interpreter,
     run_in_real_time,
 )
@@ -124,8 +125,9 @@ class RobotHwNode:
         return self._manager.manager.fault, self._robot_hw.warning()
 
     def close(self) -> None:
-        """Closes the hardware; may be called twice."""
+        """Closes the hardware, and ends real-time scheduling; may be called twice."""
         self._robot_hw.close()
+        leave_real_time()
         self._report.close()
 
     def run(self) -> bool:
