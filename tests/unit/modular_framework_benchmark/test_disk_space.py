@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The disk that records take is said beforehand, is limited, and can be freed without losing results."""
+"""The dry run estimates the disk that records take; a limit holds, and space is freed without losing results."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_prune_deletes_files_only_when_it_is_told_to_and_keeps_the_results(
+def test_prune_deletes_files_only_with_its_option_and_keeps_the_results(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, (succeeded, failed) = filled(tmp_path)

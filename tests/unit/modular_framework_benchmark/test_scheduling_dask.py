@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import io
 import os
-import signal
-import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,41 +12,23 @@ from pathlib import Path
 import distributed
 import fake_runners
 import pytest
+from dask_cluster import LosingRunner, running_cluster, wait_until_none
 from experiment_texts import PICK, read
 
 from modular_framework_benchmark.experiments.design import digest_of, lay_out
-from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.scheduling import dask_pool
 from modular_framework_benchmark.scheduling.dask_pool import DaskPool
 from modular_framework_benchmark.scheduling.experiment_run import ExperimentRun, RunEnd
 from modular_framework_benchmark.scheduling.local_pool import SchedulerError
-from modular_framework_benchmark.scheduling.marked_processes import marked_processes
 from modular_framework_benchmark.scheduling.progress import Progress
 
 SMALL = PICK.replace("trials: 6", "trials: 2").replace("planner: [RRTConnect, PRM]", "planner: [RRTConnect]")
 
 
-class LosingRunner(fake_runners.QuickRunner):
-    """Kills the Dask worker that it belongs to in the first try of episode 3."""
-
-    def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
-        tries = Path(os.environ["FAKE_TRIES"])
-        with tries.open("a", encoding="utf-8") as stream:
-            stream.write(f"{spec.number}\n")
-        if spec.number == 3 and tries.read_text().split().count("3") == 1:
-            os.kill(os.getppid(), signal.SIGKILL)
-            time.sleep(60)  # it is ended with its worker
-        return super().run(spec, folder)
-
-
 @pytest.fixture
 def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[distributed.LocalCluster]:
-    monkeypatch.setenv("FAKE_TRIES", str(tmp_path / "tries"))
-    monkeypatch.setenv("FAKE_RUNS", str(tmp_path / "runs"))
-    with distributed.LocalCluster(  # type: ignore[no-untyped-call]
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, local_directory=str(tmp_path)
-    ) as cluster:
+    with running_cluster(tmp_path, monkeypatch) as cluster:
         yield cluster
 
 
@@ -84,11 +64,3 @@ def test_an_address_without_a_scheduler_is_refused_with_what_to_start(
     monkeypatch.setattr(dask_pool, "CONNECT_TIMEOUT_S", 0.5)
     with pytest.raises(SchedulerError, match=r"answers at tcp://127.0.0.1:9 .*start one with 'dask scheduler'"):
         DaskPool("tcp://127.0.0.1:9", fake_runners.QuickRunner, "none", tmp_path)
-
-
-def wait_until_none(mark: str) -> None:
-    """Waits until no process of a run is left."""
-    end = time.monotonic() + 20
-    while marked_processes(mark):
-        assert time.monotonic() < end, "a run leaves no process behind"
-        time.sleep(0.1)

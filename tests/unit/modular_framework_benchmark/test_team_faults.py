@@ -11,10 +11,10 @@ from pathlib import Path
 
 import distributed
 import pytest
+from dask_cluster import LosingRunner, running_cluster, wait_until_none
 from experiment_texts import PICK, read
 from postgresql_server import Network, require_server, running_server
 from sqlalchemy import create_engine, text
-from test_scheduling_dask import LosingRunner, wait_until_none
 
 from modular_framework_benchmark.experiments.design import digest_of, lay_out
 from modular_framework_benchmark.records.episode import EpisodeRecord
@@ -52,11 +52,7 @@ class FaultyProgress(Progress):
 def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[distributed.LocalCluster]:
     monkeypatch.chdir(tmp_path)  # the folders of episodes are relative to the working folder
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros_home"))
-    monkeypatch.setenv("FAKE_TRIES", str(tmp_path / "tries"))
-    monkeypatch.setenv("FAKE_RUNS", str(tmp_path / "runs"))
-    with distributed.LocalCluster(  # type: ignore[no-untyped-call]
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, local_directory=str(tmp_path)
-    ) as cluster:
+    with running_cluster(tmp_path, monkeypatch) as cluster:
         yield cluster
 
 

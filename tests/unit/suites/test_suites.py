@@ -192,11 +192,12 @@ def test_sigterm_ends_the_suites_that_run_and_what_they_started(runner: ModuleTy
         "    time.sleep(600)\n"
     )
 
+    from ros_session import until  # beside the script, like the other modules that it imports
+
     children: list[psutil.Process] = []
 
     def terminate() -> None:
-        while not started.exists() or not started.read_text().endswith(" "):
-            time.sleep(0.01)
+        until(lambda: started.exists() and started.read_text().endswith(" "), "the suite has started its program")
         children.append(psutil.Process(int(started.read_text())))
         os.kill(os.getpid(), signal.SIGTERM)
 
