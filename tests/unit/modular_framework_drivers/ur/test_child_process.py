@@ -4,13 +4,18 @@
 from __future__ import annotations
 
 import os
+import socket
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from modular_framework_drivers.ur.arm_messages import ALIVE, FAILED, MESSAGE_SIZE
 from modular_framework_drivers.ur.child_process import ChildProcess
+from modular_framework_drivers.ur.delay_watch import PORT
 
 TELLER = """
 import os
@@ -48,3 +53,25 @@ def test_it_begins_with_ordinary_scheduling_though_its_starter_runs_in_real_time
     started[0].end()
     with pytest.raises(ProcessLookupError):
         os.kill(int(number), 0)
+
+
+def test_the_reason_of_an_end_comes_although_the_control_loop_is_late() -> None:
+    address = f"127.45.{os.getpid() % 250}.7"
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours, socket.create_server((address, PORT)) as arm:
+        arm.settimeout(30.0)
+        with theirs:
+            theirs.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                while True:  # what the control loop has not read yet
+                    theirs.send(ALIVE)
+            module = [sys.executable, "-m", "modular_framework_drivers.ur.rtde_process", "state", str(theirs.fileno())]
+            process = subprocess.Popen([*module, address], pass_fds=[theirs.fileno()])
+        arm.accept()[0].close()
+        time.sleep(0.3)  # the process notices it, and has no room for its last message
+        ours.settimeout(20.0)
+        messages = [ours.recv(MESSAGE_SIZE)]
+        while messages[-1][:1] not in (FAILED, b""):
+            messages.append(ours.recv(MESSAGE_SIZE))
+    assert process.wait(20.0) == 1
+    assert messages[-1].startswith(FAILED + f"Could not connect to {address}:{PORT}".encode())

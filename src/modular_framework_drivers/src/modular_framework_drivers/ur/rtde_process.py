@@ -39,6 +39,7 @@ from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
 _PRIORITY = 60  # the control loop has 80
 _POLL_PERIOD_S = 0.002
 _ALIVE_PERIOD_S = 0.02
+_LAST_WORDS_S = 1.0  # for the reason of the end to find room
 _STOP_DECELERATION = 10.0  # at the end of a connection [rad/s^2]
 _VARIABLES = [
     "timestamp",
@@ -214,10 +215,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             text = str(error).strip() or type(error).__name__
             if "Failed to start control script" in text:  # ur-rtde gives this reason for some arms only
                 text += "; is the arm in remote control?"
-            try:
-                _send(channel, FAILED + text.encode()[: MESSAGE_SIZE - 1])
-            except OSError:
-                return 1
+            channel.settimeout(_LAST_WORDS_S)  # the socket may be full of states of a control loop that is late
+            with contextlib.suppress(OSError):
+                channel.send(FAILED + text.encode()[: MESSAGE_SIZE - 1])
             return 1
     return 0
 
