@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modular_framework_drivers.ur import rtde_process
 from modular_framework_drivers.ur.arm_messages import ArmState
 from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
 
@@ -19,6 +21,44 @@ STATE = ArmState(100.0, 5.0, SIX, SIX, SIX, SIX, 1.0, 1.0, 7, 1, 2)
 
 def next_state(**changes: object) -> ArmState:
     return replace(STATE, **{"received_s": 100.008, "timestamp_s": 5.008, **changes})  # type: ignore[arg-type]
+
+
+class ReplacedState:
+    """What ur-rtde holds of an arm; the next state arrives after the getter `arrives_after` was called."""
+
+    def __init__(self, arrives_after: str) -> None:
+        self._arrives_after, self._states = arrives_after, [STATE, next_state(safety_mode=3)]
+
+    def __getattr__(self, name: str) -> Callable[[], object]:
+        fields = {
+            "getTimestamp": "timestamp_s",
+            "getActualQ": "positions",
+            "getActualQd": "velocities",
+            "getActualCurrent": "currents",
+            "getActualTCPForce": "wrench",
+            "getTargetSpeedFraction": "speed_fraction",
+            "getSpeedScaling": "speed_scaling",
+            "getRobotMode": "robot_mode",
+            "getSafetyMode": "safety_mode",
+            "getRuntimeState": "runtime_state",
+        }
+        value = getattr(self._states[0], fields[name])
+        if name == self._arrives_after:
+            self._states = self._states[-1:]
+        return lambda: value
+
+
+@pytest.mark.parametrize("getter", ["getTimestamp", "getRobotMode", "getSafetyMode"])
+def test_a_state_that_is_replaced_while_it_is_read_is_read_again(getter: str) -> None:
+    arm = ReplacedState(getter)
+    assert rtde_process.read_new_state(arm, 100.0, 0.0) is None
+    assert rtde_process.read_new_state(arm, 100.008, 0.0) == next_state(safety_mode=3)
+
+
+def test_a_state_is_read_once() -> None:
+    arm = ReplacedState("")
+    assert rtde_process.read_new_state(arm, 100.0, 0.0) == STATE
+    assert rtde_process.read_new_state(arm, 100.0, STATE.timestamp_s) is None
 
 
 def test_silence_is_the_time_since_something_was_heard_for_who_listens_all_the_time() -> None:

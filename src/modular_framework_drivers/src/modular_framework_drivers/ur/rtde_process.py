@@ -79,17 +79,17 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
     last_timestamp_s, last_sent_s = float("nan"), 0.0
     silence = SilenceWatch(time.monotonic())
     while True:
-        now_s, timestamp_s, heard = time.monotonic(), arm.getTimestamp(), False
-        if timestamp_s != last_timestamp_s:
-            last_timestamp_s = timestamp_s
-            state = _state_of(arm, now_s, timestamp_s)
+        now_s, heard = time.monotonic(), False
+        state = read_new_state(arm, now_s, last_timestamp_s)
+        if state is not None:
+            last_timestamp_s = state.timestamp_s
             heard = is_plausible(state, last)
             damaged = 0 if heard else damaged + 1
             if heard and (last is None or state.modes != last.modes):  # a flipped bit makes another valid mode of one
                 heard, modes = state.modes == modes, state.modes
             if heard:
                 last, last_sent_s = state, now_s
-                _send(channel, replace(state, late_s=delay.update(now_s - timestamp_s)).packed())
+                _send(channel, replace(state, late_s=delay.update(now_s - state.timestamp_s)).packed())
         if not heard and not arm.isConnected():
             raise ConnectionEndedError("the arm closed the connection")
         if silence.update(now_s, heard) > options.timeout:
@@ -102,9 +102,21 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
         time.sleep(_POLL_PERIOD_S)
 
 
-def _state_of(arm: Any, now_s: float, timestamp_s: float) -> ArmState:
-    """Returns the state that ur-rtde received last."""
-    return ArmState(
+def read_new_state(arm: Any, now_s: float, last_timestamp_s: float) -> ArmState | None:
+    """Returns the state that ur-rtde received last.
+
+    Args:
+        arm: RTDEReceiveInterface of the arm.
+        now_s: time of reception to note, on the monotonic clock [s].
+        last_timestamp_s: timestamp of the state that was read before [s].
+
+    Returns:
+        The state; None if it was read before, or if the next state arrived while it was read.
+    """
+    timestamp_s = arm.getTimestamp()
+    if timestamp_s == last_timestamp_s:
+        return None
+    state = ArmState(
         now_s,
         timestamp_s,
         tuple(arm.getActualQ()),
@@ -117,6 +129,7 @@ def _state_of(arm: Any, now_s: float, timestamp_s: float) -> ArmState:
         arm.getSafetyMode(),
         arm.getRuntimeState(),
     )
+    return state if arm.getTimestamp() == timestamp_s else None
 
 
 def _send(channel: socket.socket, message: bytes) -> None:
