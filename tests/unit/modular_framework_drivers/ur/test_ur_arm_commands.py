@@ -18,7 +18,7 @@ from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 PERIOD_S = 0.008
-RUNNING, NORMAL, PLAYING, PAUSED = 7, 1, 2, 4
+RUNNING, NORMAL, STOPPED, PLAYING, PAUSED = 7, 1, 1, 2, 4
 ZEROS = (0.0,) * 6
 
 
@@ -31,7 +31,8 @@ class FakeLink:
         del settings
         FakeLink.made = self
         self.lost = self.program_failure = ""
-        self.program_failed_s = 0.0
+        self.program_failed_s = self.program_ready_s = 0.0
+        self.start_step = ""
         self.commanding = True
         self.positions: Sequence[float] = ZEROS
         self.velocities: tuple[float, ...] = ZEROS
@@ -62,6 +63,9 @@ class FakeLink:
     def connect(self) -> None: ...
 
     def request_program(self) -> None: ...
+
+    def drop_program(self, reason: str) -> None:
+        self.commanding, self.program_failure = False, reason
 
     def poll(self) -> None: ...
 
@@ -132,6 +136,17 @@ def test_a_cycle_that_comes_late_is_caught_up_with_as_fast_as_the_arm_may(hw: Ur
     way = np.array(link.sent)
     assert np.abs(np.diff(way, axis=0)).max() <= np.pi * PERIOD_S * 1.001
     assert way.max() <= 0.45 + 1e-3 and way[-1] == pytest.approx([0.45] * 6)
+
+
+def test_a_program_that_ends_before_the_arm_follows_is_reported(hw: UrArmHardware) -> None:
+    link = FakeLink.made
+    link.runtime_state, link.program_ready_s = STOPPED, time.monotonic()
+    hw.read(0.0, PERIOD_S)
+    assert link.commanding, "the state may be older than the program"
+    link.program_ready_s -= 2.0
+    hw.read(0.0, PERIOD_S)
+    assert not link.commanding
+    assert hw.fault() == "the arm at nowhere takes no commands: the program on the arm was stopped; call resume"
 
 
 class FakeProcess:
@@ -284,6 +299,19 @@ def test_a_link_that_is_lost_before_the_arm_ever_followed_needs_nobody_to_resume
     FakeProcess.mute = ""
     until(link, lambda: link.commanding)
     assert link.program_failure == ""
+
+
+def test_an_upload_that_hangs_before_the_arm_ever_followed_is_tried_again(
+    link: RtdeLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rtde_link, "START_TIMEOUT_S", 0.2)
+    FakeProcess.mute = "control"
+    link.connect()
+    link.request_program()
+    until(link, lambda: len(FakeProcess.started) == 3)
+    assert [process.ended for process in FakeProcess.started] == [False, True, False] and link.program_failure == ""
+    FakeProcess.mute = ""
+    until(link, lambda: link.commanding)
 
 
 def test_a_link_that_is_lost_afterwards_does(link: RtdeLink) -> None:

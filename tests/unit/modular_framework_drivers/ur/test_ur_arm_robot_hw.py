@@ -28,7 +28,7 @@ from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 from modular_framework_ros.node_handle import MappingNodeHandle
 
 PERIOD_S = 0.008
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0  # longer than an upload that hangs and the next one
 
 
 class Rig:

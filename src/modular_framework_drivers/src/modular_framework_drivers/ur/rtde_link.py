@@ -27,10 +27,10 @@ from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, robot_fault
 from modular_framework_drivers.ur.child_process import ChildProcess
 from modular_framework_drivers.ur.state_watch import SilenceWatch
 
+START_TIMEOUT_S = 30.0  # for a process to start; a busy computer takes its time
 LOGGER = logging.getLogger("rosout.ur_arm")
 _MODULE = "modular_framework_drivers.ur.rtde_process"
 _KEEPER_PERIOD_S = 0.02
-_START_TIMEOUT_S = 30.0  # for a process to start; a busy computer takes its time
 _CONNECT_TIMEOUT_S = 5.0  # from then to the first state
 _PROGRAM_TIMEOUT_S = 15.0  # from then until the program is uploaded and runs
 _SILENCE_TIMEOUT_S = 0.5  # a process that sends nothing for so long counts as failed
@@ -73,22 +73,23 @@ class _RtdeProcess:
     Attributes:
         process: the process.
         working: whether it has sent a state, or is ready for commands.
+        connecting: whether it has started.
         failed: whether it must be replaced.
         silence: for how long an expected message has not come.
         awaits_message: whether one is expected.
     """
 
-    __slots__ = ("process", "working", "failed", "silence", "awaits_message", "_patience_s", "_since_s")
+    __slots__ = ("process", "connecting", "working", "failed", "silence", "awaits_message", "_patience_s", "_since_s")
 
     def __init__(self, process: ChildProcess, now_s: float) -> None:
         self.process = process
-        self.working = self.failed = self.awaits_message = False
+        self.connecting = self.working = self.failed = self.awaits_message = False
         self.silence = SilenceWatch(now_s)
-        self._since_s, self._patience_s = now_s, _START_TIMEOUT_S
+        self._since_s, self._patience_s = now_s, START_TIMEOUT_S
 
     def connects(self, now_s: float, patience_s: float) -> None:
         """Notes that it has started, and has `patience_s` [s] from now on to connect."""
-        self._since_s, self._patience_s = now_s, patience_s
+        self.connecting, self._since_s, self._patience_s = True, now_s, patience_s
 
     def too_late(self, now_s: float) -> str:
         """Returns by when it should have connected, if that is over; else ""."""
@@ -119,6 +120,7 @@ class RtdeLink:
         self.commanding = False
         self.program_failure = ""
         self.program_failed_s = 0.0
+        self.program_ready_s = 0.0
 
     def connect(self) -> None:
         """Begins to connect, and connects again until `close`; returns at once."""
@@ -139,6 +141,16 @@ class RtdeLink:
             control.failed, self.commanding = True, False
         self.program_failure = ""
         self._program_wanted = True
+
+    @property
+    def start_step(self) -> str:
+        """What the arm still needs before it takes commands."""
+        control = self._control
+        if control is None:
+            return "the process that commands it is to be started"
+        if self.commanding:
+            return "its program has been uploaded and does not run yet"
+        return "its program is being uploaded" if control.connecting else "the process that commands it starts"
 
     def drop_program(self, reason: str) -> None:
         """Stops commanding until the next `request_program`."""
@@ -211,6 +223,7 @@ class RtdeLink:
             elif message == READY:
                 control.working = True
                 self.commanding = self._program_wanted and not control.failed and not self.lost
+                self.program_ready_s = now_s
                 self._has_commanded |= self.commanding
             elif message[:1] == FAILED and not control.failed:
                 self.drop_program(message[1:].decode(errors="replace"))
@@ -267,7 +280,12 @@ class RtdeLink:
             self._control, control.failed = None, True
             control.process.end(_FINAL_STOP_S)
         elif late := control.too_late(now_s):
-            self.drop_program(f"the program was not accepted {late}")
+            reason = f"the program was not accepted {late}"
+            if self._has_commanded:
+                self.drop_program(reason)
+            else:  # nothing has moved yet, so no `resume` is needed
+                LOGGER.error("arm at %s: %s; it is uploaded again", self._settings.address, reason)
+                control.failed = True
 
     def _control_arguments(self) -> list[str]:
         settings, wanted = self._settings, self._settings.speed_scale

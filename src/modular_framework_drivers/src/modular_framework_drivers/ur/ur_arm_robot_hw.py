@@ -41,6 +41,7 @@ _SHORTEST_PERIOD_S = 0.002
 _LONGEST_PERIOD_S = 0.05  # a longer one is not made up for at once
 _STALE_S = 0.025  # three cycles of a CB3 controller
 _LATE_S = 0.04  # a state that was under way for so long is worth a warning [s]
+_FIRST_CYCLE_S = 1.0  # from the upload of a program to a state in which it runs [s]
 _CAUSE_S = 0.03  # by which the state that explains the end of the program may come after it [s]
 
 
@@ -143,10 +144,13 @@ class UrArmHardware(RobotHW):
 
     def _stop_with_the_program(self, state: ArmState | None) -> None:
         """Stops commanding after the program has ended, for any reason, until `resume` is called."""
-        if self._link is None or not self._link.commanding or not self._following:
+        if self._link is None or not self._link.commanding:
             return
+        starting = not self._following and (
+            state is None or state.received_s < self._link.program_ready_s + _FIRST_CYCLE_S
+        )
         fault = self._robot_fault.partition(";")[0]
-        if fault or not self._program_runs(state):
+        if not starting and (fault or not self._program_runs(state)):
             self._link.drop_program(fault or "the program on the arm was stopped")
 
     def _program_runs(self, state: ArmState | None) -> bool:
@@ -235,7 +239,7 @@ class UrArmHardware(RobotHW):
             return ""
         if link.program_failure:
             return "" if self._cause_may_follow(link) else self._program_failure(link)
-        return f"the arm at {self.address} is being made ready for commands"
+        return f"the arm at {self.address} is being made ready for commands: {link.start_step}"
 
     def _program_failure(self, link: RtdeLink) -> str:
         return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
