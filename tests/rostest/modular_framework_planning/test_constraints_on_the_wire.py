@@ -14,12 +14,20 @@ from moveit_msgs.msg import (
     JointConstraint,
     MoveItErrorCodes,
     OrientationConstraint,
+    PlanningSceneComponents,
     PositionConstraint,
     PositionIKRequest,
     RobotState,
     VisibilityConstraint,
 )
-from moveit_msgs.srv import GetPositionFK, GetPositionIK, GetStateValidity
+from moveit_msgs.srv import (
+    GetCartesianPath,
+    GetCartesianPathRequest,
+    GetPlanningScene,
+    GetPositionFK,
+    GetPositionIK,
+    GetStateValidity,
+)
 from planning_wire import (
     ARM,
     DOWN,
@@ -32,6 +40,7 @@ from planning_wire import (
     call,
     hold,
     plan,
+    pose_constraints,
     report_of,
     request,
     table,
@@ -190,11 +199,6 @@ OLD_KIND = in_box(
             "weight",
         ),
         (
-            Constraints(orientation_constraints=[turned(0.1, 0.1, 0.1, orientation=Quaternion(0, 0, 0, 0.5))]),
-            CODES.INVALID_GOAL_CONSTRAINTS,
-            "length 0.5",
-        ),
-        (
             Constraints(orientation_constraints=[turned(NAN, 0.1, 0.1)]),
             CODES.INVALID_GOAL_CONSTRAINTS,
             "absolute_x_axis",
@@ -342,6 +346,53 @@ def test_an_orientation_that_was_not_filled_in_is_the_identity() -> None:
         for item in regions
     ]
     assert results[0] == results[1] and np.isfinite(results[0].distance)
+
+
+@pytest.mark.parametrize("length", [2.0, 1e-4])
+def test_orientations_of_any_length_are_normalised(length: float) -> None:
+    tilted = Rotation.from_rotvec([0.0, 0.2, 0.0]) * Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
+    long = Quaternion(*(length * tilted.as_quat()))
+
+    def is_tilted(values: list[float]) -> bool:
+        position, rotation = pose_at(values)
+        turn = (rotation.inv() * tilted).magnitude()
+        return bool(np.abs(position - (0.1, 0.5, 0.95)).max() < 2e-3 and turn < 2e-3)
+
+    code, values = solve(ik(pose_stamped=PoseStamped(Header(frame_id="world"), Pose(Point(0.1, 0.5, 0.95), long))))
+    assert code == OK and is_tilted(values)
+    kept = turned(0.02, 0.02, 9.0, orientation=Quaternion(length, 0.0, 0.0, 0.0))
+    path = Constraints(orientation_constraints=[turned(0.5, 0.5, 9.0, orientation=long)])
+    assert solve(ik(constraints=Constraints(orientation_constraints=[kept])))[0] == OK
+    answer = plan(request(pose_constraints(0.1, 0.5, 0.95, long), path_constraints=path))
+    assert answer.error_code.val == OK and is_tilted(end_of(answer))
+    state = RobotState(joint_state=JointState(name=ARM, position=START), is_diff=True)
+    home, level = tip_pose(START), Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
+    lines = call(
+        "compute_cartesian_path",
+        GetCartesianPath,
+        GetCartesianPathRequest(
+            header=Header(frame_id="world"),
+            start_state=state,
+            group_name=GROUP,
+            waypoints=[Pose(home.position, long)],
+            max_step=0.01,
+            avoid_collisions=True,
+        ),
+    )
+    assert lines.error_code.val == OK and lines.fraction == 1.0
+    tilt_at_end = pose_at(lines.solution.joint_trajectory.points[-1].positions)[1]
+    assert (tilt_at_end.inv() * tilted).magnitude() < 1e-3 < (level.inv() * tilted).magnitude()
+    item = box("crate", 0.0, 0.0, 0.3, (0.1, 0.1, 0.1))
+    item.pose.orientation = item.primitive_poses[0].orientation = long
+    assert add(item)
+    held = box("held", 0.0, 0.0, 0.1, (0.04, 0.04, 0.04))
+    held.pose.orientation = long
+    hold(held)
+    scene = call("get_planning_scene", GetPlanningScene, PlanningSceneComponents(1023)).scene
+    attached = scene.robot_state.attached_collision_objects[0].object
+    for seen in (scene.world.collision_objects[0].pose, attached.pose):
+        q = seen.orientation
+        assert abs(np.dot([q.x, q.y, q.z, q.w], tilted.as_quat())) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_fk_answers_many_links_in_any_frame() -> None:

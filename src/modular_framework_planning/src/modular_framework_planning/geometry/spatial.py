@@ -16,7 +16,6 @@ from modular_framework_planning.errors import GeometryError
 Array = NDArray[np.float64]
 Transform = Any  # pinocchio.SE3: Pinocchio ships no type information
 
-QUATERNION_NORM_TOLERANCE = 0.1
 IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
 LOGGER = logging.getLogger("rosout.poses")
 
@@ -26,11 +25,11 @@ def make_transform(position: Sequence[float], quaternion_xyzw: Sequence[float], 
 
     Args:
         position: x, y, z [m].
-        quaternion_xyzw: x, y, z, w; within 0.1 of unit length (it is normalised).
+        quaternion_xyzw: x, y, z, w; any length above 0 (it is normalised).
         where: what the pose belongs to, for the error text.
 
     Raises:
-        GeometryError: a number is not finite, or the quaternion is not of unit length.
+        GeometryError: a number is not finite, or the quaternion is all zeros.
     """
     translation = np.asarray(position, dtype=float)
     quaternion = np.asarray(quaternion_xyzw, dtype=float)
@@ -39,13 +38,11 @@ def make_transform(position: Sequence[float], quaternion_xyzw: Sequence[float], 
             f"{where}: position {list(position)} or orientation {list(quaternion_xyzw)} holds a number "
             "that is not finite; every number must be finite"
         )
-    norm = float(np.linalg.norm(quaternion))
-    if abs(norm - 1.0) > QUATERNION_NORM_TOLERANCE:
-        raise GeometryError(
-            f"{where}: quaternion xyzw {list(quaternion_xyzw)} has length {norm:.3g}; allowed is 1 "
-            f"within {QUATERNION_NORM_TOLERANCE}; the identity is 0 0 0 1"
-        )
-    x, y, z, w = quaternion / norm
+    largest = float(np.abs(quaternion).max())
+    if largest == 0.0:
+        raise GeometryError(f"{where}: quaternion xyzw 0 0 0 0 has length 0; the identity is 0 0 0 1")
+    quaternion = quaternion / largest  # squares of very small or large numbers are 0 or infinite
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
     return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), translation)
 
 
