@@ -44,17 +44,21 @@ def scene_with(model: RobotModel, height_m: float) -> PlanningScene:
 
 
 def planned(
-    model: RobotModel, height_m: float, parameters: dict[str, object] | None = None, **request: object
+    model: RobotModel,
+    height_m: float,
+    parameters: dict[str, object] | None = None,
+    goal: tuple[float, ...] = GOAL,
+    **request: object,
 ) -> PlanningAnswer:
     settings = PipelineSettings(seed=4, parameters=parameters or {})
     pipeline = PlanningPipeline(
         model, KinematicsPool(model), settings, StompPlanner.configure(model, settings), make_adapters()
     )
     joints = model.group(GROUP).joints
-    goal = JointGoal(dict(zip(joints, GOAL, strict=True)))
+    goals = (JointGoal(dict(zip(joints, goal, strict=True))),)
     return pipeline.plan(
         PlanningRequest(
-            scene_with(model, height_m), GROUP, (goal,), **{"planner_id": "STOMP", "allowed_time_s": 600.0, **request}
+            scene_with(model, height_m), GROUP, goals, **{"planner_id": "STOMP", "allowed_time_s": 600.0, **request}
         )
     )
 
@@ -64,6 +68,11 @@ def test_a_motion_bends_round_a_post_and_repeats_itself(model: RobotModel) -> No
     assert np.array_equal(answers[0].trajectory.positions, answers[1].trajectory.positions)
     assert np.allclose(answers[0].trajectory.positions[[0, -1]], [START, GOAL])
     assert np.abs(answers[0].path - np.linspace(START, GOAL, 60)).max() > 0.05
+
+
+def test_a_motion_to_where_the_robot_is_has_one_posture(model: RobotModel) -> None:
+    trajectory = planned(model, 0.7, goal=START).trajectory
+    assert trajectory.duration_s == 0.0 and np.array_equal(trajectory.positions, [START])
 
 
 def test_path_constraints_are_kept(model: RobotModel) -> None:

@@ -24,6 +24,7 @@ from modular_framework_planning.trajectory_processing.time_parameterization impo
 # Of accelerations, one after the other under path constraints: in rounded corners a motion leaves the path by
 # acceleration times window squared by 24 (see parameterize), 3e-4 rad at 5 rad/s^2: more than tight tolerances allow.
 SLOWNESS = (1.0, 4.0, 16.0)
+SAME_POSITION = 1.0e-9  # [rad or m]; neighbouring vertices nearer to each other than this are one
 
 
 class AddTimeOptimalParameterization(RequestAdapter):
@@ -47,8 +48,8 @@ def time_path(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
 
 def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     vertices = np.ascontiguousarray(path.vertices, dtype=float)
-    if len(vertices) == 2 and np.abs(vertices[1] - vertices[0]).max() < 1e-9:
-        vertices = vertices[1:]
+    differ = np.abs(np.diff(vertices, axis=0)).max(axis=1) >= SAME_POSITION
+    vertices = vertices[np.append(differ, True)]  # the last of equal ones: a goal is met exactly
     period = _number(problem.settings.parameters, "resample_dt", LONGEST_PERIOD_S, SHORTEST_PERIOD_S)
     tolerance = _number(problem.settings.parameters, "path_tolerance", problem.settings.blend_deviation, 0.0)
 
