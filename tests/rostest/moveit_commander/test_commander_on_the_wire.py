@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from copy import deepcopy
 from typing import Any
 
 import actionlib
@@ -415,6 +416,18 @@ def test_a_plan_is_a_tuple_of_four_and_can_be_executed(arm: MoveGroupCommander) 
     assert ends[1] > ends[0] and slow.joint_trajectory.points[-1].positions == pytest.approx(NEAR, abs=1e-3)
     for name in ("magic", ""):
         assert not arm.retime_trajectory(arm.get_current_state(), trajectory, algorithm=name).joint_trajectory.points
+    for name, wrong in (
+        ("ref_state_in", (None, trajectory)),
+        ("traj_in", (arm.get_current_state(), trajectory.joint_trajectory)),
+        ("velocity_scaling_factor", (arm.get_current_state(), trajectory, "0.5")),
+        ("algorithm", (arm.get_current_state(), trajectory, 0.5, 0.5, None)),
+    ):
+        with pytest.raises(MoveItCommanderException, match=f"retime_trajectory: {name} is a "):
+            arm.retime_trajectory(*wrong)
+    short = deepcopy(trajectory)
+    short.joint_trajectory.points[1].positions = NEAR[1:]
+    with pytest.raises(MoveItCommanderException, match=r"points\[1\] has positions .* for each of the 6 joints"):
+        arm.retime_trajectory(arm.get_current_state(), short)
     full, beyond = (arm.retime_trajectory(arm.get_current_state(), trajectory, factor, factor) for factor in (1.0, 7.0))
     assert beyond == full, "a factor that is none is 1"
     assert arm.execute(trajectory) is True

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 import rospy
@@ -78,7 +79,22 @@ class MoveGroupCommander(GroupObjects):
             acceleration_scaling_factor: share of the top accelerations, in (0, 1].
             algorithm: one of MoveIt's names; all are one time-optimal algorithm here. Another one is an error on the
                 log, and the answer is empty, as in MoveIt.
+
+        Raises:
+            MoveItCommanderException: an argument has another type, a joint is unknown, the positions of a point are
+                not one finite number per joint, or no timing keeps the limits.
         """
+        for name, value, kind in (
+            ("ref_state_in", ref_state_in, RobotState),
+            ("traj_in", traj_in, RobotTrajectory),
+            ("velocity_scaling_factor", velocity_scaling_factor, Real),
+            ("acceleration_scaling_factor", acceleration_scaling_factor, Real),
+            ("algorithm", algorithm, str),
+        ):
+            if not isinstance(value, kind):
+                raise MoveItCommanderException(
+                    f"retime_trajectory: {name} is a {type(value).__name__}; a {kind.__name__} is needed"
+                )
         if algorithm not in ALGORITHMS:
             rospy.logerr(
                 "retime_trajectory: unknown time parameterization algorithm '%s'; allowed: %s; the answer is "
@@ -96,6 +112,12 @@ class MoveGroupCommander(GroupObjects):
             )
         joints = [self._model.joints[name] for name in names]
         points = [point.positions for point in traj_in.joint_trajectory.points]
+        for number, point in enumerate(points):
+            if len(point) != len(names) or not np.isfinite(point).all():
+                raise MoveItCommanderException(
+                    f"retime_trajectory: points[{number}] has positions {list(point)}; one finite number is needed "
+                    f"for each of the {len(names)} joints"
+                )
         if points:
             points = unwound(points, [joint.kind == "continuous" for joint in joints]).tolist()
         timed = RobotTrajectory(multi_dof_joint_trajectory=traj_in.multi_dof_joint_trajectory)
