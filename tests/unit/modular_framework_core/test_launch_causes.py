@@ -40,6 +40,7 @@ def test_the_last_fatal_message_is_the_cause_with_all_its_lines(tmp_path: Path) 
         ("gui:=", "argument 'gui' is ''"),
         ("worldfile:=b", "did you mean 'world_file'"),
         ("b.world", "not of the form name:=value"),
+        ("gui=false", "'gui=false' is not of the form name:=value; did you mean 'gui:=false'"),
     ],
 )
 def test_a_wrong_argument_is_refused_with_what_is_allowed(tmp_path: Path, argument: str, hint: str) -> None:
@@ -57,14 +58,14 @@ METHOD = """<launch><arg name="method_launch_file" default=""/><arg name="config
     [
         (
             "method_launch_file:=top_down_grasp/a.launch",
-            "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; did you mean 'top_down_grasps'; "
-            "allowed is PACKAGE/FILE with a file in the package's folder launch, the path of a launch file from /, or "
-            "none; correct it",
+            "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; allowed is PACKAGE/FILE with a "
+            "file in the package's folder launch, the path of a launch file from /, or none; correct it, or build and "
+            "source the workspace with the package; did you mean 'top_down_grasps'?",
         ),
         (
             "method_launch_file:=top_down_grasps/top_down.launch",
-            "and the package has no such file; did you mean 'top_down_grasps/top_down_grasps.launch'; allowed are "
-            "top_down_grasps/top_down_grasps.launch; correct it",
+            "and the package has no such file; allowed: top_down_grasps/top_down_grasps.launch; did you mean "
+            "'top_down_grasps/top_down_grasps.launch'?",
         ),
         ("method_launch_file:=modular_framework_msgs", "which is no launch file; allowed is PACKAGE/FILE"),
         ("method_launch_file:=/nowhere/a.launch", "and there is no such file; allowed is PACKAGE/FILE"),

@@ -291,7 +291,13 @@ def test_nothing_is_overwritten(package_path: Path, capsys: pytest.CaptureFixtur
         (CRANE.replace("<box size=", '<mesh filename="a/b.stl" size='), (), "mesh files are not found: a/b.stl"),
         ('<robot name="r"><link name="a"/></robot>', (), "no arm is found"),
         (CRANE.replace('lower="-2"', 'lower="low"'), (), "expected a number"),
-        (CRANE.replace("</robot>", '<link name="alone"/></robot>'), (), "2 root links (base, alone)"),
+        (
+            CRANE.replace("</robot>", '<link name="alone"/></robot>'),
+            (),
+            "2 links have no joint above them (base, alone)",
+        ),
+        (CRANE.replace('<parent link="boom"', '<parent link="bom"'), (), "link 'bom' is unknown; allowed: base, "),
+        (CRANE.replace('<axis xyz="0 0 1"', '<axis xyz="0 0 0"'), (), "joint 'pan': its axis is 0 0 0; give it a"),
         ("<robot>", (), "not an XML document"),
     ],
 )

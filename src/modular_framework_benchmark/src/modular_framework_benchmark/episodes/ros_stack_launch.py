@@ -21,12 +21,11 @@ from modular_framework_benchmark.episodes.stack import StackLaunch
 from modular_framework_benchmark.episodes.task_settings import TaskSettings, read_settings
 from modular_framework_benchmark.records.episode import EpisodeSpec
 from modular_framework_core.launching.launch_arguments import (
-    METHOD,
-    NO_METHOD,
     argument_values,
     check_arguments,
     known_arguments,
 )
+from modular_framework_core.launching.launch_values import METHOD, NO_METHOD, file_faults
 from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, preview_launch
 
@@ -53,7 +52,7 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         arguments |= settings.arguments
         arguments |= {name: value for name, value in OWN_ARGUMENTS.items() if name in known}
         given = [f"{name}:={value}" for name, value in arguments.items()]
-        check_arguments(path, given)
+        check_arguments(path, given, file_faults)
         values = argument_values(path, given)
         controllers: tuple[str, ...] = ()
         method_nodes = _nodes_of(values.get(METHOD, ""))

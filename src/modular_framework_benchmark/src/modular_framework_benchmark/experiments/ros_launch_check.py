@@ -150,7 +150,8 @@ class LaunchCheck:
         text = self.launch.parameters.get(f"/{DESCRIPTION}")
         try:
             joints = tuple(joint.name for joint in read_urdf(str(text)).joints) if text else ()
-        except XmlError:
+        except XmlError as error:
+            yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {error}", ARGUMENTS)
             return
         for name, value in self._names.naming("joint") if joints else ():
             if value not in joints:

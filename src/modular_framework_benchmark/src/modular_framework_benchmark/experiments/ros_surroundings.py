@@ -15,6 +15,7 @@ from modular_framework_benchmark.experiments.surroundings import NotThere
 from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.launch_arguments import argument_values, check_arguments, known_arguments
+from modular_framework_core.launching.launch_values import file_faults
 
 
 class RosSurroundings:
@@ -62,16 +63,6 @@ class RosSurroundings:
         problem = _problem(path, tuple(f"{name}:={value}" for name, value in arguments.items()))
         if problem:
             raise NotThere(problem.removeprefix(f"{path}: "))
-        for name, kind in (("world_file", "worlds"), ("scene_file", "scenes")):
-            if arguments.get(name) and name in self.launch_arguments(launch):
-                self._check_file(launch, arguments, kind, arguments[name])
-
-    def _check_file(self, launch: str, arguments: Mapping[str, str], kind: str, name: str) -> None:
-        folder = self._description(launch, arguments) / kind
-        there = sorted(found.name for found in folder.glob("*"))
-        if name not in there:
-            allowed = listing(there, "the folder is empty")
-            raise NotThere(f"argument '{kind[:-1]}_file' is '{name}', not in {folder}; {allowed}{nearest(name, there)}")
 
     def task(self, name: str, folder: Path) -> str:
         """Returns the path of a task of the API package, or of one's own."""
@@ -119,7 +110,7 @@ def _known(path: str) -> dict[str, str | None]:
 @lru_cache(maxsize=4096)
 def _problem(path: str, arguments: tuple[str, ...]) -> str:
     try:
-        check_arguments(path, list(arguments))
+        check_arguments(path, list(arguments), file_faults)  # numbers are checked with the parameters
     except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, ValueError) as error:
         return str(error)
     return ""

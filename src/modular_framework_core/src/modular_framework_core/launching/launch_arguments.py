@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import roslaunch.arg_dump
@@ -12,15 +11,13 @@ import roslaunch.config
 import roslaunch.core
 import roslaunch.substitution_args
 import roslaunch.xmlloader
-import rospkg
 
+from modular_framework_core.files.faults import nearest
+from modular_framework_core.launching.launch_values import value_faults
 from modular_framework_urdf import xml_text
 
 BOOLEANS = ("true", "false", "1", "0")
 """Texts that roslaunch accepts as a bool, in upper or lower case."""
-METHOD, CONFIGURATION = "method_launch_file", "config_directory"
-NO_METHOD = ("", "none")
-"""Values of METHOD that start no method; roslaunch passes over an argument that is given an empty value."""
 
 
 def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
@@ -65,12 +62,15 @@ def _files_with_all_arguments(path: str) -> list[str]:
     ]
 
 
-def check_arguments(path: str, arguments: list[str]) -> None:
-    """Refuses arguments that the launch file does not have, and values that name missing files.
+def check_arguments(
+    path: str, arguments: list[str], faults_of: Callable[[Mapping[str, str]], list[str]] = value_faults
+) -> None:
+    """Refuses arguments that the launch file does not have, and values that it cannot use.
 
     Args:
         path: Launch file.
         arguments: What is given, `name:=value`.
+        faults_of: Returns what is wrong with the values of all arguments.
 
     Raises:
         roslaunch.core.RLException: It names every wrong argument and what was probably meant.
@@ -80,61 +80,14 @@ def check_arguments(path: str, arguments: list[str]) -> None:
     for argument in arguments:
         name, assignment, value = argument.partition(":=")
         if not assignment:
-            faults.append(f"argument '{argument}' is not of the form name:=value")
+            start, sign, rest = argument.partition("=")
+            meant = f"; did you mean '{start}:={rest}'" if sign and start in known else ""
+            faults.append(f"argument '{argument}' is not of the form name:=value{meant}")
         elif name not in known:
-            faults.append(f"unknown argument '{name}'{_hint(name, known)}; allowed: {', '.join(sorted(known))}")
+            faults.append(f"unknown argument '{name}'{nearest(name, known)}; allowed: {', '.join(sorted(known))}")
         elif str(known[name][1]).lower() in BOOLEANS[:2] and value.lower() not in BOOLEANS:
             faults.append(f"argument '{name}' is '{value}', allowed are true and false; correct it")
     if not faults:
-        values = argument_values(path, arguments)
-        faults = [fault for fault in (_method_fault(values.get(METHOD, "")), _folder_fault(values)) if fault]
+        faults = faults_of(argument_values(path, arguments))
     if faults:
         raise roslaunch.core.RLException(f"{path}: " + "; ".join(faults))
-
-
-def _method_fault(value: str) -> str:
-    """Says what is wrong with the launch file of a method; nothing if it is there."""
-    if value in NO_METHOD or Path(value).is_absolute() and Path(value).is_file():
-        return ""
-    allowed = "PACKAGE/FILE with a file in the package's folder launch, the path of a launch file from /, or none"
-    fault, package, file = f"argument '{METHOD}' is '{value}', ", *value.partition("/")[::2]
-    if Path(value).is_absolute() or not file:
-        reason = f"and there is no such file{_path_hint(Path(value))}" if file else "which is no launch file"
-        return f"{fault}{reason}; allowed is {allowed}; correct it"
-    finder = rospkg.RosPack()
-    try:
-        folder = Path(finder.get_path(package)) / "launch"
-    except rospkg.ResourceNotFound:
-        return (
-            f"{fault}and there is no package '{package}'{_hint(package, finder.list())}; allowed is {allowed}; "
-            "correct it, or build and source the workspace with the package"
-        )
-    if (folder / file).is_file():
-        return ""
-    files = sorted(f"{package}/{found.name}" for found in folder.glob("*.launch"))
-    return (
-        f"{fault}and the package has no such file{_hint(value, files)}; allowed are "
-        f"{', '.join(files) or 'files in its folder launch, which is empty'}; correct it"
-    )
-
-
-def _folder_fault(values: dict[str, str]) -> str:
-    """Says what is wrong with the folder of the configuration files; nothing if it is there."""
-    value = values.get(CONFIGURATION, "")
-    if not value or Path(value).is_absolute() and Path(value).is_dir():
-        return ""
-    return (
-        f"argument '{CONFIGURATION}' is '{value}', allowed is the path of a folder from /, such as a copy of the "
-        f"folder config of modular_framework_api; correct it{_path_hint(Path(value))}"
-    )
-
-
-def _path_hint(path: Path) -> str:
-    """Returns a hint at the path beside a missing one whose name is most like it; empty when there is none."""
-    beside = [str(entry) for entry in path.parent.iterdir()] if path.is_absolute() and path.parent.is_dir() else []
-    return _hint(str(path), beside)
-
-
-def _hint(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f"; did you mean '{near[0]}'" if near else ""

@@ -105,6 +105,7 @@ def run_launch_file(
         The task's exit code; EXIT_NODE_DIED when another node died first; EXIT_BAD_LAUNCH when the launch file or an
         argument is wrong.
     """
+    path = ""
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (package, launch_file))])[0]
         check_arguments(path, arguments)
@@ -127,9 +128,20 @@ def run_launch_file(
         parent.start()
         parent.spin()
     except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError) as error:  # ValueError: of a value
-        print(f"run_framework: {error}", file=sys.stderr)
+        print(f"run_framework: {_reason(error, path, arguments)}", file=sys.stderr)
         return EXIT_BAD_LAUNCH
     return _tell_end(watcher, uuid)
+
+
+def _reason(error: Exception, path: str, arguments: list[str]) -> str:
+    """Returns why a launch could not start; of the robot's description roslaunch tells the command only."""
+    if "command parameter [robot_description]" not in str(error):
+        return str(error)
+    values = argument_values(path, arguments)
+    return (
+        f"argument 'robot_urdf_file' is '{values.get('robot_urdf_file')}', which xacro cannot expand with urdf_args "
+        f"'{values.get('urdf_args')}'; its error is above"
+    )
 
 
 def _tell_end(watcher: EndWatcher, uuid: str) -> int:

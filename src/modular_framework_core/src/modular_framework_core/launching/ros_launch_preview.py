@@ -15,6 +15,8 @@ from modular_framework_core.launching.external_controllers import controller_nod
 from modular_framework_ros.node_handle import ParameterError
 
 CONTROLLERS_SPAWNER = "external_controllers_spawner"
+CHECKED_ARGUMENTS = "checked_arguments"
+"""Parameter whose command checks the arguments when roslaunch loads the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,13 @@ def leaves(parameters: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     return result
 
 
+class _PreviewLoader(roslaunch.xmlloader.XmlLoader):  # type: ignore[misc]
+    """Loads a launch file without the check of its arguments, so that faults of parameters are found beside theirs."""
+
+    def param_value(self, verbose: bool, name: str, *source: Any) -> Any:
+        return "" if name == CHECKED_ARGUMENTS else super().param_value(verbose, name, *source)
+
+
 def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
     """Returns what a launch file would start; equal for equal files, so names of anonymous nodes are as in the file.
 
@@ -84,7 +93,7 @@ def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
     Raises:
         roslaunch.core.RLException: The launch file or something that it reads cannot be used.
     """
-    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False)
+    loader = _PreviewLoader(resolve_anon=False)
     config = roslaunch.config.load_config_default(
         [(path, list(arguments))], None, loader=loader, verbose=False, assign_machines=False
     )

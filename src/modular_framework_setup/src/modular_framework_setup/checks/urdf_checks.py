@@ -28,15 +28,22 @@ def check_urdf(document: XmlDocument, faults: FaultList) -> RobotTree | None:
         add_xml_error(error, faults)
         return None
     tree = RobotTree(robot, document.where)
+    check_tree(tree, faults)
+    _check_meshes(robot, tree, faults)
+    return tree
+
+
+def check_tree(tree: RobotTree, faults: FaultList) -> None:
+    """Checks links, joints and transmissions of a robot description, but not its meshes."""
+    robot = tree.robot
     _check_names(robot, tree, faults)
     _check_roots(tree, faults)
     for joint in robot.joints:
         _check_ends(joint, tree, faults)
+        _check_axis(joint, tree, faults)
         _check_limit(joint, tree, faults)
         _check_mimic(joint, tree, faults)
     _check_transmissions(robot, tree, faults)
-    _check_meshes(robot, tree, faults)
-    return tree
 
 
 def _check_names(robot: Robot, tree: RobotTree, faults: FaultList) -> None:
@@ -79,6 +86,13 @@ def _check_ends(joint: Joint, tree: RobotTree, faults: FaultList) -> None:
             faults.add_unknown(tree.location(joint.line), f"joint '{joint.name}': {role} link", link, tree.links)
     if joint.kind not in KINDS:
         faults.add_unknown(tree.location(joint.line), f"joint '{joint.name}': type", joint.kind, KINDS)
+
+
+def _check_axis(joint: Joint, tree: RobotTree, faults: FaultList) -> None:
+    if joint.movable and not any(joint.axis):
+        faults.add(
+            tree.location(joint.line), f"joint '{joint.name}': its axis is 0 0 0; give it a direction, such as 0 0 1"
+        )
 
 
 def _check_limit(joint: Joint, tree: RobotTree, faults: FaultList) -> None:

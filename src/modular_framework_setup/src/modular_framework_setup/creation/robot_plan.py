@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from modular_framework_core.files.faults import FaultList
 from modular_framework_planning.errors import ModelError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_setup.checks.urdf_checks import check_tree
 from modular_framework_setup.config_files.config_package import find_package
 from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.creation.collision_sampling import CollisionSampling, Pair
@@ -123,8 +125,6 @@ def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progr
     """
     source.root.set("name", choices.name)
     tree = _tree(source)
-    if len(tree.roots) != 1:
-        raise CreationError(f"{source.path}: {len(tree.roots)} root links ({', '.join(tree.roots)}); one is needed")
     parts = confirm(tree, find_parts(tree, choices.chains, choices.fingers))
     notes = complete_urdf(source.root, tree, parts.grippers)
     model = _model(source, choices)
@@ -151,9 +151,14 @@ def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progr
 
 def _tree(source: SourceUrdf) -> RobotTree:
     try:
-        return RobotTree(read_urdf(xml_text.to_text(source.root), str(source.path)), str(source.path))
+        tree = RobotTree(read_urdf(xml_text.to_text(source.root), str(source.path)), str(source.path))
     except XmlError as error:
         raise CreationError(str(error)) from error
+    faults = FaultList()
+    check_tree(tree, faults)
+    if faults:
+        raise CreationError("\n".join(map(str, faults.sorted())))
+    return tree
 
 
 def _model(source: SourceUrdf, choices: Choices) -> RobotModel:

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A wrong value of a launch argument of the framework is refused with the argument, the value and what is allowed."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+import roslaunch.config
+import roslaunch.core
+import roslaunch.rlutil
+import rospkg
+
+from modular_framework_core.launching.launch_arguments import check_arguments
+from modular_framework_core.launching.launch_runner import EXIT_BAD_LAUNCH, run_launch_file
+
+API = "modular_framework_api"
+
+
+@pytest.fixture
+def start() -> str:
+    return str(roslaunch.rlutil.resolve_launch_arguments([API, "start_framework.launch"])[0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["world_file:=ur5_setp.world"], "'ur5_setp.world', .* no such file; allowed: bin.world, .*'ur5_setup.world'?"),
+        (["robot_urdf_file:=ur5.urdf"], "'ur5.urdf', .* no such file; allowed: .*; did you mean 'ur5.urdf.xacro'?"),
+        (["robot_package:=ur5_ezgriper_robot"], "there is no such package; .*; did you mean 'ur5_ezgripper_robot'?"),
+        (["moveit_config_package:=ur5_ezgripper_robot"], "has no .*/launch/move_group.launch"),
+        (["simulation:=false", "scene_file:=ur5.scene"], "'ur5.scene', .* no such file; allowed: bin.scene"),
+        (["simulation:=false", "connection_file:=no.yaml"], "'no.yaml', .*allowed: .*connection_emulators.yaml"),
+        (["real_time_factor:=fast"], "is 'fast'; allowed: a number, at least 0"),
+        (["seed:=abc"], "is 'abc'; allowed: a whole number"),
+        (["physics_engine:=bulet"], "is 'bulet'; allowed: pybullet, mujoco"),
+    ],
+)
+def test_the_sentence_names_argument_value_and_what_is_allowed(start: str, arguments: list[str], sentence: str) -> None:
+    argument = arguments[-1].partition(":=")[0]
+    with pytest.raises(roslaunch.core.RLException, match=f"argument '{argument}' .*{sentence}"):
+        check_arguments(start, arguments)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"), [("a: [1", "2:1: this is not valid YAML"), (None, "1:1: there is no such file")]
+)
+def test_a_broken_or_missing_configuration_file_is_named(
+    start: str, tmp_path: Path, text: str | None, fault: str
+) -> None:
+    folder = tmp_path / "config"
+    shutil.copytree(Path(rospkg.RosPack().get_path(API)) / "config", folder)
+    broken = folder / "motion_planner_config.yaml"
+    broken.unlink() if text is None else broken.write_text(text)
+    with pytest.raises(roslaunch.core.RLException, match=re.escape(f"'{folder}': {broken}:") + ".*" + fault[4:]):
+        check_arguments(start, [f"config_directory:={folder}"])
+
+
+def test_broken_files_of_world_and_robot_are_named_with_their_line(start: str, tmp_path: Path) -> None:
+    (tmp_path / "broken.world").write_text("<sdf>\n<world>")
+    below_root = "../" * 20
+    for argument in ("world_file", "robot_urdf_file"):
+        with pytest.raises(roslaunch.core.RLException, match=f"argument '{argument}' .*broken.world:2: not an XML"):
+            check_arguments(start, [f"{argument}:={below_root}{tmp_path}/broken.world"])
+
+
+def test_roslaunch_prints_the_sentence_before_its_own_error(start: str, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(roslaunch.core.RLException, match="checked_arguments"):
+        roslaunch.config.load_config_default([(start, ["world_file:=ur5_setp.world"])], None, verbose=False)
+    assert capfd.readouterr().err.startswith("argument 'world_file' is 'ur5_setp.world', and ")
+
+
+def test_a_robot_that_xacro_cannot_expand_ends_with_one_sentence(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "bad.xacro").write_text(
+        '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">${nothing}</robot>'
+    )
+    file = f"{'../' * 20}{tmp_path}/bad.xacro"
+    code = run_launch_file(API, "start_framework.launch", [f"robot_urdf_file:={file}"], "task")
+    last = capfd.readouterr().err.splitlines()[-1]
+    assert code == EXIT_BAD_LAUNCH
+    assert last.startswith(f"run_framework: argument 'robot_urdf_file' is '{file}', which xacro cannot expand")
