@@ -36,7 +36,7 @@ mode: task
 arguments: {world_file: table.world}
 parameters: {/planner_name: $planner}
 objects:
-  - {model: $object, x: [-0.2, 0.2], y: {choice: [0.4, 0.5]}, yaw: {normal: [0, 1]}, on: 0.8}
+  - {model: $object, x: [-0.2, 0.2], y: {choice: [0.4, 0.5]}, yaw: {normal: [0, 1]}, rests_at: 0.8}
 success: {lifted: 0.1}
 factors:
   method:

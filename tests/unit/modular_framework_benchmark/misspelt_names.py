@@ -32,7 +32,7 @@ TASK: dict[str, Any] = {
     "task": "simulation_pick.yaml",
     "arguments": {"world_file": "ur5_table.world"},
     "parameters": {"/planner_name": "$planner"},
-    "objects": [{"model": "cube", "x": [-0.25, 0.25], "y": [0.36, 0.64], "on": 0.84}],
+    "objects": [{"model": "cube", "x": [-0.25, 0.25], "y": [0.36, 0.64], "rests_at": 0.84}],
     "success": {"lifted": 0.10, "hold_time": 2.0},
     "factors": {"planner": ["RRTConnect", "BKPIECE"]},
     "compare": "planner",
@@ -72,7 +72,7 @@ GRASPS: dict[str, Any] = {
     "group": "panda_manipulator",
     "gripper_joint": "panda_finger_joint1",
     "method": "$method",
-    "objects": [{"model": "cube", "x": 0.4, "y": 0.0, "on": 0.0}],
+    "objects": [{"model": "cube", "x": 0.4, "y": 0.0, "rests_at": 0.0}],
     "factors": {
         "method": [
             "top_down_grasps.ros_top_down_node:TopDownMethod",

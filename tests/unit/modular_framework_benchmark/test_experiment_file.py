@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 from experiment_texts import PICK, FakeSurroundings, faults_of, read
 
 from modular_framework_benchmark.experiments.experiment import StoppingKind
@@ -36,6 +37,16 @@ def test_a_value_that_is_only_a_level_keeps_its_type(tmp_path: Path) -> None:
     found = [one.settings["parameters"] for one in read(text, tmp_path).combinations[::2]][:4]
     assert [one["/a"] for one in found] == [0.5, True, 3, "word"]
     assert [one["/b"] for one in found] == ["with 0.5 and $", "with true and $", "with 3 and $", "with word and $"]
+
+
+def test_the_height_of_a_surface_survives_pyyaml_and_its_old_name_is_read(tmp_path: Path) -> None:
+    def poses(text: str) -> list[object]:
+        settings = read(text, tmp_path).combinations[0].settings
+        return [item.drawn((1, 0), 0) for item in settings["objects"]]
+
+    expected = poses(PICK)
+    assert poses(yaml.safe_dump(yaml.safe_load(PICK))) == expected
+    assert poses(PICK.replace("rests_at: 0.8", "on: 0.8")) == expected
 
 
 def test_a_listed_design_runs_only_what_it_lists(tmp_path: Path) -> None:
@@ -68,8 +79,9 @@ def test_a_listed_method_without_another_one_to_compare_with_is_a_fault(tmp_path
         ("{world_file:", "{end_with_task: true, world_file:", "end_with_task", "the argument 'end_with_task' cannot"),
         ("[cube, ball]", "[cube, bal]", "$object", "there is no model 'bal'; allowed: cube, ball, can"),
         ("$object", "$objct", "$objct", "'$objct' names no factor; allowed: method"),
-        ("on: 0.8", "on: 0.8, z: 1", "{model", "an object has both z and on"),
-        (", on: 0.8", "", "{model", "an object has neither z nor on"),
+        ("rests_at: 0.8", "rests_at: 0.8, z: 1", "{model", "an object has both z and rests_at"),
+        ("rests_at: 0.8", "rests_at: 0.8, on: 0.8", "on", "the key of an object 'on' is unknown; allowed: model"),
+        (", rests_at: 0.8", "", "{model", "an object has neither z nor rests_at"),
         ("[-0.2, 0.2]", "[0.2, -0.2]", "[0.2", "the range of x goes down from 0.2 to -0.2"),
         ("{normal: [0, 1]}", "{normal: [0, -1]}", "[0", "normal of yaw must be [MEAN, DEVIATION]"),
         ("{normal: [0, 1]}", "{gauss: [0, 1]}", "{gauss", "yaw must be a number, [LOW, HIGH], {normal"),

@@ -31,8 +31,8 @@ group: arm
 gripper_joint: finger
 method: $method
 objects:
-  - {model: cube, x: [0.4, 0.5], y: 0.0, on: 0.0}
-  - {model: can, name: beside, x: 0.2, y: 0.3, on: 0.0}
+  - {model: cube, x: [0.4, 0.5], y: 0.0, rests_at: 0.0}
+  - {model: can, name: beside, x: 0.2, y: 0.3, rests_at: 0.0}
 factors:
   method: [a.b:First, a.b:Second]
 compare: method

@@ -165,3 +165,10 @@ def test_a_package_of_moveit_1_is_read_as_it_is() -> None:
     assert parameters["robot_description"].count("<link ") > 5
     assert "AddTimeOptimalParameterization" in parameters["planning_pipelines"]["ompl"]["request_adapters"]
     assert parameters["robot_description_planning"]["cartesian_limits"]["max_trans_vel"] == 1.0
+
+
+@pytest.mark.parametrize("robot", ["ur5_ezgripper", "panda_hand", "iiwa_wsg50", "dual_panda"])
+def test_the_shipped_packages_load_without_a_word_of_deprecation(robot: str, caplog: pytest.LogCaptureFixture) -> None:
+    parameters = MoveItConfigsBuilder(robot).pilz_cartesian_limits().to_dict()
+    assert "deprecated" not in caplog.text
+    assert parameters["robot_description_planning"]["cartesian_limits"]["max_trans_vel"] == 1.0

@@ -20,8 +20,10 @@ from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
 from modular_framework_simulation.errors import DescriptionError
 
 POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
-KEYS = ("model", "name", *POSE_KEYS, "on")
-EXAMPLE = "{model: cube, x: [-0.2, 0.2], y: 0.5, on: 0.84}"
+SURFACE, OLD_SURFACE = "rests_at", "on"
+"""Key of the height of the surface, and its old name, which PyYAML reads and writes as true."""
+KEYS = ("model", "name", *POSE_KEYS, SURFACE)
+EXAMPLE = "{model: cube, x: [-0.2, 0.2], y: 0.5, rests_at: 0.84}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +56,7 @@ class SceneObject:
             name: self.pose.get(name, Fixed(0.0)).draw(generator_of(*key, "objects", index, name)) for name in POSE_KEYS
         }
         if self.surface is not None:
-            surface = self.surface.draw(generator_of(*key, "objects", index, "on"))
+            surface = self.surface.draw(generator_of(*key, "objects", index, OLD_SURFACE))
             numbers["z"] = resting_height(self.file, surface, numbers["roll"], numbers["pitch"])
         return {"name": self.name, "model": self.model, **numbers}
 
@@ -90,26 +92,38 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
     mapping = reading.mapping(item, "each of objects", EXAMPLE)
     if mapping is None:
         return None
-    node = spelt_as_meant(mapping, KEYS, "the key of an object", reading.faults)
+    node = spelt_as_meant(_renamed(mapping), KEYS, "the key of an object", reading.faults)
     if "model" not in node.entries:
         reading.faults.add(node.location, f"an object needs a model; add one, such as {EXAMPLE}")
         return None
-    if ("z" in node.entries) == ("on" in node.entries):
-        found = "both z and on" if "z" in node.entries else "neither z nor on"
+    if ("z" in node.entries) == (SURFACE in node.entries):
+        found = f"both z and {SURFACE}" if "z" in node.entries else f"neither z nor {SURFACE}"
         reading.faults.add(
             node.location,
-            f"an object has {found}; allowed is one of them: z, the height of its frame, or on, that of the surface it "
-            "stands on [m]",
+            f"an object has {found}; allowed is one of them: z, the height of its frame, or {SURFACE}, that of the "
+            "surface it stands on [m]",
         )
     pose = {
         key: drawn
         for key in POSE_KEYS
         if key in node.entries and (drawn := read_distribution(node.entries[key], key, reading)) is not None
     }
-    surface = read_distribution(node.entries["on"], "on", reading) if "on" in node.entries else None
+    surface = read_distribution(node.entries[SURFACE], SURFACE, reading) if SURFACE in node.entries else None
     model = reading.text(node.entries["model"], "model")
     name = reading.name(node.entries["name"], "name") if "name" in node.entries else None
     return None if model is None else ObjectNodes(node, model, name, pose, surface)
+
+
+def _renamed(mapping: Mapping) -> Mapping:
+    """Returns the keys of an object with OLD_SURFACE as SURFACE, unless that is there too."""
+    if SURFACE in mapping.entries:
+        return mapping
+    names = {key: SURFACE if key == OLD_SURFACE else key for key in mapping.entries}
+    return Mapping(
+        {names[key]: value for key, value in mapping.entries.items()},
+        {names[key]: location for key, location in mapping.keys.items()},
+        mapping.location,
+    )
 
 
 def named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> SceneObject:
@@ -132,6 +146,6 @@ def named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Readi
         try:
             lowest_point(file, 0.0, 0.0)
         except DescriptionError as error:
-            reading.faults.add(found.node.entries["on"].location, f"the model's lowest point is not known: {error}")
+            reading.faults.add(found.node.entries[SURFACE].location, f"the model's lowest point is not known: {error}")
     is_path = "/" in found.model or found.model.endswith(".sdf")
     return SceneObject(name, str(file) if is_path else found.model, file, found.pose, found.surface)

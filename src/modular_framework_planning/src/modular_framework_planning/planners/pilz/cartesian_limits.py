@@ -53,7 +53,7 @@ def read_cartesian_limits(entries: Mapping[str, Any], where: str = "cartesian_li
             got = "missing" if key not in entries else repr(value)
             faults.append(f"{key} is {got}; a number {'below' if sign < 0 else 'above'} 0 is needed")
     if faults:
-        raise ModelError(f"{where}: {'; '.join(faults)}; see cartesian_limits.yaml of a config package")
+        raise ModelError(f"{where}: {'; '.join(faults)}; see pilz_cartesian_limits.yaml of a config package")
     return CartesianLimits(
         float(entries["max_trans_vel"]),
         float(entries["max_trans_acc"]),

@@ -126,7 +126,7 @@ class CommandPlanner:
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
                 f"{planner_id}: robot_description_planning/"
-                "cartesian_limits is not set; load a cartesian_limits.yaml with max_trans_vel, "
+                "cartesian_limits is not set; load a pilz_cartesian_limits.yaml with max_trans_vel, "
                 "max_trans_acc, max_trans_dec and max_rot_vel",
             )
         return self._limits
