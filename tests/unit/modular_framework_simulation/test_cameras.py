@@ -138,6 +138,51 @@ def test_corners_of_a_cube_are_seen_where_the_intrinsics_project_them(
         assert np.linalg.norm(intersection(before, after) - corner) < 1.0
 
 
+SMALL = Pinhole(320, 240, 1.1)
+
+
+def rays(pinhole: Pinhole) -> Any:
+    """Directions of the pixels' centres by the matrix K, (height, width, 3), z = 1."""
+    column, row = np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height))
+    pixels = np.stack([column, row, np.ones_like(column)], axis=-1)
+    return pixels @ np.linalg.inv(np.array(pinhole.intrinsics()).reshape(3, 3)).T
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_an_oblique_plane_is_seen_where_the_rays_of_the_pixels_meet_it(
+    empty: PhysicsWorld, renderer: Renderer, axis: int
+) -> None:
+    distance, slope = 3.6, 0.9
+    normal = np.array([0.0, 0.0, -math.cos(slope)])
+    normal[axis] = math.sin(slope)
+    wall = specs.Plane((float(normal[0]), float(normal[1]), float(normal[2])), (40.0, 40.0))
+    empty.spawn(visible("wall", wall, Pose((0.0, 0.0, distance))))
+    depth = look(empty, renderer, camera(Pose(), pinhole=SMALL)).depth
+    expected = normal[2] * distance / (rays(SMALL) @ normal)
+    near = np.abs(expected - distance) < 0.5
+    per_pixel = np.gradient(expected, axis=1 - axis)
+    assert abs(float(np.median((depth - expected)[near] / per_pixel[near]))) < 0.06  # [pixel]
+    assert np.abs(depth - expected)[near].max() < 0.004  # half of what OpenGL's depth buffer resolves there
+
+
+def test_a_sphere_is_seen_where_the_rays_of_the_pixels_meet_it(empty: PhysicsWorld, renderer: Renderer) -> None:
+    centre, radius = np.array([0.1, 0.07, 2.0]), 0.3
+    empty.spawn(visible("ball", specs.Sphere(radius), Pose((0.1, 0.07, 2.0))))
+    image = look(empty, renderer, camera(Pose(), pinhole=SMALL))
+    ray = rays(SMALL)
+    along, square = ray @ centre, np.sum(ray**2, axis=-1)
+    root = along**2 - square * (centre @ centre - radius**2)
+    hit = root > 0.0
+    expected = (along - np.sqrt(np.where(hit, root, np.nan))) / square
+    seen = ~np.isnan(image.depth)
+    red = image.rgb[..., 0] > 2.0 * image.rgb[..., 1]
+    for found in (seen, red):
+        assert np.abs(np.argwhere(found).mean(axis=0) - np.argwhere(hit).mean(axis=0)).max() < 0.1  # [pixel]
+        assert found.sum() == pytest.approx(hit.sum(), rel=0.01)
+    inside = seen & (root > 0.1 * np.nanmax(root))  # where depth is not too steep
+    assert np.abs(image.depth - expected)[inside].max() < 0.004
+
+
 @pytest.mark.parametrize("distance", [0.5, 1.0, 2.72])
 def test_depth_is_that_of_the_surface(empty: PhysicsWorld, renderer: Renderer, distance: float) -> None:
     empty.spawn(visible("wall", specs.Plane((0.0, 0.0, 1.0), (10.0, 10.0)), Pose()))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from modular_framework_simulation.models.sdf_specs import Colour
 
-_ROUND = 32
-"""Sides of what is drawn for a round shape with a picture."""
+_ROUND = 64
+"""Sides of a round shape; its surface is drawn within 0.12 % of its radius."""
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,8 @@ def drawn_cylinder(radius: float, length: float, colour: Colour, picture: Any) -
 def drawn_sphere(radius: float, colour: Colour, picture: Any) -> DrawnBody:
     """Returns a sphere with the picture around it."""
     angles = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
-    return _turned(np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius, colour, picture)
+    body = _turned(np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius, colour, picture)
+    return replace(body, normals=body.vertices / radius)
 
 
 def _turned(outline: Array, colour: Colour, picture: Any) -> DrawnBody:

@@ -31,7 +31,7 @@ from modular_framework_simulation.models.mesh_files import load_mesh, write_fold
 from modular_framework_simulation.models.sdf_specs import Box, Colour, Cylinder, Mesh, Plane, Sphere, Visual
 from modular_framework_urdf import collada
 
-_CACHE_VERSION = "3"
+_CACHE_VERSION = "4"
 _LIST = "parts.json"
 _PICTURE = re.compile(rb"<init_from>\s*([^<]+?)\s*</init_from>|^\s*(?:map_Kd|mtllib)\s+(.+?)\s*$", re.MULTILINE)
 _WHITE: Colour = (1.0, 1.0, 1.0, 1.0)

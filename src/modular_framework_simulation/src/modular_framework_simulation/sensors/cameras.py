@@ -22,6 +22,8 @@ Image = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]
 Cloud = npt.NDArray[np.void]
 
+_NOTHING = 1.0 - 1e-6
+"""Depth in OpenGL's buffer from which on nothing is seen; TinyRenderer's empty pixels have not quite 1."""
 POINT = np.dtype({"names": ["x", "y", "z", "rgb"], "formats": ["<f4", "<f4", "<f4", "<u4"]})
 """A point of a cloud: position [m], and colour as 0x00RRGGBB."""
 
@@ -59,12 +61,16 @@ class Pinhole:
         (column, row), focal = self.centre, self.focal_length
         return (focal, 0.0, column, 0.0, focal, row, 0.0, 0.0, 1.0)
 
-    def opengl_projection(self) -> tuple[float, ...]:
-        """Returns OpenGL's projection matrix, column by column."""
+    def opengl_projection(self, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[float, ...]:
+        """Returns OpenGL's projection matrix, column by column.
+
+        Args:
+            shift: What the image is moved by, right and down [pixel].
+        """
         focal, near, far = self.focal_length, self.near, self.far
         column_1 = (2 * focal / self.width, 0.0, 0.0, 0.0)
         column_2 = (0.0, 2 * focal / self.height, 0.0, 0.0)
-        column_3 = (0.0, 0.0, (near + far) / (near - far), -1.0)
+        column_3 = (-2 * shift[0] / self.width, 2 * shift[1] / self.height, (near + far) / (near - far), -1.0)
         return (*column_1, *column_2, *column_3, 0.0, 0.0, 2 * near * far / (near - far), 0.0)
 
     def depth_from_buffer(self, values: npt.NDArray[np.float32]) -> Depth:
@@ -75,7 +81,7 @@ class Pinhole:
         """
         buffer = values.astype(np.float64)
         depth = self.far * self.near / (self.far - (self.far - self.near) * buffer)
-        depth[buffer >= 1.0] = np.nan
+        depth[buffer >= _NOTHING] = np.nan
         return depth.astype(np.float32)
 
     def cloud(self, depth: Depth, rgb: Image) -> Cloud:

@@ -20,6 +20,9 @@ from modular_framework_urdf.rotations import rotate_vector
 
 _PLANE_THICKNESS_M = 1e-3
 
+_TINY_SHIFT = (-0.5, 0.5)
+"""Shift of TinyRenderer's images, right and down [pixel]: it samples pixels at a corner, not at their centre."""
+
 _OPENGL_IN_OPTICAL = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 """OpenGL's camera looks along -z, with y upwards."""
 
@@ -49,7 +52,7 @@ class Renderer:
         self._api: Any = pybullet
         self._meshes, self._log = meshes, log
         self._client: int = pybullet.connect(pybullet.DIRECT)
-        self._flag = pybullet.ER_TINY_RENDERER
+        self._flag, self._shift = pybullet.ER_TINY_RENDERER, _TINY_SHIFT
         if drawing is Drawing.EGL:
             self._load_egl()
         self._bodies: dict[int, tuple[tuple[tuple[int, Pose], ...], ...]] = {}
@@ -61,7 +64,7 @@ class Renderer:
             raise SimulationError("PyBullet was built without its EGL renderer; use TinyRenderer")
         if self._api.loadPlugin(plugin.origin, "_eglRendererPlugin", physicsClientId=self._client) < 0:
             raise SimulationError("PyBullet's EGL renderer cannot be loaded here; use TinyRenderer")
-        self._flag = self._api.ER_BULLET_HARDWARE_OPENGL
+        self._flag, self._shift = self._api.ER_BULLET_HARDWARE_OPENGL, (0.0, 0.0)
 
     def apply(self, update: SceneUpdate) -> None:
         """Brings the shapes in step with the world."""
@@ -102,22 +105,21 @@ class Renderer:
 
     def _shapes(self, visual: specs.Visual) -> list[tuple[dict[str, Any], specs.Colour, Pose]]:
         """Returns the engine's options for the parts of a visual, with their colours and poses."""
-        if visual.texture is None and not isinstance(visual.geometry, specs.Mesh):
-            options, shift = self._shape(visual.geometry)
+        geometry = visual.geometry
+        if visual.texture is None and not isinstance(geometry, specs.Mesh | specs.Sphere):  # the engine's are coarse
+            options, shift = self._shape(geometry)
             return [(options, visual.colour, shift)]
         parts = self._meshes.parts(visual)
         mesh = self._api.GEOM_MESH
         return [({"shapeType": mesh, "fileName": str(part.file)}, part.colour, Pose()) for part in parts]
 
-    def _shape(self, geometry: specs.Box | specs.Cylinder | specs.Sphere | specs.Plane) -> tuple[dict[str, Any], Pose]:
+    def _shape(self, geometry: specs.Box | specs.Cylinder | specs.Plane) -> tuple[dict[str, Any], Pose]:
         api = self._api
         match geometry:
             case specs.Box(size=(x, y, z)):
                 return {"shapeType": api.GEOM_BOX, "halfExtents": (x / 2, y / 2, z / 2)}, Pose()
             case specs.Cylinder(radius=radius, length=length):
                 return {"shapeType": api.GEOM_CYLINDER, "radius": radius, "length": length}, Pose()
-            case specs.Sphere(radius=radius):
-                return {"shapeType": api.GEOM_SPHERE, "radius": radius}, Pose()
             case specs.Plane(normal=normal, size=(x, y)):
                 half = _PLANE_THICKNESS_M / 2
                 turn = _rotation_from_z(normal)
@@ -136,7 +138,7 @@ class Renderer:
             pinhole.width,
             pinhole.height,
             _view_matrix(optical_in_world),
-            pinhole.opengl_projection(),
+            pinhole.opengl_projection(self._shift),
             shadow=0,
             renderer=self._flag,
             flags=self._api.ER_NO_SEGMENTATION_MASK,
