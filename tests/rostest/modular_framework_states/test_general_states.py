@@ -12,10 +12,11 @@ import actionlib
 import pytest
 import rospy
 from actionlib.server_goal_handle import ServerGoalHandle
-from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import GripperCommandAction, GripperCommandResult
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from control_msgs.msg import GripperCommandAction, GripperCommandGoal, GripperCommandResult
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
+from ros_session import until
 from rospy.impl.tcpros_base import TCPROSTransport
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
@@ -24,7 +25,9 @@ from std_srvs.srv import SetBool, SetBoolResponse
 import smach
 from modular_framework_core import srv
 from modular_framework_core.commander.arm_commander import CommanderError
+from modular_framework_ros import action_server
 from modular_framework_ros.action_server import SteadyActionServer
+from modular_framework_ros.ros_node_calls import NodeCallError
 from modular_framework_states.states.call_action import CallAction
 from modular_framework_states.states.call_service import CallService
 from modular_framework_states.states.counter import Counter
@@ -245,6 +248,45 @@ def test_no_result_is_lost_while_its_topic_is_still_being_connected(monkeypatch:
     state = CallAction("quick_hand", {"command": {"position": 0.5}}, timeout=20.0, server_timeout=60.0)
     assert run(state)[0] == "success", state.reason
     assert ended.is_set()
+
+
+@pytest.mark.parametrize("answers", [True, False], ids=["a client that answers late", "a client that cannot be called"])
+def test_a_goal_is_reported_after_its_client_has_answered_a_call(
+    monkeypatch: pytest.MonkeyPatch, answers: bool
+) -> None:
+    """A client misses what it hears before its send_goal() has returned."""
+    called, may_answer = threading.Event(), threading.Event()
+
+    def process_id(address: str, timeout_s: float) -> int:
+        called.set()
+        assert may_answer.wait(60.0)
+        if not answers:
+            raise NodeCallError(address)
+        return 1
+
+    def answer(goal: ServerGoalHandle) -> None:
+        goal.set_accepted()
+        goal.set_succeeded(GripperCommandResult(reached_goal=True))
+        ended.set()
+
+    monkeypatch.setattr(action_server, "process_id", process_id)
+    ended = threading.Event()
+    server = SteadyActionServer("quick_grip", GripperCommandAction, answer, auto_start=False)
+    server.start()
+    client = actionlib.SimpleActionClient("quick_grip", GripperCommandAction)
+    assert client.wait_for_server(rospy.Duration(60.0))
+    lists: list[GoalStatusArray] = []
+    subscriber = rospy.Subscriber("quick_grip/status", GoalStatusArray, lists.append)
+    client.send_goal(GripperCommandGoal())
+    assert called.wait(60.0) and ended.wait(60.0)
+    seen = len(lists)
+    until(lambda: len(lists) >= seen + 2, "two more status messages")
+    assert not any(message.status_list for message in lists) and client.get_result() is None
+    may_answer.set()
+    assert client.wait_for_result(rospy.Duration(60.0)) and client.get_result().reached_goal
+    until(lambda: any(item.status == GoalStatus.SUCCEEDED for item in lists[-1].status_list), "the status of the goal")
+    subscriber.unregister()
+    server.stop()
 
 
 def test_call_action_sends_a_goal_and_reports_how_it_ended() -> None:

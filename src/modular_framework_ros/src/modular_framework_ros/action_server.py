@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An action server that reports the end of every goal to its client, also of a goal that ends at once."""
+"""Action servers that report the end of every goal to the client, also of a goal that ends at once.
+
+A client of actionlib misses what it hears of a goal before its send_goal() has returned. So a server reports a goal
+only after the client's node has answered a call that began after the goal's arrival.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import rospy
-from actionlib import ActionServer
+from actionlib import ActionServer, SimpleActionServer
 
 from modular_framework_ros.publishing import going_down
+from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
-# actionlib's simple client never learns of an end that reaches it before its send_goal() has returned
-EARLIEST_END_S = 0.05
+CLIENT_TIMEOUT_S = 0.5
+"""How long a goal is not reported if the client's node does not answer [s]."""
 CLOSING_DELAY_S = 0.15
 """For a result to get out: to close a topic drops what rospy's threads have still to write [s]."""
 
@@ -44,15 +50,14 @@ class _StatusTimer(threading.Thread):
 
 
 class SteadyActionServer(ActionServer):
-    """An action server whose status topic does not depend on simulated time, and whose clients hear of every end.
-
-    The result of a goal that ends at once is published EARLIEST_END_S after the goal arrived.
-    """
+    """An action server whose status topic does not depend on simulated time, and whose clients hear of every end."""
 
     def initialize(self) -> None:
-        self._arrival_s: dict[str, float] = {}
+        self._client_addresses: dict[str, str] = {}
         self._last_result_s = -CLOSING_DELAY_S
-        self._pending_results: set[threading.Timer] = set()
+        self._unreported: dict[str, tuple[Any, Any] | None] = {}
+        """Status and result, if the goal has ended, of the goals that are not reported yet, by their ID."""
+        self._reports: set[threading.Thread] = set()
         super().initialize()
         timer: rospy.Timer | None = getattr(self, "status_timer", None)
         if timer is not None:
@@ -61,38 +66,80 @@ class SteadyActionServer(ActionServer):
             self.status_timer.start()
 
     def internal_goal_callback(self, goal: Any) -> None:
-        self._arrival_s[goal.goal_id.id] = time.monotonic()
-        super().internal_goal_callback(goal)
+        with self.lock:
+            goal_id, client = goal.goal_id.id, goal._connection_header["callerid"]
+            known = {item.status.goal_id.id for item in self.status_list}
+            if self.started and goal_id and goal_id not in known:
+                self._unreported[goal_id] = None
+                report = threading.Thread(target=self._report, args=(goal_id, client), daemon=True)
+                self._reports.add(report)
+                report.start()
+            super().internal_goal_callback(goal)
+
+    def _report(self, goal_id: str, client: str) -> None:
+        self._wait_for_client(client)
+        with self.lock:
+            ended = self._unreported.pop(goal_id)
+            if ended is not None:
+                self.publish_result(*ended)
+            else:
+                self.publish_status()
+        self._reports.discard(threading.current_thread())
+
+    def _wait_for_client(self, client: str) -> None:
+        try:
+            if client not in self._client_addresses:
+                self._client_addresses[client] = node_address(client)
+            process_id(self._client_addresses[client], CLIENT_TIMEOUT_S)
+        except NodeCallError as error:
+            self._client_addresses.pop(client, None)
+            rospy.logdebug("%s: a goal is reported though its client did not answer: %s", self.ns, error)
 
     def publish_result(self, status: Any, result: Any) -> None:
-        early_s = self._arrival_s.pop(status.goal_id.id, 0.0) + EARLIEST_END_S - time.monotonic()
-        if early_s <= 0.0:
-            self._publish_result_now(status, result)
-            return
-        later = threading.Timer(early_s, self._publish_result_now, (status, result))  # the caller has other work to do
-        later.daemon = True
-        self._pending_results.add(later)
-        later.start()
-
-    def _publish_result_now(self, status: Any, result: Any) -> None:
-        try:
-            super().publish_result(status, result)
-        except rospy.ROSException:
-            if not going_down():
-                raise
-        self._last_result_s = time.monotonic()
-        self._pending_results.discard(threading.current_thread())  # type: ignore[arg-type]
+        with self.lock:
+            if status.goal_id.id in self._unreported:
+                self._unreported[status.goal_id.id] = status, result
+                return
+            try:
+                super().publish_result(status, result)
+            except rospy.ROSException:
+                if not going_down():
+                    raise
+            self._last_result_s = time.monotonic()
 
     def stop(self) -> None:
         """Stops serving, once every result has been published."""
-        for later in list(self._pending_results):
-            later.join()
+        for report in list(self._reports):
+            report.join()
         time.sleep(max(0.0, self._last_result_s + CLOSING_DELAY_S - time.monotonic()))
         super().stop()
 
     def publish_status(self) -> None:
-        try:
-            super().publish_status()
-        except rospy.ROSException:
-            if not going_down():
-                raise
+        with self.lock:
+            items, self.status_list = self.status_list, []
+            unreported: list[Any] = []
+            for item in items:
+                (unreported if item.status.goal_id.id in self._unreported else self.status_list).append(item)
+            try:
+                super().publish_status()
+            except rospy.ROSException:
+                if not going_down():
+                    raise
+            finally:
+                self.status_list += unreported
+
+
+class SteadySimpleActionServer(SimpleActionServer):
+    """actionlib's SimpleActionServer on a `SteadyActionServer`; `start` starts it.
+
+    Args:
+        name: Name of the action.
+        action: Type of the action.
+        execute: Called with each goal, on a thread of the server.
+    """
+
+    def __init__(self, name: str, action: Any, execute: Callable[[Any], None]) -> None:
+        super().__init__(name, action, execute_cb=execute, auto_start=False)
+        self.action_server = SteadyActionServer(
+            name, action, self.internal_goal_callback, self.internal_preempt_callback, auto_start=False
+        )

@@ -3,20 +3,16 @@
 
 from __future__ import annotations
 
-import time
 import traceback
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import rospy
-from actionlib import SimpleActionServer
 
 import smach
+from modular_framework_ros.action_server import SteadySimpleActionServer
 
 __all__ = ["ActionServerWrapper"]
-
-# actionlib's simple client never learns of an end that reaches it before its send_goal() has returned
-EARLIEST_END_S = 0.05
 
 
 class ActionServerWrapper:
@@ -85,7 +81,7 @@ class ActionServerWrapper:
         self._check_outcomes()
         wrapped_container.register_transition_cb(self.transition_cb)
         wrapped_container.register_termination_cb(self.termination_cb)
-        self._action_server = SimpleActionServer(server_name, action_spec, execute_cb=self.execute_cb, auto_start=False)
+        self._action_server = SteadySimpleActionServer(server_name, action_spec, self.execute_cb)
 
     def _new_goal_data(self, goal: Any) -> None:
         """Puts a goal in the userdata, with an empty feedback and result; None: an empty goal."""
@@ -159,7 +155,6 @@ class ActionServerWrapper:
 
     def execute_cb(self, goal: Any) -> None:
         """Runs the container for a goal, and ends the goal as its outcome says."""
-        begun_s = time.monotonic()
         container = self.wrapped_container
         self._new_goal_data(goal)
         for slot in goal.__slots__ if self._expand_goal_slots else ():
@@ -175,10 +170,8 @@ class ActionServerWrapper:
             result = self._packed_result()
         except Exception as error:  # whatever a state raises ends this goal, not the server
             smach.logerr(f"'{self._server_name}': the state machine raised:\n{traceback.format_exc()}")
-            _sleep_until(begun_s + EARLIEST_END_S)
             self._action_server.set_aborted(text=f"the state machine raised {type(error).__name__}: {error}")
             return
-        _sleep_until(begun_s + EARLIEST_END_S)
         self._end_goal(outcome, result)
 
     def _packed_result(self) -> Any:
@@ -203,7 +196,3 @@ class ActionServerWrapper:
             self._action_server.set_preempted(result, text)
         else:
             self._action_server.set_aborted(result, text)
-
-
-def _sleep_until(time_s: float) -> None:
-    time.sleep(max(0.0, time_s - time.monotonic()))

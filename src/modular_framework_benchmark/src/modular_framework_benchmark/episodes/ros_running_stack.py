@@ -4,19 +4,16 @@
 from __future__ import annotations
 
 import hashlib
-import http.client
-import xmlrpc.client
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import rosgraph
 import rospkg
-import rospy
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
 from modular_framework_benchmark.records.what_ran import RanMethod, WhatRan, description_digests
 from modular_framework_planning.plan_statistics import PlannerRun
+from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
 FILES = {
     "world": "/gazebo/world_file",
@@ -65,23 +62,12 @@ def _value(parameters: Mapping[str, Any], name: str) -> Any:
     return found
 
 
-class _Transport(xmlrpc.client.Transport):
-    """Does not wait forever for a node whose process was stopped."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Returns a connection with a timeout."""
-        connection = super().make_connection(host)
-        connection.timeout = NODE_TIMEOUT_S
-        return connection
-
-
 def package_of(node: str) -> str:
     """Returns the ROS package of a running node's program; "" where it cannot be found out."""
     try:
-        uri: Any = rosgraph.Master(rospy.get_name()).lookupNode(node)
-        _, _, process = xmlrpc.client.ServerProxy(uri, _Transport()).getPid(rospy.get_name())
+        process = process_id(node_address(node), NODE_TIMEOUT_S)
         words = Path(f"/proc/{process}/cmdline").read_bytes().decode(errors="replace").split("\0")
-    except (OSError, rosgraph.MasterException, xmlrpc.client.Error):
+    except (OSError, NodeCallError):
         return ""
     program = next((Path(word) for word in words if word.startswith("/") and Path(word).parent.name != "bin"), None)
     if program is None:
