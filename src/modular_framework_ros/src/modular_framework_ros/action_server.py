@@ -20,6 +20,9 @@ from modular_framework_ros.ros_node_calls import NodeCallError, node_address, pr
 
 CLIENT_TIMEOUT_S = 0.5
 """How long a goal is not reported if the client's node does not answer [s]."""
+_QUICK_ANSWER_S = 0.005
+"""Switch interval of Python's threads. A client that answers later is busy and may be in send_goal() still [s]."""
+_MOST_CALLS = 3
 CLOSING_DELAY_S = 0.15
 """For a result to get out: to close a topic drops what rospy's threads have still to write [s]."""
 
@@ -90,7 +93,11 @@ class SteadyActionServer(ActionServer):
         try:
             if client not in self._client_addresses:
                 self._client_addresses[client] = node_address(client)
-            process_id(self._client_addresses[client], CLIENT_TIMEOUT_S)
+            for _ in range(_MOST_CALLS):
+                begun_s = time.monotonic()
+                process_id(self._client_addresses[client], CLIENT_TIMEOUT_S)
+                if time.monotonic() - begun_s < _QUICK_ANSWER_S:
+                    return
         except NodeCallError as error:
             self._client_addresses.pop(client, None)
             rospy.logdebug("%s: a goal is reported though its client did not answer: %s", self.ns, error)
