@@ -15,7 +15,7 @@ from moveit_commander.chain_jacobian import jacobian
 from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_objects import GroupObjects
 from moveit_commander.robot_model import group_values
-from moveit_commander.trajectory_timing import ALGORITHMS, distinct, retime, unwound
+from moveit_commander.trajectory_timing import ALGORITHMS, Limits, distinct, retime, unwound
 
 
 class MoveGroupCommander(GroupObjects):
@@ -82,7 +82,7 @@ class MoveGroupCommander(GroupObjects):
 
         Raises:
             MoveItCommanderException: an argument has another type, a joint is unknown, the positions of a point are
-                not one finite number per joint, or no timing keeps the limits.
+                not one finite number per joint, or a limit is not above 0.
         """
         for name, value, kind in (
             ("ref_state_in", ref_state_in, RobotState),
@@ -128,13 +128,19 @@ class MoveGroupCommander(GroupObjects):
                 _point(point, 0.0, [0.0] * len(names), [0.0] * len(names)) for point in kept
             ]
             return timed
-        times, velocities, accelerations = retime(
-            kept,
-            _factor("velocity", velocity_scaling_factor) * np.array([joint.velocity for joint in joints]),
-            _factor("acceleration", acceleration_scaling_factor) * np.array([joint.acceleration for joint in joints]),
+        lower, upper, velocity, acceleration = np.array(
+            [(joint.lower, joint.upper, joint.velocity, joint.acceleration) for joint in joints]
+        ).T
+        is_endless = [joint.kind == "continuous" for joint in joints]
+        limits = Limits(
+            np.where(is_endless, -np.inf, lower),
+            np.where(is_endless, np.inf, upper),
+            _factor("velocity", velocity_scaling_factor) * velocity,
+            _factor("acceleration", acceleration_scaling_factor) * acceleration,
         )
+        timing = retime(kept, limits)
         timed.joint_trajectory.points = [
-            _point(*row) for row in zip(kept, times, velocities, accelerations, strict=True)
+            _point(*row) for row in zip(kept, timing.times, timing.velocities, timing.accelerations, strict=True)
         ]
         return timed
 

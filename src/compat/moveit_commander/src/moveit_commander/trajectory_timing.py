@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Retimes a path: its waypoints stay, and its velocities and accelerations are within the joint limits."""
+"""Retimes a path: its waypoints stay, and the curve that a controller puts through them keeps the joint limits."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,19 @@ ALGORITHMS = (
 )
 GRID_POINTS = 20  # between two waypoints
 SAME_POINT = 1e-6  # [rad or m] waypoints nearer to each other than this are one
+SAMPLES = 64  # of the curve between two waypoints; the peak of a cubic lies at most 0.2 % above the largest of them
+MARGIN = 2e-3  # share of the limits
+BOUND_TOLERANCE = 1e-4  # [rad or m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limits:
+    """Limits of the joints, shape (joints,) each [rad or m, per s, per s^2]."""
+
+    lower: Any
+    upper: Any
+    velocity: Any
+    acceleration: Any
 
 
 def unwound(points: Any, continuous: Any) -> Any:
@@ -38,28 +52,84 @@ def distinct(points: Any) -> Any:
     return np.concatenate([[0], 1 + np.flatnonzero(moved)])
 
 
-def retime(points: Any, velocity: Any, acceleration: Any) -> tuple[Any, Any, Any]:
-    """Returns the fastest timing of a spline through the waypoints (TOPP-RA), at rest at both ends.
+@dataclass(frozen=True, slots=True, eq=False)
+class Timing:
+    """Times of waypoints [s], shape (n,); velocities and accelerations there, shape (n, joints)."""
+
+    times: Any
+    velocities: Any
+    accelerations: Any
+
+
+def retime(points: Any, limits: Limits) -> Timing:
+    """Returns a fast timing of the waypoints, at rest at both ends, whose times are whole nanoseconds.
+
+    TOPP-RA times a cubic spline through the waypoints. Its accelerations jump, which the quintics between the waypoints
+    cannot do: the timing is slowed evenly until these keep the limits. Where the spline swings over a bound, or so far
+    that stops at all waypoints are faster, a monotone spline takes its place, then these stops.
 
     Args:
         points: waypoints, shape (n >= 2, joints) [rad or m], each different from the one before.
-        velocity: limits of the joints, shape (joints,) [rad/s or m/s].
-        acceleration: limits of the joints, shape (joints,) [rad/s^2 or m/s^2].
-
-    Returns:
-        Times of the waypoints [s], shape (n,), strictly increasing; velocities and accelerations there, shape (n,
-        joints).
+        limits: of the joints; bounds hold where the waypoints keep them.
 
     Raises:
-        MoveItCommanderException: no timing keeps the limits.
+        MoveItCommanderException: a velocity or acceleration limit is not above 0.
     """
+    points = np.asarray(points, dtype=float)
+    if not (min(limits.velocity.min(), limits.acceleration.min()) > 0.0):
+        raise MoveItCommanderException(
+            f"retime_trajectory: velocity limits {limits.velocity.tolist()} and acceleration limits "
+            f"{limits.acceleration.tolist()}; all must be above 0"
+        )
+    slowest = _with_stops(points, limits)
+    return _along(False, points, limits, slowest) or _along(True, points, limits, slowest) or slowest
+
+
+def _with_stops(points: Any, limits: Limits) -> Timing:
+    """Returns the timing that stops at each waypoint; v = 15/8 d/T, a = 10/sqrt(3) d/T^2 at most."""
+    spans = np.abs(np.diff(points, axis=0))
+    durations = np.maximum(
+        1.875 * spans / limits.velocity, np.sqrt(10.0 / np.sqrt(3.0) * spans / limits.acceleration)
+    ).max(axis=1)
+    times = np.concatenate([[0.0], np.cumsum(durations * (1.0 + MARGIN))])
+    return Timing(np.round(times, 9), np.zeros_like(points), np.zeros_like(points))
+
+
+def _along(is_monotone: bool, points: Any, limits: Limits, slowest: Timing) -> Timing | None:
+    """Returns the timing of a spline; None where it leaves the bounds or is slower than another timing."""
+    from scipy.interpolate import BPoly
+
+    timing = _fastest(is_monotone, points, limits)
+    if timing is None:
+        return None
+    times, velocities, accelerations = timing.times, timing.velocities, timing.accelerations
+    curve = BPoly.from_derivatives(times, np.stack([points, velocities, accelerations], axis=1))
+    samples = np.linspace(times[:-1], times[1:], SAMPLES, axis=1)
+    positions = curve(samples)
+    lower, upper = np.minimum(limits.lower, points.min(axis=0)), np.maximum(limits.upper, points.max(axis=0))
+    if (positions < lower - BOUND_TOLERANCE).any() or (positions > upper + BOUND_TOLERANCE).any():
+        return None
+    fastest = np.abs(curve(samples, 1) / limits.velocity).max()
+    hardest = np.abs(curve(samples, 2) / limits.acceleration).max()
+    factor = max(1.0, fastest, np.sqrt(hardest)) * (1.0 + MARGIN)
+    times = np.round(times * factor, 9)
+    return Timing(times, velocities / factor, accelerations / factor**2) if times[-1] < slowest.times[-1] else None
+
+
+def _fastest(is_monotone: bool, points: Any, limits: Limits) -> Timing | None:
+    """Returns the fastest timing of a spline through the waypoints; None where TOPP-RA finds none."""
+    from scipy.interpolate import PchipInterpolator
     from toppra import SplineInterpolator
     from toppra.algorithm import TOPPRA
     from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+    from toppra.simplepath import SimplePath
 
-    points = np.asarray(points, dtype=float)
     knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    path = SplineInterpolator(knots, points)
+    path = (
+        SimplePath(knots, points, PchipInterpolator(knots, points, axis=0)(knots, 1))
+        if is_monotone
+        else SplineInterpolator(knots, points)
+    )
     grid = np.concatenate(
         [
             *(
@@ -69,19 +139,20 @@ def retime(points: Any, velocity: Any, acceleration: Any) -> tuple[Any, Any, Any
             knots[-1:],
         ]
     )
-    limits = [
-        JointVelocityConstraint(np.column_stack([-velocity, velocity])),
-        JointAccelerationConstraint(np.column_stack([-acceleration, acceleration])),
+    constraints = [
+        JointVelocityConstraint(np.column_stack([-limits.velocity, limits.velocity])),
+        JointAccelerationConstraint(np.column_stack([-limits.acceleration, limits.acceleration])),
     ]
-    _, speeds, _ = TOPPRA(limits, path, gridpoints=grid, solver_wrapper="seidel").compute_parameterization(0.0, 0.0)
+    _, speeds, _ = TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel").compute_parameterization(
+        0.0, 0.0
+    )
     if speeds is None or not np.isfinite(speeds).all() or (speeds[1:-1] <= 0.0).any():
-        raise MoveItCommanderException(
-            "retime_trajectory: no timing of this path keeps the joint limits; are there sharp turns or limits of 0?"
-        )
+        return None
     steps = 2.0 * np.diff(grid) / (speeds[:-1] + speeds[1:])
     times = np.concatenate([[0.0], np.cumsum(steps)])
     changes = np.diff(speeds) / steps  # constant between two grid points
     at = np.arange(len(knots)) * GRID_POINTS
     tangents, curvatures = path(knots, 1), path(knots, 2)
     change = changes[np.minimum(at, len(changes) - 1)]
-    return times[at], tangents * speeds[at, None], tangents * change[:, None] + curvatures * (speeds[at] ** 2)[:, None]
+    accelerations = tangents * change[:, None] + curvatures * (speeds[at] ** 2)[:, None]
+    return Timing(times[at], tangents * speeds[at, None], accelerations)
