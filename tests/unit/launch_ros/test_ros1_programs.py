@@ -123,6 +123,40 @@ def test_controllers_of_a_file_of_ros_2_are_those_of_ros_1(tmp_path: Path) -> No
     assert not any(name.startswith("/controller_manager/arm") for name in values)
 
 
+@pytest.mark.parametrize("constraints", ["{}", "{goal_time: 0.0, stopped_velocity_tolerance: 0.02, a: {goal: 0.03}}"])
+def test_a_goal_of_ros_2_without_goal_time_has_no_time_limit(tmp_path: Path, constraints: str) -> None:
+    (tmp_path / "ros2_controllers.yaml").write_text(
+        f"""
+controller_manager:
+  ros__parameters:
+    arm: {{type: {TRAJECTORY}}}
+arm:
+  ros__parameters:
+    joints: [a]
+    command_interfaces: [effort]
+    state_interfaces: [position, velocity]
+    constraints: {constraints}
+    gains: {{a: {{p: 10.0, d: 1.0, ff_velocity_scale: 0.5}}}}
+"""
+    )
+    path = str(tmp_path / "ros2_controllers.yaml")
+    context = visited(Node(package="controller_manager", executable="ros2_control_node", parameters=[path]))
+    values = context.parameters.values()
+    assert values["/arm/constraints/goal_time"] == 1e9
+    assert values.get("/arm/constraints/stopped_velocity_tolerance", 0.02) == 0.02
+    assert values.get("/arm/constraints/a/goal", 0.03) == 0.03
+    assert (values["/arm/gains/a/p"], values["/arm/gains/a/d"], values["/arm/velocity_ff/a"]) == (10.0, 1.0, 0.5)
+
+
+def test_a_velocity_that_no_state_interface_gives_is_not_checked(tmp_path: Path) -> None:
+    (tmp_path / "ros2_controllers.yaml").write_text(
+        CONTROLLERS.replace("[position],", "[position], state_interfaces: [position],")
+    )
+    path = str(tmp_path / "ros2_controllers.yaml")
+    context = visited(Node(package="controller_manager", executable="ros2_control_node", parameters=[path]))
+    assert context.parameters.values()["/arm/constraints/stopped_velocity_tolerance"] == 0.0
+
+
 def test_controllers_of_a_file_of_ros_1_stay_as_they_are(tmp_path: Path) -> None:
     (tmp_path / "controllers.yaml").write_text(
         "arm: {type: position_controllers/JointTrajectoryController, joints: [a]}"

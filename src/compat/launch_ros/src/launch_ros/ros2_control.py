@@ -32,6 +32,8 @@ CONTROLLER_TYPES = {
     ),
 }
 """Types of ROS 2 that have one other name on ROS 1; those that depend on interfaces are in `ros1_type`."""
+NO_TIME_LIMIT_S = 1e9
+"""`goal_time` of ros_control for a goal that may be reached at any time after its end [s]."""
 TRAJECTORY_TYPE = "joint_trajectory_controller/JointTrajectoryController"
 FORWARD_TYPES = (
     "forward_command_controller/ForwardCommandController",
@@ -148,6 +150,25 @@ def _is_controller(value: Any) -> bool:
 
 def _ros1_parameters(parameters: Mapping[str, Any], type_name: str) -> dict[str, Any]:
     ros1 = {**parameters, "type": ros1_type(type_name, parameters)}
+    if type_name == TRAJECTORY_TYPE:
+        ros1 |= _ros1_trajectory_parameters(parameters)
     if ros1["type"] == "joint_state_controller/JointStateController":
         ros1.setdefault("publish_rate", JOINT_STATE_RATE)
     return ros1
+
+
+def _ros1_trajectory_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns what ROS 2's trajectory controller names otherwise, or means otherwise, than that of ROS 1.
+
+    `open_loop_control` needs no translation: a motion of ROS 1 begins where the one before it commands the joints.
+    """
+    constraints = dict(parameters.get("constraints", {}))
+    if not constraints.get("goal_time"):
+        constraints["goal_time"] = NO_TIME_LIMIT_S
+    if "velocity" not in parameters.get("state_interfaces", ("position", "velocity")):
+        constraints["stopped_velocity_tolerance"] = 0.0  # a velocity that is not read is not checked
+    gains = {joint: dict(values) for joint, values in parameters.get("gains", {}).items()}
+    feed_forward = {
+        joint: values.pop("ff_velocity_scale") for joint, values in gains.items() if "ff_velocity_scale" in values
+    }
+    return {"constraints": constraints} | ({"gains": gains, "velocity_ff": feed_forward} if gains else {})
