@@ -66,16 +66,34 @@ def test_joint_states_come_at_the_rate(window: RosSession) -> None:
 
 
 def test_wrong_parameters_end_the_node_with_what_is_allowed(window: RosSession) -> None:
-    command = ["rosrun", "joint_state_publisher_gui", "joint_state_publisher_gui", "__name:=wrong", "_rate:=-1",
-               "_source_list:=[joint_states]"]  # fmt: skip
+    command = ["rosrun", "joint_state_publisher_gui", "joint_state_publisher_gui", "__name:=wrong", "_rate:=-1"]
     answer = subprocess.run(command, env=window.env, capture_output=True, text=True, timeout=60, check=False)
     assert answer.returncode == 1
     assert "parameter '/wrong/rate' is -1; allowed: a number, above 0" in answer.stdout + answer.stderr
-    command.remove("_rate:=-1")
-    answer = subprocess.run(
-        [*command, "_rate:=1"], env=window.env, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert answer.returncode == 1 and "'joint_states', which this node publishes" in answer.stdout + answer.stderr
+
+
+def test_a_source_may_be_the_topic_that_the_node_publishes(window: RosSession) -> None:
+    """Values of others count, and values of the node itself do not come back."""
+    command = ["rosrun", "joint_state_publisher", "joint_state_publisher", "__name:=own_source", "_rate:=20",
+               "_source_list:=[shared_states]", "joint_states:=shared_states"]  # fmt: skip
+    states: list[JointState] = []
+    subscriber = rospy.Subscriber("shared_states", JointState, states.append)
+    other = rospy.Publisher("shared_states", JointState, queue_size=1)
+    node = subprocess.Popen(command, env=window.env)
+
+    def turned() -> bool:
+        other.publish(JointState(name=["turn"], position=[0.5]))
+        own = [state for state in states if "wheel" in state.name]
+        return bool(own) and dict(zip(own[-1].name, own[-1].position, strict=True))["turn"] == 0.5
+
+    try:
+        until(turned, "the position of another node")
+        assert node.poll() is None
+    finally:
+        node.terminate()
+        node.wait(30.0)
+        subscriber.unregister()
+        other.unregister()
 
 
 @pytest.fixture(scope="module")

@@ -192,6 +192,16 @@ def test_files_of_moveit_2_are_understood(small: SmallPackage) -> None:
     ]
 
 
+def test_a_controller_of_the_root_namespace_has_an_empty_name(small: SmallPackage) -> None:
+    small.edit(
+        MOVEIT,
+        "name: arm_controller\n    action_ns: follow_joint_trajectory",
+        'name: ""\n    action_ns: joint_trajectory_action',
+    )
+    small.edit(MOVEIT, "    action_ns: gripper_cmd\n", "")
+    assert small.faults() == ()
+
+
 def test_the_srdf_is_expanded_with_the_arguments_of_the_setup_assistant(small: SmallPackage) -> None:
     opening = '<robot name="crane" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="tip" default="lost"/>'
     small.edit("config/crane.srdf", '<robot name="crane">', opening)

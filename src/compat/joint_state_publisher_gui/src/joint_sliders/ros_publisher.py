@@ -56,6 +56,8 @@ class JointStatePublisher:
         threading.Thread(target=self._publish_all, daemon=True).start()
 
     def _receive(self, message: JointState) -> None:
+        if message._connection_header["callerid"] == rospy.get_name():
+            return  # source_list may name the topic that this node publishes
         self.values.receive(message.name, message.position, message.velocity, message.effort)
         self._on_change()
 
@@ -89,7 +91,6 @@ def joint_state_publisher() -> JointStatePublisher | None:
     declared = declared_parameters()
     try:
         parameters = read_parameters(declared)
-        _check_sources(parameters)
         joints = slider_joints(read_urdf(declared.value("~robot_description")), parameters.settings)
     except (ParameterError, XmlError, ValueError) as error:
         for line in str(error).splitlines():
@@ -107,13 +108,3 @@ def declared_parameters() -> ParameterReader:
         lambda name: rospy.get_param(name, rospy.get_param(name[1:], None)),
         lambda name: rospy.resolve_name(name if rospy.has_param(name) else name[1:]),
     )
-
-
-def _check_sources(parameters: NodeParameters) -> None:
-    own = rospy.resolve_name(OUTPUT)
-    for topic in parameters.source_list:
-        if rospy.resolve_name(topic) == own:
-            raise ValueError(
-                f"parameter source_list has '{topic}', which this node publishes; allowed: other topics; "
-                f"remap {OUTPUT} or take the topic out"
-            )

@@ -126,6 +126,8 @@ class ControllerChecker:
                 self._faults.add_unknown(entry.location, f"initial: state of group '{group}'", pose, sorted(states))
 
     def _check_hardware(self, controller: MoveItController, moving: Sequence[HardwareController]) -> None:
+        if not controller.name:
+            return
         names = [item.name for item in moving]
         found = next((item for item in moving if item.name == controller.name.rsplit("/", 1)[-1]), None)
         if found is None:

@@ -74,7 +74,7 @@ def _of_list(node: Node, faults: FaultList) -> Iterator[MoveItController]:
         faults.add(node.location, f"controller_list is {kind_of(node)}; expected a list with name, joints and type")
         return
     for number, entry in enumerate(node.items):
-        if isinstance(entry, Mapping) and plain_text(entry.entries.get("name")):
+        if isinstance(entry, Mapping) and "name" in entry.entries:  # "" stands for a controller of the root namespace
             yield _controller(plain_text(entry.entries["name"]), entry.location, entry, faults)
         else:
             faults.add(entry.location, f"controller_list[{number}] has no name; add it")
