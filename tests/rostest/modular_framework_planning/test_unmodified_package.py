@@ -28,12 +28,21 @@ from moveit_msgs.msg import (
     MoveItErrorCodes,
     PlanningScene,
     PlanningSceneComponents,
+    PositionIKRequest,
     RobotState,
 )
-from moveit_msgs.srv import ApplyPlanningScene, GetMotionPlan, GetPlanningScene, GetStateValidity
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    GetMotionPlan,
+    GetPlanningScene,
+    GetPositionFK,
+    GetPositionIK,
+    GetStateValidity,
+)
 from ros_session import until
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Header
 
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 REACHING = [0.6, 0.3, 0.0, -1.7, 0.0, 2.0, 0.785]
@@ -108,6 +117,32 @@ def test_a_pose_is_reached(arm: MoveGroupCommander) -> None:
     assert [reached.x, reached.y, reached.z] == pytest.approx(
         [pose.pose.position.x, pose.pose.position.y, pose.pose.position.z], abs=2e-3
     )
+
+
+@pytest.mark.parametrize(("held", "tolerance"), [(1, 0.1), (2, 0.01), (4, 0.001)])
+def test_ik_of_seven_joints_keeps_joint_constraints(arm: MoveGroupCommander, held: int, tolerance: float) -> None:
+    rng = np.random.default_rng(held)
+    joints = arm.get_active_joints()
+    solve, place = (
+        rospy.ServiceProxy(name, kind) for name, kind in (("compute_ik", GetPositionIK), ("compute_fk", GetPositionFK))
+    )
+    for _ in range(25):
+        values = dict(zip(joints, arm.get_random_joint_values(), strict=True))
+        state = RobotState(joint_state=JointState(name=joints, position=list(values.values())), is_diff=True)
+        pose = place(Header(frame_id="panda_link0"), ["panda_link8"], state).pose_stamped[0]
+        kept = {name: values[name] for name in rng.choice(joints, held, replace=False)}
+        request = PositionIKRequest(group_name="panda_arm", pose_stamped=pose, timeout=rospy.Duration(1.0))
+        request.constraints.joint_constraints = [
+            JointConstraint(name, value, tolerance, tolerance, 1.0) for name, value in kept.items()
+        ]
+        answer = solve(request)
+        assert answer.error_code.val == MoveItErrorCodes.SUCCESS, (values, kept)
+        found = dict(zip(answer.solution.joint_state.name, answer.solution.joint_state.position, strict=True))
+        assert all(abs(found[name] - value) < tolerance + 2e-6 for name, value in kept.items())
+        reached = place(Header(frame_id="panda_link0"), ["panda_link8"], answer.solution).pose_stamped[0].pose
+        assert [reached.position.x, reached.position.y, reached.position.z] == pytest.approx(
+            [pose.pose.position.x, pose.pose.position.y, pose.pose.position.z], abs=3e-6
+        )
 
 
 def test_the_hand_closes_and_arm_and_hand_move_together(demo: Any) -> None:

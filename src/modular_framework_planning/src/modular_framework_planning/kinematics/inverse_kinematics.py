@@ -67,6 +67,11 @@ class InverseKinematics:
         self._closed = self._try_closed_form()
         self.reach = self._max_reach()
 
+    @property
+    def finds_all(self) -> bool:
+        """Whether no solution is missed: a closed form gives them all."""
+        return self._closed is not None and self._closed.locked is None and not self.settings.position_only
+
     def _try_closed_form(self) -> ClosedForm | None:
         between = [
             name for name in self.model.chain_joints(self.base_link, self._last_link) if name in self.model.index
@@ -156,7 +161,7 @@ class InverseKinematics:
         timeout_s: float | None = None,
         bounds: tuple[Array, Array] | None = None,
     ) -> _Problem:
-        allowed = self.settings.timeout_s * self.settings.attempts if timeout_s is None else timeout_s
+        allowed = self.settings.total_timeout_s if timeout_s is None else timeout_s
         return _Problem(
             self._chain.at(seed),
             target,

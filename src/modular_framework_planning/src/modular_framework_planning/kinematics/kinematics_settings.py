@@ -40,6 +40,11 @@ class KinematicsSettings:
                 "whole attempts",
             )
 
+    @property
+    def total_timeout_s(self) -> float:
+        """Time of all attempts."""
+        return self.timeout_s * self.attempts
+
 
 def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSettings]:
     """Reads the contents of kinematics.yaml: a mapping from group to its keys.

@@ -3,21 +3,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import count, product
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from modular_framework_planning.constraints.constraint_kinds import (
+    OrientationConstraint,
+    Parameterization,
+    PositionConstraint,
+)
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.geometry.regions import SphereSolid
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
-from modular_framework_planning.messages.constraint_conversions import holding_link
+from modular_framework_planning.messages.constraint_conversions import frame_on_robot, holding_link
 from modular_framework_planning.messages.poses import stamped_in_scene
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
+MIN_TRIES = 32  # made even after the timeout, so that a busy machine does not report reachable poses as unreachable
+MAX_TRIES = 1024  # where the clock must not decide
 MOST_COMBINED = 256  # solutions of several subgroups put together
 REACHED = 1.0e-4  # [m and rad]; a subgroup that another one carries does not reach its pose in their combination
 
@@ -46,6 +58,17 @@ class IkTarget:
                 self.link, self.placed.translation, self.target.translation, seed, timeout_s
             )
         return solver.solutions(self.link, self.target * self.placed.inverse(), seed, timeout_s)
+
+    def constraints(
+        self, scene: PlanningScene, position_only: bool
+    ) -> tuple[PositionConstraint, list[OrientationConstraint]]:
+        """Returns the target as a position constraint, and as an orientation constraint if that is not left open."""
+        link, world = frame_on_robot(scene, self.link), frame_on_robot(scene, "")
+        place = pin.SE3(np.eye(3), self.target.translation)
+        position = PositionConstraint(link, self.placed.translation, world, ((SphereSolid(0.0), place),))
+        rotation = self.target.rotation @ self.placed.rotation.T
+        kind = Parameterization.ROTATION_VECTOR
+        return position, [] if position_only else [OrientationConstraint(link, world, rotation, np.zeros(3), kind)]
 
     def is_reached(self, model: RobotModel, positions: Array, position_only: bool) -> bool:
         """Returns whether the frame is at its target."""
@@ -193,6 +216,45 @@ def combined_solutions(
             "ask for one link of a group that is one chain",
         )
     return list(together)
+
+
+def sampled_solutions(
+    scene: PlanningScene,
+    group: JointGroup,
+    targets: Sequence[IkTarget],
+    solvers: Sequence[InverseKinematics],
+    constraints: KinematicConstraints,
+    end_s: float,
+) -> Iterator[Array]:
+    """Yields positions of the whole robot that bring each link to its target and keep the constraints.
+
+    The first one is sought from the scene's state with its joints moved within their constraints, the others from
+    random states within these.
+
+    Args:
+        scene: the seed.
+        group: the joints that may move.
+        targets: what to place.
+        solvers: of these, in the same order.
+        constraints: of the request.
+        end_s: time.monotonic() at which the search ends; with math.inf the number of tries does.
+    """
+    pairs = zip(targets, solvers, strict=True)
+    poses = [target.constraints(scene, solver.settings.position_only) for target, solver in pairs]
+    together = KinematicConstraints(
+        scene.model,
+        constraints.joints,
+        [*constraints.positions, *(position for position, _ in poses)],
+        [*constraints.orientations, *(turn for _, turns in poses for turn in turns)],
+    )
+    rng = np.random.default_rng(0)
+    found = together.project(scene.positions, group.indices)
+    for number in count():
+        if found is not None:
+            yield found
+        if number >= MAX_TRIES if math.isinf(end_s) else number >= MIN_TRIES and time.monotonic() > end_s:
+            return
+        found = together.sample(rng, scene.positions, group.indices, attempts=1)
 
 
 def _joined(seed: Array, solvers: Sequence[InverseKinematics], solutions: Sequence[Array]) -> Array:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,12 @@ from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
-from modular_framework_planning.move_group.ik_targets import combined_solutions, ik_targets, solvers_of
+from modular_framework_planning.move_group.ik_targets import (
+    combined_solutions,
+    ik_targets,
+    sampled_solutions,
+    solvers_of,
+)
 from modular_framework_planning.move_group.pipeline_parameters import launch_seed
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
@@ -69,24 +75,43 @@ class KinematicsService(MoveGroupCapability):
         return response
 
     def _solve(self, scene: PlanningScene, request: Any) -> Array:
-        """Returns the solution nearest to the seed; raises PlanningError with the cause."""
+        """Returns the solution nearest to the seed; raises PlanningError with the cause.
+
+        Where these solutions do not do, and the solvers may have missed others, the rest of the time is for solutions
+        that are searched for together with the constraints.
+        """
+        begun = time.monotonic()
         group = self._context.model.group(request.group_name)
         targets = ik_targets(scene, group, request)
         links = [target.link for target in targets]
         solvers = solvers_of(self._context.kinematics, self._context.model, group, links)
-        found = combined_solutions(targets, solvers, scene.positions, self._timeout(request))
-        kept = self._constrained(scene, request, found, links)
-        if not request.avoid_collisions:
-            return kept[0]
-        checker = self._context.new_checker(scene, group.indices)
-        free = first_free(kept, checker.is_free, MAX_COMPARED)
-        if free:
-            return clearest(free, scene.positions, checker.distance)
-        contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))
-        raise PlanningError(
-            ErrorCode.NO_IK_SOLUTION,
-            f"all {len(kept)} inverse kinematics solutions for {', '.join(links)} collide; the nearest: {contacts}",
+        constraints = constraints_from_message(
+            scene, request.constraints, "ik_request.constraints", ErrorCode.NO_IK_SOLUTION, links[0]
         )
+        timeout_s = self._timeout(request)
+        found = combined_solutions(targets, solvers, scene.positions, timeout_s)
+        kept = [positions for positions in found if constraints.satisfied(positions)]
+        if kept and not request.avoid_collisions:
+            return kept[0]
+        checker = self._context.new_checker(scene, group.indices) if request.avoid_collisions else None
+        if checker is not None:
+            free = first_free(kept, checker.is_free, MAX_COMPARED)
+            if free:
+                return clearest(free, scene.positions, checker.distance)
+        if not all(solver.finds_all for solver in solvers):
+            end_s = begun + (
+                sum(solver.settings.total_timeout_s for solver in solvers) if timeout_s is None else timeout_s
+            )
+            for positions in sampled_solutions(scene, group, targets, solvers, constraints, end_s):
+                if checker is None or checker.is_free(positions):
+                    return positions
+        tips = f"{len(found)} inverse kinematics solutions for {', '.join(links)}"
+        if not kept:
+            reason = f"none of {tips} satisfies the constraints; the nearest: {constraints.describe(found[0])}"
+            raise PlanningError(ErrorCode.NO_IK_SOLUTION, reason)
+        assert checker is not None
+        contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))
+        raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"all {len(kept)} of {tips} collide; the nearest: {contacts}")
 
     @staticmethod
     def _timeout(request: Any) -> float | None:
@@ -95,21 +120,6 @@ class KinematicsService(MoveGroupCapability):
             return math.inf  # numbers of tries bound the search: the clock must not decide
         asked = request.timeout.to_sec()
         return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
-
-    @staticmethod
-    def _constrained(scene: PlanningScene, request: Any, found: list[Array], links: list[str]) -> list[Array]:
-        """Returns the solutions that satisfy the request's constraints; raises PlanningError where none does."""
-        constraints = constraints_from_message(
-            scene, request.constraints, "ik_request.constraints", ErrorCode.NO_IK_SOLUTION, links[0]
-        )
-        kept = [positions for positions in found if constraints.satisfied(positions)]
-        if not kept:
-            raise PlanningError(
-                ErrorCode.NO_IK_SOLUTION,
-                f"none of {len(found)} inverse kinematics solutions for "
-                f"{', '.join(links)} satisfies the constraints; the nearest: {constraints.describe(found[0])}",
-            )
-        return kept
 
     def _serve_fk(self, request: Any) -> GetPositionFKResponse:
         response = GetPositionFKResponse()
