@@ -21,6 +21,7 @@ SHARED = (  # several have a module `conftest`: the first is found
     "tests/unit/modular_framework_planning",
     "tests/unit/modular_framework_benchmark",
     "tests/rostest/modular_framework_planning",
+    "tests/unit/modular_framework_simulation",
     "tests",
 )
 MARK = "MODULAR_FRAMEWORK_BENCHMARK"

@@ -63,11 +63,16 @@ def test_a_box_slides_on_a_steep_slope_and_sticks_on_a_shallow_one(world: Physic
     assert moved["steep"] > 0.02
 
 
-def test_a_ball_comes_to_rest(world: PhysicsWorld) -> None:
-    body = world.spawn(solid("ball", specs.Sphere(0.03), Pose((0, 0, 0.03))))
+@pytest.mark.parametrize(("rolling", "speed"), [(1e-4, 0.0), (None, 0.05)])
+def test_a_ball_comes_to_rest_if_its_surface_resists_rolling(
+    world: PhysicsWorld, rolling: float | None, speed: float
+) -> None:
+    shape = specs.Sphere(0.03)
+    surface = specs.Collision("shape", Pose(), shape, specs.Friction(0.8, rolling=rolling))
+    body = world.spawn(solid("ball", shape, Pose((0, 0, 0.03)), surface=surface))
     world.set_state("ball", BodyState(Pose((0, 0, 0.03)), Twist((0.05, 0, 0), (0, 0.05 / 0.03, 0))))
     run(world, 5.0)
-    assert math.dist(body.state().twist.linear, (0, 0, 0)) < 0.005
+    assert math.dist(body.state().twist.linear, (0, 0, 0)) == pytest.approx(speed, abs=0.005)
 
 
 def test_the_model_frame_is_not_the_centre_of_mass(world: PhysicsWorld) -> None:

@@ -20,7 +20,8 @@ class PhysicsSettings:
             tested from 1 ms to 1/240 s, grasps with 2 ms: five steps make one tick of a 100 Hz clock. Errors of motion
             grow with the step (a fall of t seconds ends g t step / 2 too low), so does the creep of held objects.
         solver_iterations: Of the contact solver, at most; it ends earlier where nothing changes any more. A grasped
-            object hangs in a chain arm - finger - object - finger, through which forces travel link by link.
+            object hangs in a chain arm - finger - object - finger, through which forces travel link by link. PyBullet
+            makes more of them where the masses of free bodies differ more than 1:75.
         contact_erp: Share of a penetration that is corrected in one step. An object that falls is up to one step too
             deep when it touches, and leaves with up to this share of its velocity; low, so that it does not jump.
         friction_erp: Share of a slip that is taken back in one step where surfaces stick. Friction alone only stops
@@ -36,8 +37,8 @@ class PhysicsSettings:
             velocity afterwards, up to this share of the velocity before.
         hardest_erp: As contact_erp, the most that a stiffness in a model may ask for.
         body_spinning_friction: Resistance of objects against spinning about a contact normal [m], where the
-            model does not say; about the radius of a small contact patch.
-        body_rolling_friction: Resistance of objects against rolling [m]; brings balls to rest on a table.
+            model does not say: none, as in Gazebo.
+        body_rolling_friction: Resistance of objects against rolling [m], where the model does not say: none.
         body_friction: Coefficient of friction of links of robots whose description does not say.
         pad_friction: Of the gripper's links (rubber pads) whose description does not say. The smaller coefficient of
             the two surfaces of a contact counts.
@@ -57,8 +58,8 @@ class PhysicsSettings:
     bounce_threshold: float = 0.05
     bounce_erp: float = 0.01
     hardest_erp: float = 0.2
-    body_spinning_friction: float = 0.0005
-    body_rolling_friction: float = 0.0001
+    body_spinning_friction: float = 0.0
+    body_rolling_friction: float = 0.0
     body_friction: float = 1.0
     pad_friction: float = 1.0
     pad_spinning_friction: float = 0.005

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Trials of the laws of mechanics: what a simulated world does, and what the textbook says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from simulated_samples import jointed, run
+
+from modular_framework_simulation.models import sdf_specs as specs
+from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_world import PhysicsWorld
+from modular_framework_simulation.physics.simulated_body import BodyState, Twist
+from modular_framework_urdf.rotations import Vector3, rotate_vector
+
+G = 9.81
+MakeWorld = Callable[[], PhysicsWorld]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a trial measured, and what the law says."""
+
+    measured: float
+    expected: float
+
+    @property
+    def error(self) -> float:
+        """Relative error."""
+        return abs(self.measured / self.expected - 1.0)
+
+
+def part(
+    name: str,
+    shape: specs.Geometry,
+    pose: Pose,
+    moments: Vector3,
+    mass: float = 1.0,
+    mu: float = 0.8,
+    bounce: float = 0.0,
+    static: bool = False,
+) -> specs.Model:
+    """Returns a body with its own moments of inertia [kg m^2]."""
+    surface = specs.Collision("shape", Pose(), shape, specs.Friction(mu), specs.Bounce(bounce, 0.0))
+    x, y, z = moments
+    inertial = specs.Inertial(Pose(), mass, (x, 0, 0, y, 0, z))
+    return specs.Model(name, pose, static, (specs.Link("link", Pose(), inertial, (surface,), ()),), (), "law")
+
+
+def box(name: str, side: float, pose: Pose, mass: float = 1.0, mu: float = 0.8, bounce: float = 0.0) -> specs.Model:
+    """Returns a cube."""
+    moment = mass * side**2 / 6
+    return part(name, specs.Box((side,) * 3), pose, (moment,) * 3, mass, mu, bounce)
+
+
+def slope(angle: float, mu: float) -> tuple[specs.Model, Pose]:
+    """Returns a slope that goes down towards x, and the pose of its surface's centre."""
+    pose = Pose.from_xyz_rpy((0, 0, 3), (0, angle, 0))
+    return part("slope", specs.Box((8, 2, 0.1)), pose, (1, 1, 1), mu=mu, static=True), pose @ Pose((0, 0, 0.05))
+
+
+def free_fall(make: MakeWorld) -> Outcome:
+    """A fall of one second covers g t^2 / 2."""
+    world = make()
+    body = world.spawn(box("cube", 0.05, Pose((0, 0, 8))))
+    run(world, 1.0)
+    return Outcome(8 - body.state().pose.position[2], G / 2)
+
+
+def slide(make: MakeWorld) -> Outcome:
+    """A box with the speed v stops after v^2 / (2 mu g)."""
+    world, speed, mu = make(), 2.0, 0.4
+    ground, top = slope(0.0, mu)
+    world.spawn(ground)
+    flat = part("box", specs.Box((0.2, 0.2, 0.04)), top @ Pose((-2, 0, 0.02)), (0.0035, 0.0035, 0.0067), mu=mu)
+    body = world.spawn(flat)
+    run(world, 0.2)
+    begin = body.state().pose.position
+    world.set_state("box", BodyState(body.state().pose, Twist((speed, 0, 0))))
+    run(world, 2.0)
+    return Outcome(body.state().pose.position[0] - begin[0], speed**2 / (2 * mu * G))
+
+
+def rolled(make: MakeWorld, shape: specs.Geometry, moments: Vector3, turn: Vector3, inertia_ratio: float) -> Outcome:
+    """Returns the way down a slope of 10 degrees in one second; `inertia_ratio` is I / (m r^2)."""
+    world, angle, radius = make(), math.radians(10), 0.05
+    ground, top = slope(angle, 0.8)
+    world.spawn(ground)
+    start = top @ Pose((-2, 0, radius)) @ Pose.from_xyz_rpy((0, 0, 0), turn)
+    body = world.spawn(part("roller", shape, start, moments))
+    run(world, 1.0)
+    way = math.dist(body.state().pose.position, start.position)
+    return Outcome(way, G * math.sin(angle) / (1 + inertia_ratio) / 2)
+
+
+def roll_cylinder(make: MakeWorld) -> Outcome:
+    """A cylinder rolls down a slope with two thirds of what it would slide with."""
+    across, along = 1 * (3 * 0.05**2 + 0.1**2) / 12, 0.05**2 / 2
+    shape = specs.Cylinder(0.05, 0.1)
+    return rolled(make, shape, (across, across, along), (math.pi / 2, 0, 0), 0.5)
+
+
+def roll_ball(make: MakeWorld) -> Outcome:
+    """A ball rolls down a slope with five sevenths of what it would slide with."""
+    return rolled(make, specs.Sphere(0.05), (0.4 * 0.05**2,) * 3, (0, 0, 0), 0.4)
+
+
+def bounced(make: MakeWorld, shape: specs.Geometry, half: float, moment: float) -> Outcome:
+    """Returns the ratio of the velocities after and before an impact with restitution 0.8."""
+    world, bounce = make(), 0.8
+    world.spawn(part("slab", specs.Box((1, 1, 1)), Pose(), (1, 1, 1), bounce=bounce, static=True))
+    body = world.spawn(part("body", shape, Pose((0, 0, 0.5 + half + 0.5)), (moment,) * 3, bounce=bounce))
+    before = 0.0
+    while (velocity := body.state().twist.linear[2]) <= before:
+        before = velocity
+        world.step()
+    after = velocity
+    for _ in range(50):
+        world.step()
+        after = max(after, body.state().twist.linear[2])
+    return Outcome(-after / before, bounce)
+
+
+def bounce_ball(make: MakeWorld) -> Outcome:
+    """A ball of restitution 0.8 leaves with 0.8 of its velocity."""
+    return bounced(make, specs.Sphere(0.05), 0.05, 0.4 * 0.05**2)
+
+
+def bounce_box(make: MakeWorld) -> Outcome:
+    """A box of restitution 0.8 that falls flat leaves with 0.8 of its velocity."""
+    return bounced(make, specs.Box((0.1, 0.1, 0.1)), 0.05, 0.1**2 / 6)
+
+
+def pendulum(make: MakeWorld) -> Outcome:
+    """A pendulum has the period 2 pi sqrt(I / (m g l)) (1 + a^2 / 16)."""
+    world, length, amplitude = make(), 0.4, 0.1
+    body = world.spawn(jointed("pendulum", length, pose=Pose((0, 0, 2))))
+    body.set_joints({"hinge": math.pi / 2 - amplitude})
+    crossings: list[float] = []
+    step_s, before = world.settings.time_step_s, 0.0
+    while len(crossings) < 5:
+        world.step()
+        x, _, z = body.link_state("bob").pose.position
+        angle = math.atan2(-x, 2 - z)
+        if before * angle < 0:
+            crossings.append(world.time_ns * 1e-9 - step_s * angle / (angle - before))
+        before = angle
+    period = 2 * math.pi * math.sqrt((0.001 + 0.5 * length**2) / (0.5 * G * length)) * (1 + amplitude**2 / 16)
+    return Outcome((crossings[4] - crossings[0]) / 2, period)
+
+
+def top(make: MakeWorld) -> Outcome:
+    """A spinning top without friction turns about the vertical with the rate of Lagrange's steady precession."""
+    world, mass, height, radius, tilt, spin = make(), 0.5, 0.06, 0.004, 0.3, 150.0
+    axial, across = 4e-4, 3e-4
+    arm = height * mass * G  # torque per sine of the tilt, about the centre: the floor's push m g at the tip
+    # I1 W^2 cos(t) - I3 s W + m g h = 0; the slow root
+    root = math.sqrt((axial * spin) ** 2 - 4 * across * math.cos(tilt) * arm)
+    rate = (axial * spin - root) / (2 * across * math.cos(tilt))
+    tip = specs.Collision("tip", Pose((0, 0, -height)), specs.Sphere(radius), specs.Friction(0.0))
+    inertial = specs.Inertial(Pose(), mass, (across, 0, 0, across, 0, axial))
+    pose = Pose.from_xyz_rpy((0, 0, height * math.cos(tilt) + radius), (0, tilt, 0))
+    model = specs.Model("top", pose, False, (specs.Link("link", Pose(), inertial, (tip,), ()),), (), "law")
+    body = world.spawn(model)
+    axis = rotate_vector(pose.quaternion, (0.0, 0.0, 1.0))
+    own = spin - rate * math.cos(tilt)  # total spin about the axis is `spin`
+    angular = (own * axis[0], 0.0, own * axis[2] + rate)
+    world.set_state("top", BodyState(pose, Twist((0, 0, 0), angular)))
+    turned, before = 0.0, 0.0
+    seconds = 3.0
+    for _ in range(round(seconds / world.settings.time_step_s)):
+        world.step()
+        x, y, _ = rotate_vector(body.state().pose.quaternion, (0.0, 0.0, 1.0))
+        angle = math.atan2(y, x)
+        turned += (angle - before + math.pi) % (2 * math.pi) - math.pi
+        before = angle
+    return Outcome(turned / seconds, rate)
+
+
+def stack(make: MakeWorld) -> Outcome:
+    """Ten cubes on each other stand: the highest has its height after ten seconds, to a fraction of one cube."""
+    world, side = make(), 0.05
+    bodies = [world.spawn(box(f"cube_{n}", side, Pose((0, 0, side * (n + 0.5))))) for n in range(10)]
+    run(world, 10.0)
+    x, y, z = bodies[-1].state().pose.position
+    return Outcome(side - math.dist((x, y, z), (0, 0, 9.5 * side)), side)
+
+
+def heavy_on_light(make: MakeWorld) -> Outcome:
+    """A body of 100 kg stands on a body of 0.1 kg: their heights after five seconds."""
+    world, side = make(), 0.1
+    light = world.spawn(box("light", side, Pose((0, 0, side / 2)), mass=0.1))
+    heavy = world.spawn(box("heavy", side, Pose((0, 0, 1.5 * side)), mass=100.0))
+    run(world, 5.0)
+    off = max(
+        math.dist(body.state().pose.position, (0, 0, height))
+        for body, height in ((light, 0.5 * side), (heavy, 1.5 * side))
+    )
+    return Outcome(side - off, side)
+
+
+def friction_cone(make: MakeWorld) -> Outcome:
+    """A box begins to slip on a slope whose tangent is the coefficient of friction."""
+    mu, low, high = 0.5, 0.8, 1.2
+    while high - low > 0.005:
+        middle = (low + high) / 2
+        world = make()
+        ground, top_pose = slope(math.atan(mu * middle), mu)
+        world.spawn(ground)
+        start = top_pose @ Pose((0, 0, 0.02))
+        body = world.spawn(part("box", specs.Box((0.2, 0.2, 0.04)), start, (0.0035, 0.0035, 0.0067), mu=mu))
+        run(world, 1.0)
+        slips = math.dist(body.state().pose.position, start.position) > 0.004
+        low, high = (low, middle) if slips else (middle, high)
+    return Outcome(mu * (low + high) / 2, mu)
+
+
+TRIALS = (
+    free_fall, slide, roll_cylinder, roll_ball, bounce_ball, bounce_box, pendulum, top, stack, heavy_on_light,
+    friction_cone,
+)  # fmt: skip
