@@ -53,6 +53,7 @@ from planning_wire import (
     table,
 )
 from ros_session import until
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
@@ -169,6 +170,20 @@ def test_state_validity_names_the_bodies_and_the_depth() -> None:
     answer = call("check_state_validity", GetStateValidity, RobotState(), GROUP, Constraints())
     assert not answer.valid and answer.contacts[0].depth > 0
     assert "wall" in {answer.contacts[0].contact_body_1, answer.contacts[0].contact_body_2}
+
+
+def test_state_validity_logs_the_joint_that_is_out_of_bounds() -> None:
+    lines: list[str] = []
+    log = rospy.Subscriber("/rosout", Log, lambda message: lines.append(message.msg))
+    until(lambda: log.get_num_connections() > 0, "the log")
+    outside = RobotState(joint_state=JointState(name=[ARM[2]], position=[7.0]), is_diff=True)
+
+    def logged() -> bool:
+        assert not call("check_state_validity", GetStateValidity, outside, GROUP, Constraints()).valid
+        return any(f"joint {ARM[2]} at 7.0000 is outside" in line for line in lines)
+
+    until(logged, "the joint in the log")
+    log.unregister()
 
 
 def test_planners_are_listed() -> None:

@@ -151,7 +151,7 @@ def _require_usable(waypoints: Sequence[Transform], max_step_m: float, jumps: Ju
             f"waypoints: {len(waypoints)}; at most {MAX_STEPS} are followed: thin them out",
         )
     if not (np.isfinite(max_step_m) and max_step_m > 0.0):
-        raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"max_step is {max_step_m}; a length above 0 m is needed")
+        raise PlanningError(ErrorCode.FAILURE, f"max_step is {max_step_m}; a length above 0 m is needed")
     for name in ("factor", "prismatic", "revolute"):
         value = getattr(jumps, name)
         if not (np.isfinite(value) and value >= 0.0):

@@ -18,6 +18,9 @@ from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
 
+_LOG_PERIOD_S = 5.0
+"""Time between two identical messages: clients ask for many states in a row [s]."""
+
 
 class StateValidationService(ServiceCapability):
     """Offers check_state_validity (moveit_msgs/GetStateValidity)."""
@@ -57,7 +60,7 @@ class StateValidationService(ServiceCapability):
             )
         problems += [item.text for item in results if not item.satisfied]
         if problems:
-            rospy.logdebug("state not valid: %s", "; ".join(problems))
+            rospy.loginfo_throttle_identical(_LOG_PERIOD_S, f"{self.name}: not valid: {'; '.join(problems)}")
         return GetStateValidityResponse(
             valid=not contacts and not problems,
             contacts=[self._contact(item, model.planning_frame) for item in contacts],
