@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from modular_framework_planning.errors import ErrorCode, ModelError, PlanningError
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
@@ -34,7 +34,6 @@ from modular_framework_planning.planning_pipeline.adapters.limit_max_cartesian_l
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
 from modular_framework_planning.planning_scene.planning_scene import empty_scene
-from modular_framework_planning.robot_model.joint_limits import JointLimits, tighten
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.jerk_limits import (
     along_straight_lines,
@@ -180,14 +179,6 @@ def test_every_way_of_smoothing_keeps_the_limits_of_random_motions() -> None:
             assert np.diff(motion.times).min() > 1e-3
             assert np.allclose(motion.positions[[0, -1]], vertices[[0, -1]])
         assert np.allclose(straight.at(straight.sample_times())[0][0], vertices[0])
-
-
-def test_limits_of_jerk_are_read_and_checked() -> None:
-    limits = JointLimits(-1.0, 1.0, 1.0, 1.0)
-    assert tighten("j", limits, {"has_jerk_limits": True, "max_jerk": 20.0}).jerk == 20.0
-    assert tighten("j", limits, {"has_jerk_limits": False, "max_jerk": 20.0}).jerk == 1000.0
-    with pytest.raises(ModelError, match="jerk -1"):
-        tighten("j", limits, {"has_jerk_limits": True, "max_jerk": -1})
 
 
 def speeds_by_difference(model: RobotModel, motion: Trajectory, link: str) -> np.ndarray:

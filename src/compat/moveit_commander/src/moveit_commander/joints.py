@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from modular_framework_urdf import robot as urdf_robot
+from modular_framework_urdf.joint_limits import described_limits, overwritten
 from modular_framework_urdf.mimics import Mimic
 from modular_framework_urdf.robot import MOVABLE_KINDS, Vector
 from modular_framework_urdf.srdf_reader import VirtualJoint
@@ -123,19 +124,9 @@ def joint_of(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
 
 def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
     """The joint within the limits of the description, or those that its entry in joint_limits.yaml puts in place."""
-    lower, upper, velocity = (
-        (0.0, 0.0, 1.0) if joint.limit is None else (joint.limit.lower, joint.limit.upper, joint.limit.velocity or 1.0)
-    )
-    if joint.safety is not None:
-        lower = lower if joint.safety.soft_lower_limit is None else max(lower, joint.safety.soft_lower_limit)
-        upper = upper if joint.safety.soft_upper_limit is None else min(upper, joint.safety.soft_upper_limit)
-    if joint.kind == "continuous":
-        lower, upper = -math.pi, math.pi
-    if entry.get("has_position_limits", False):
-        lower, upper = float(entry.get("min_position", lower)), float(entry.get("max_position", upper))
-    if entry.get("has_velocity_limits", False):
-        velocity = float(entry.get("max_velocity", velocity))
-    acceleration = float(entry.get("max_acceleration", 1.0)) if entry.get("has_acceleration_limits", False) else 1.0
+    is_endless = joint.kind == "continuous"
+    limits, _ = overwritten(joint.name, described_limits(joint), entry, is_endless)
+    lower, upper = (-math.pi, math.pi) if is_endless else (limits.lower, limits.upper)
     mimic = joint.mimic or NO_MIMIC
     return Joint(
         joint.name,
@@ -144,8 +135,8 @@ def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
         joint.child,
         lower,
         upper,
-        velocity,
-        acceleration,
+        limits.velocity,
+        limits.acceleration,
         joint.origin.xyz,
         joint.origin.rpy,
         joint.axis,

@@ -31,7 +31,7 @@ from modular_framework_planning.geometry.regions import (
 from modular_framework_planning.geometry.spatial import IDENTITY_XYZW, Transform, make_transform, quaternion_or_identity
 from modular_framework_planning.messages.multi_dof import with_angles
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
-from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
+from modular_framework_planning.robot_model.robot_model import BEYOND_BOUND
 
 PRIMITIVES: dict[int, tuple[Callable[..., Solid], int]] = {
     SolidPrimitive.BOX: (BoxSolid, 3),

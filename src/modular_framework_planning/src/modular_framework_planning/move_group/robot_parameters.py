@@ -45,7 +45,7 @@ def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
         rospy.rostime.wallsleep(0.1)
     urdf, srdf = (str(rospy.get_param(nearest_parameter(name))) for name in names)
     model = RobotModel(urdf, srdf, load_planning_limits().get("joint_limits") or {})
-    for note in model.document.notes:
+    for note in model.notes:
         rospy.logwarn(note)
     return model
 

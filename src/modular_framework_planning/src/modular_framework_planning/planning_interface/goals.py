@@ -27,8 +27,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PoseGoal,
     group_bounds,
 )
-from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
-from modular_framework_planning.robot_model.robot_model import JointGroup
+from modular_framework_planning.robot_model.robot_model import BEYOND_BOUND, JointGroup
 
 MAX_GOAL_STATES = 8
 MAX_SAMPLES = 64  # states tried within the tolerances of one goal

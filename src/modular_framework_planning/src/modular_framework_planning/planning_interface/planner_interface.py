@@ -27,9 +27,8 @@ from modular_framework_planning.planning_interface.planning_request import (
     group_bounds,
 )
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
-from modular_framework_planning.robot_model.joint_limits import BEYOND_BOUND
 from modular_framework_planning.robot_model.multi_dof_joint import UNBOUNDED_M
-from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
+from modular_framework_planning.robot_model.robot_model import BEYOND_BOUND, JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_TURNED = 16  # goals by the longer way round that are searched for

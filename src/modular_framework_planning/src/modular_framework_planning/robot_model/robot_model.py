@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,6 @@ from modular_framework_planning.errors import ErrorCode, ModelError, UnknownName
 from modular_framework_planning.geometry.angles import short_way
 from modular_framework_planning.geometry.shapes import Shape
 from modular_framework_planning.geometry.spatial import Array, Transform
-from modular_framework_planning.robot_model.joint_limits import (
-    DEFAULT_ACCELERATION,
-    DEFAULT_VELOCITY,
-    JointLimits,
-    tighten,
-)
 from modular_framework_planning.robot_model.srdf import parse_srdf
 from modular_framework_planning.robot_model.urdf_document import (
     CONTINUOUS_BOUND,
@@ -28,9 +23,10 @@ from modular_framework_planning.robot_model.urdf_document import (
     load_urdf,
     package_resolver,
 )
+from modular_framework_urdf.joint_limits import DEFAULT_ACCELERATION, DEFAULT_VELOCITY, JointLimits, overwritten
 from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription
 
-NO_VELOCITY_LIMIT = 1.0e6
+BEYOND_BOUND = 1.0e-4  # [rad or m]; a goal this little beyond a joint's bound means the bound (3.1416 for pi)
 KEPT_MODELS = 4  # for how many robots what is computed once for a robot is kept
 
 
@@ -111,7 +107,8 @@ class RobotModel:
         # comes from tf, as other frames do.
         self.planning_frame = self.base.parent_frame if self.base else self.document.root_link
         self.frame_ids = {link: self.pin_model.getFrameId(link, pin.FrameType.BODY) for link in self.document.links}
-        self.limits = self._joint_limits(limits or {})
+        self.limits, notes = self._joint_limits(limits or {})
+        self.notes = (*self.document.notes, *notes)  # what was ignored or is looser than described, and why
         self.lower, self.upper, self.max_velocity, self.max_acceleration, self.max_jerk = (
             np.array([getattr(self.limits[name], key) for name in self.joint_names])
             for key in ("lower", "upper", "velocity", "acceleration", "jerk")
@@ -137,19 +134,25 @@ class RobotModel:
             names = (names - {self.base.name}) | set(self.base.variables)
         return names
 
-    def _joint_limits(self, entries: Mapping[str, Any]) -> dict[str, JointLimits]:
-        result = {}
+    def _joint_limits(self, entries: Mapping[str, Any]) -> tuple[dict[str, JointLimits], tuple[str, ...]]:
+        """Returns the limits of all joints, and notes on entries that are looser than the URDF, or ignored."""
+        result: dict[str, JointLimits] = {}
+        notes: list[str] = []
         for number, name in enumerate(self.joint_names):
-            velocity = float(self.pin_model.upperVelocityLimit[number])
-            known = 0.0 < velocity < NO_VELOCITY_LIMIT
-            limits = JointLimits(
-                float(self.pin_model.lowerPositionLimit[number]),
-                float(self.pin_model.upperPositionLimit[number]),
-                velocity if known else DEFAULT_VELOCITY,
-                DEFAULT_ACCELERATION,
-            )
-            result[name] = tighten(name, limits, _entry(entries, name))
-        return result
+            bounds = (self.pin_model.lowerPositionLimit[number], self.pin_model.upperPositionLimit[number])
+            limits = self.document.limits.get(name)
+            if limits is None:  # of the base
+                limits = JointLimits(float(bounds[0]), float(bounds[1]), DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
+            is_endless = math.isinf(limits.upper)
+            try:
+                limits, found = overwritten(name, limits, _entry(entries, name), is_endless)
+            except ValueError as error:
+                raise ModelError(str(error)) from error
+            if is_endless:
+                limits = replace(limits, lower=-CONTINUOUS_BOUND, upper=CONTINUOUS_BOUND)
+            result[name] = limits
+            notes += found
+        return result, tuple(notes)
 
     def _load_geometry(self) -> tuple[LinkGeometry, ...]:
         result = []

@@ -16,6 +16,7 @@ from modular_framework_planning.geometry.spatial import Transform
 from modular_framework_planning.robot_model.multi_dof_joint import MultiDofJoint, Variable, multi_dof_joint
 from modular_framework_urdf import robot as urdf
 from modular_framework_urdf import xml_text
+from modular_framework_urdf.joint_limits import JointLimits, described_limits
 from modular_framework_urdf.mesh_reader import MeshError, read_mesh
 from modular_framework_urdf.mimics import Mimic, resolved
 from modular_framework_urdf.robot import MOVABLE_KINDS, Link, PlacedShapes, Robot
@@ -49,6 +50,7 @@ class UrdfDocument:
     collisions: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()  # what was ignored, and why
     multi_dof_joint: MultiDofJoint | None = None  # above the root link
+    limits: Mapping[str, JointLimits] = field(default_factory=dict)  # of the URDF's joints, by name
 
 
 def directory_resolver(root: Path) -> MeshResolver:
@@ -234,4 +236,5 @@ def load_urdf(
         {link.name: tuple(_collisions(link, resolve)) for link in robot.links},
         (*notes, *ignored),
         base,
+        {joint.name: described_limits(joint) for joint in robot.movable_joints()},
     )

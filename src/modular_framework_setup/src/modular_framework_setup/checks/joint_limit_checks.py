@@ -98,7 +98,7 @@ class _JointChecker:
         if limit is None:
             return
         wider = f"{self._what}: {key} {value:g} is wider than the URDF's"
-        rule = "this file may only tighten a limit, so it has no effect"
+        rule = "this file counts, and the robot may not follow"
         if key == "max_velocity" and limit.velocity and value > limit.velocity * (1.0 + VELOCITY_SHARE):
             self._faults.add(where, f"{wider} {limit.velocity:g}; {rule}; allowed: at most {limit.velocity:g}")
         if self._joint.kind not in ("revolute", "prismatic"):

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Limits of joints for planning: those of the URDF, overwritten by joint_limits.yaml as in MoveIt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_urdf.robot import Joint
+
+DEFAULT_VELOCITY = 1.0  # [rad/s] or [m/s] where no source names one
+NO_VELOCITY_LIMIT = 1.0e6  # [rad/s] or [m/s]; a velocity from here on is none
+DEFAULT_ACCELERATION = 1.0  # [rad/s^2] or [m/s^2] where no source names one
+DEFAULT_JERK = 1000.0  # [rad/s^3] or [m/s^3] where no source names one
+ROUNDING = 1.0e-3  # share of a limit; a limit this little above the URDF's is that limit, rounded
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """Limits of one joint; positions [rad or m], velocity [1/s], acceleration [1/s^2], jerk [1/s^3].
+
+    Attributes:
+        deceleration: largest deceleration, above 0; None if it equals the acceleration.
+    """
+
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float
+    deceleration: float | None = None
+    jerk: float = DEFAULT_JERK
+
+    @property
+    def braking(self) -> float:
+        """Largest deceleration [1/s^2], above 0."""
+        return self.acceleration if self.deceleration is None else self.deceleration
+
+
+def described_limits(joint: Joint) -> JointLimits:
+    """Returns the limits of a joint's description, soft ones included; without bounds for a continuous joint."""
+    lower, upper = (0.0, 0.0) if joint.limit is None else (joint.limit.lower, joint.limit.upper)
+    if joint.safety is not None:
+        lower = lower if joint.safety.soft_lower_limit is None else max(lower, joint.safety.soft_lower_limit)
+        upper = upper if joint.safety.soft_upper_limit is None else min(upper, joint.safety.soft_upper_limit)
+    if joint.kind == "continuous":
+        lower, upper = -math.inf, math.inf
+    velocity = (joint.limit and joint.limit.velocity) or 0.0
+    is_known = 0.0 < velocity < NO_VELOCITY_LIMIT
+    return JointLimits(lower, upper, velocity if is_known else DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
+
+
+def _value(name: str, entry: Mapping[str, Any], flag: bool, key: str) -> float | None:
+    if not flag or key not in entry:
+        return None
+    value = entry[key]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"joint_limits/{name}/{key}: {value!r} is not a finite number")
+    return float(value)
+
+
+def overwritten(
+    name: str, limits: JointLimits, entry: Mapping[str, Any], is_endless: bool = False
+) -> tuple[JointLimits, tuple[str, ...]]:
+    """Returns the limits after the file's entry for this joint, and notes on what is looser or ignored.
+
+    Args:
+        name: joint, for error texts.
+        limits: of the description.
+        entry: of joint_limits.yaml. Bounds count with `has_position_limits`, other limits unless their flag is false.
+        is_endless: whether the joint cannot have bounds.
+
+    Raises:
+        ValueError: a value is not a number, has the wrong sign, or leaves no room between the bounds.
+    """
+    has_bounds = bool(entry.get("has_position_limits", False))
+    low, high = (_value(name, entry, has_bounds and not is_endless, key) for key in ("min_position", "max_position"))
+    lower, upper = limits.lower if low is None else low, limits.upper if high is None else high
+    velocity, acceleration, jerk = (
+        _value(name, entry, entry.get(f"has_{kind}_limits", True), f"max_{kind}")
+        for kind in ("velocity", "acceleration", "jerk")
+    )
+    braking_flag = "has_deceleration_limits" if "has_deceleration_limits" in entry else "has_deceleration"
+    deceleration = _value(name, entry, entry.get(braking_flag, True), "max_deceleration")
+    if deceleration is not None and deceleration >= 0:
+        raise ValueError(f"joint_limits/{name}/max_deceleration: {deceleration}; it must be below 0")
+    if lower > upper or any(value is not None and value <= 0 for value in (velocity, acceleration, jerk)):
+        raise ValueError(
+            f"joint_limits/{name}: bounds [{lower}, {upper}], velocity {velocity}, acceleration "
+            f"{acceleration}, jerk {jerk}; the bounds must leave room and the rest must be above 0"
+        )
+    result = JointLimits(
+        lower,
+        upper,
+        limits.velocity if velocity is None else velocity,
+        limits.acceleration if acceleration is None else acceleration,
+        None if deceleration is None else -deceleration,
+        DEFAULT_JERK if jerk is None else jerk,
+    )
+    notes = [
+        f"joint_limits/{name}: {key} {new:g} is looser than the URDF's {old:g}; it counts all the same"
+        for key, new, old, is_looser in (
+            ("min_position", lower, limits.lower, lower < limits.lower - ROUNDING),
+            ("max_position", upper, limits.upper, upper > limits.upper + ROUNDING),
+            ("max_velocity", result.velocity, limits.velocity, result.velocity > limits.velocity * (1.0 + ROUNDING)),
+        )
+        if is_looser
+    ]
+    if has_bounds and is_endless:
+        notes.append(f"joint_limits/{name}: has_position_limits is ignored, because the joint is continuous")
+    return result, tuple(notes)
