@@ -91,24 +91,30 @@ class InverseKinematics:
         sliding = self.group.indices[~self._turning]
         return steps + float(np.maximum(np.abs(self.model.lower), np.abs(self.model.upper))[sliding].sum())
 
-    def tip_offset(self, tip_link: str) -> Transform:
-        """Returns the pose of the last joint's link in the frame of a tip rigidly fixed to it.
+    def tip_offset(self, tip_link: str, positions: Array) -> Transform:
+        """Returns the pose of the last joint's link in the frame of a tip; only fixed and passive joints lie between.
+
+        Args:
+            tip_link: name of the tip.
+            positions: of the whole robot, for the passive joints, which stay there [rad or m].
 
         Raises:
             UnknownNameError: no such link.
-            PlanningError: the link moves relative to the end of the chain.
+            PlanningError: a joint that is not passive moves the link relative to the end of the chain.
         """
         if not self.model.has_link(tip_link):
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", tip_link, self.model.frame_ids)
-        frames = self.model.pin_model.frames
-        tip, last = (frames[self.model.frame_ids[name]] for name in (tip_link, self._last_link))
-        if tip.parentJoint != last.parentJoint:
+        if not self.model.is_carried(tip_link, self._last_link):
             raise PlanningError(
                 ErrorCode.NO_IK_SOLUTION,
                 f"link '{tip_link}' is not rigidly fixed to "
                 f"'{self._last_link}', the end of group '{self.group.name}'; choose a link that is",
             )
-        return tip.placement.inverse() * last.placement
+        tip, last = (self.model.pin_model.frames[self.model.frame_ids[name]] for name in (tip_link, self._last_link))
+        if tip.parentJoint == last.parentJoint:
+            return tip.placement.inverse() * last.placement
+        transforms = self.model.link_transforms(positions)
+        return transforms[tip_link].actInv(transforms[self._last_link])
 
     def solutions(
         self,
@@ -122,7 +128,7 @@ class InverseKinematics:
         """Returns all solutions found, as positions of the whole robot, nearest to the seed first.
 
         Args:
-            tip_link: link to bring to the target; rigidly fixed to the end of the group's chain.
+            tip_link: link to bring to the target; see tip_offset.
             target: pose of the link in the planning frame.
             seed: positions of the whole robot [rad or m]; joints outside the group stay there.
             timeout_s: time the search may take where there is no closed form; the group's by default. With
@@ -130,7 +136,7 @@ class InverseKinematics:
             rng: source of restarts of the numeric search.
             bounds: lower and upper bounds of the group's joints [rad or m]; those of the robot by default.
         """
-        problem = self._problem(target * self.tip_offset(tip_link), seed, timeout_s, bounds)
+        problem = self._problem(target * self.tip_offset(tip_link, seed), seed, timeout_s, bounds)
         found = self._from_closed_form(problem)
         if not len(found):
             found = self._from_search(problem, rng or np.random.default_rng(0))
@@ -142,13 +148,13 @@ class InverseKinematics:
         """As `solutions`, for the position of a point alone; the orientation is left open, and kept where it can be.
 
         Args:
-            tip_link: link that carries the point; rigidly fixed to the end of the group's chain.
+            tip_link: link that carries the point; see tip_offset.
             point: in the link's frame (3,) [m].
             position: where the point shall be, in the planning frame (3,) [m].
             seed: as for `solutions`.
             timeout_s: as for `solutions`.
         """
-        joint = self.tip_offset(tip_link).inverse() * pin.SE3(np.eye(3), np.asarray(point, dtype=float))
+        joint = self.tip_offset(tip_link, seed).inverse() * pin.SE3(np.eye(3), np.asarray(point, dtype=float))
         turn = self.model.link_transforms(seed)[tip_link].rotation
         target = pin.SE3(turn, np.asarray(position, dtype=float))
         problem = self._problem(target, seed, timeout_s).with_ball_joint(joint)
@@ -295,7 +301,7 @@ class InverseKinematics:
     def explain_unreachable(self, tip_link: str, target: Transform, seed: Array) -> str:
         """Says why a pose has no solution: too far away, or only out of joint bounds."""
         transforms = self.model.link_transforms(seed)
-        last = target * self.tip_offset(tip_link)
+        last = target * self.tip_offset(tip_link, seed)
         shoulder = transforms[self.model.document.joint_children[self.group.joints[0]]]
         distance = float(np.linalg.norm(last.translation - shoulder.translation))
         where = np.array2string(target.translation, precision=3, separator=", ")

@@ -48,13 +48,13 @@ class PoseFollower:
 
         Args:
             solver: inverse kinematics of the group.
-            link: rigidly fixed to the end of the group's chain.
+            link: at the end of the group's chain, see InverseKinematics.tip_offset.
             rest: positions of the whole robot; those outside the group stay.
 
         Raises:
             PlanningError: the link does not exist or is not rigid to the chain's end.
         """
-        solver.tip_offset(link)
+        solver.tip_offset(link, rest)
         self.model: RobotModel = solver.model
         self.group: JointGroup = solver.group
         self.link = link

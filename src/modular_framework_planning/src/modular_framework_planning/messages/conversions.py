@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from moveit_msgs.msg import RobotState, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 from modular_framework_planning.contacts import ATTACHED, LINK, WORLD
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array
@@ -28,6 +30,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
+LOGGER = logging.getLogger("rosout.goals")
 BODY_TYPES = {LINK: 0, WORLD: 1, ATTACHED: 2}
 
 
@@ -109,6 +112,7 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
             ErrorCode.INVALID_GOAL_CONSTRAINTS,
             f"{where}: no constraint; give joint, position or orientation constraints",
         )
+    constraints = _without_passive_joints(scene, constraints, where)
     joints = constraints.joints
     if len({joint.name for joint in joints}) == len(joints) and not (constraints.positions or constraints.orientations):
         return JointGoal(
@@ -122,6 +126,21 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
     link = holding_link(scene, name)
     in_link = scene.frame_transform(link).actInv(scene.frame_transform(name))
     return PoseGoal(link, constraints.pose_target(scene.positions) * in_link.inverse(), constraints)
+
+
+def _without_passive_joints(
+    scene: PlanningScene, constraints: KinematicConstraints, where: str
+) -> KinematicConstraints:
+    """Returns the constraints without joints that nothing moves; says so where these are not where they should be."""
+    passive = [item for item in constraints.joints if item.name in scene.model.passive_joints]
+    for item in passive:
+        result = item.evaluate(None, scene.positions)
+        if not result.satisfied:
+            LOGGER.warning("%s: %s; it is passive, nothing moves it, and it stays there", where, result.text)
+    if not passive:
+        return constraints
+    moved = [item for item in constraints.joints if item not in passive]
+    return KinematicConstraints(scene.model, moved, constraints.positions, constraints.orientations, constraints.name)
 
 
 def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:

@@ -171,10 +171,8 @@ def _ends(model: RobotModel, groups: Sequence[JointGroup]) -> str:
 
 
 def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
-    """Whether a link is rigidly fixed to the end of a chain."""
-    last = model.document.joint_children[group.joints[-1]]
-    frames = model.pin_model.frames
-    return bool(frames[model.frame_ids[link]].parentJoint == frames[model.frame_ids[last]].parentJoint)
+    """Whether a link is at the end of a chain."""
+    return model.is_carried(link, model.document.joint_children[group.joints[-1]])
 
 
 def _share_nothing(groups: Sequence[JointGroup]) -> bool:

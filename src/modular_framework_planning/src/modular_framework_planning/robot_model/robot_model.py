@@ -102,6 +102,7 @@ class RobotModel:
         self.base_indices = np.array(
             [self.index[name] for name in self.base.variables] if self.base else [], dtype=np.int64
         )
+        self.passive_joints = frozenset(self.semantics.passive_joints) - self.document.mimics.keys()
         self.follower_joints = frozenset(self._expanded((*self.document.mimics, *self.semantics.passive_joints)))
         # As in MoveIt: the frame in which the base moves, or the root link; the parent frame of a fixed virtual joint
         # comes from tf, as other frames do.
@@ -180,6 +181,15 @@ class RobotModel:
             link, joint = self._tree[link]
             joints.append(joint)
         return joints[::-1]
+
+    def is_carried(self, link: str, carrier: str) -> bool:
+        """Whether only fixed and passive joints lie between a link and the one that carries it (or it is that link)."""
+        paths = [
+            self.pin_model.supports[self.pin_model.frames[self.frame_ids[name]].parentJoint] for name in (link, carrier)
+        ]
+        path, above = ([int(number) for number in numbers] for numbers in paths)
+        between = [self.pin_model.names[number] for number in path[len(above) :]]
+        return path[: len(above)] == above and self.passive_joints.issuperset(between)
 
     def _group_joints(self, spec: GroupSpec, seen: tuple[str, ...] = ()) -> set[str]:
         if spec.name in seen:
