@@ -81,8 +81,11 @@ def test_gravity_defaults_to_that_of_sdf_and_can_be_set(tmp_path: Path) -> None:
 
 
 def test_what_means_nothing_here_is_read_over_and_listed(tmp_path: Path) -> None:
-    ignored = world(tmp_path, "<light name='sun'/>\n<plugin name='x'/>").ignored
-    assert [entry.split(": ")[1] for entry in ignored] == ["<light>", "<plugin>"]
+    read = world(
+        tmp_path, "<light name='sun'/>\n<plugin name='x'/><physics><max_step_size>0.004</max_step_size></physics>"
+    )
+    assert [entry.split(": ")[1] for entry in read.ignored] == ["<plugin>"]
+    assert read.step_s == 0.004
 
 
 def test_poses_relative_to_other_frames_are_resolved() -> None:
@@ -92,6 +95,15 @@ def test_poses_relative_to_other_frames_are_resolved() -> None:
         <joint name='j' type='fixed'><parent>a</parent><child>b</child></joint>"""
     link = model(text, "1.7").links[1]
     assert link.pose.position == pytest.approx((0, 2, 1))
+
+
+def test_friction_of_bullet_counts_in_both_directions_where_ode_has_none() -> None:
+    text = """<link name='a'><collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry><surface>
+        <friction><bullet><friction>0.7</friction><friction2>0.6</friction2></bullet></friction></surface></collision>
+        </link>"""
+    read = model(text)
+    assert read.links[0].collisions[0].friction == specs.Friction(0.7, mu2=0.6)
+    assert not any("friction" in note for note in read.notes)
 
 
 def test_friction_inertia_and_joints_are_read() -> None:

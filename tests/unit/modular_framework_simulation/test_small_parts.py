@@ -95,6 +95,17 @@ def test_time_that_nobody_waits_for_may_pass_at_another_pace() -> None:
     assert time.now == pytest.approx(50.4)
 
 
+def test_as_fast_as_possible_leaves_the_processor_to_nodes_while_the_robot_stands_still() -> None:
+    time = FakeTime()
+    pacer = Pacer(0.0, time.clock, time.sleep)
+    begun = time.now
+    pacer.keep(1.0, still=True)
+    pacer.keep(9.0, still=True)
+    assert time.now - begun == pytest.approx(8.0 / 4.0)
+    pacer.keep(500.0)
+    assert time.now - begun == pytest.approx(8.0 / 4.0)
+
+
 def test_what_arrives_while_the_loop_sleeps_is_carried_out_at_once_and_the_sleep_goes_on() -> None:
     requests = RequestQueue()
     answers: list[float] = []

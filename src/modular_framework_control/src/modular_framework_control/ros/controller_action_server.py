@@ -11,6 +11,7 @@ from typing import Any
 import rospy
 from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus as GoalStatusMsg
+from control_msgs.msg import GripperCommandResult
 
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.ros.outbox import Outbox
@@ -115,6 +116,10 @@ class ControllerActionServer:
             GoalStatus.CANCELED: goal.set_canceled,
             GoalStatus.REJECTED: goal.set_rejected,
         }[status]
+        result = self._make_result(goal_handle)
         if status in (GoalStatus.ABORTED, GoalStatus.REJECTED):
-            rospy.logwarn("%s: goal %s: %s", self._server.ns, status.value, goal_handle.text)
-        finish(self._make_result(goal_handle), goal_handle.text)
+            # Fingers that close on an object stall: whether that is a fault is for the sender to say.
+            stalled = isinstance(result, GripperCommandResult) and result.stalled
+            log = rospy.logdebug if stalled else rospy.logwarn
+            log("%s: goal %s: %s", self._server.ns, status.value, goal_handle.text)
+        finish(result, goal_handle.text)

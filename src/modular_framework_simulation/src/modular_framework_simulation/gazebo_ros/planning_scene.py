@@ -69,7 +69,7 @@ class PlanningScenePublisher:
         self._scene_changed = threading.Event()
         self._compared_s = 0.0
         self._compare_pause_s = _COMPARE_PAUSE_S
-        self._last_problem = ""
+        self._last_problem = self._told_problem = ""
         self._synchronising = threading.Lock()
         self._exact_at = (-1, -1)
 
@@ -149,9 +149,9 @@ class PlanningScenePublisher:
             names = sorted({conversions.collision_object_id(*change.key) for change in changes})
             return self._fail(f"move_group refused a change of {', '.join(names)}")
         self._changes.confirm()
-        if self._last_problem:
+        if self._told_problem:
             rospy.loginfo("planning scene: in step with the simulated world again")
-        self._last_problem = ""
+        self._last_problem = self._told_problem = ""
         return _SYNC_PERIOD_S
 
     def _compare(self) -> None:
@@ -193,8 +193,10 @@ class PlanningScenePublisher:
         return bool(self._server_uri)
 
     def _fail(self, problem: str) -> float:
-        if problem != self._last_problem:
+        # A first failure may be that of a move_group that ends before the simulation does; the next try tells.
+        if problem == self._last_problem and problem != self._told_problem:
             rospy.logwarn("planning scene: %s; the scene is read and the change sent again", problem)
+            self._told_problem = problem
         self._last_problem = problem
         self._compared_s = 0.0
         return _RETRY_PERIOD_S

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import sys
 import threading
@@ -142,6 +143,11 @@ class SimulationNode:
             spec = read_world(file, self._resources)
             if spec.ignored:
                 rospy.logwarn("elements of the world that have no effect here: %s", ", ".join(spec.ignored))
+            step_s = self._settings.time_step_s
+            if spec.step_s is not None and not math.isclose(spec.step_s, step_s):
+                rospy.logwarn(
+                    "the world asks for steps of %g s; steps of %g s are made (time_step)", spec.step_s, step_s
+                )
         engine = parameters["~physics_engine"]
         world = PhysicsWorld(
             self._settings,

@@ -212,7 +212,8 @@ class SimulationLoop:
             self._held_at = -1
             self.pacer.start(self._time_s())
         self.step()
-        self.pacer.keep(self._time_s(), idle=not self.holds.owners, calm=calm)
+        idle = not self.holds.owners
+        self.pacer.keep(self._time_s(), idle, calm, still=idle and calm and self._actors is not None)
 
     def _stand_still(self) -> None:
         """Lets the controllers take up goals while time is held; at first, lets them report the state of now."""

@@ -19,7 +19,7 @@ _READ: dict[str, tuple[str, ...]] = {
     "surface": ("friction", "bounce", "contact"),
     "friction": ("ode", "bullet", "torsional"),
     "friction/ode": ("mu", "mu2"),
-    "friction/bullet": ("friction", "rolling_friction"),
+    "friction/bullet": ("friction", "friction2", "rolling_friction"),
     "friction/torsional": ("coefficient",),
     "bounce": ("restitution_coefficient", "threshold"),
     "contact": ("ode", "collide_without_contact", "collide_bitmask"),

@@ -68,6 +68,7 @@ def read_world(path: Path, resources: Resources) -> specs.World:
         _gravity(world, version),
         tuple(with_saved_state(models, world.find("state"))),
         tuple(ignored),
+        _step(world),
     )
 
 
@@ -91,7 +92,7 @@ def _models_of(
                 raise DescriptionError(child.where, f"is a second model '{model.spec.name}'", "give each its own name")
             model = _with_free_name(model, loaded, f"{child.source}:{child.line}")
             loaded[model.spec.name] = model
-        elif child.tag not in ("gravity", "frame", "state"):
+        elif child.tag not in ("gravity", "frame", "state", "physics", "light", "scene", "gui"):
             ignored.append(f"{child.source}:{child.line}: <{child.tag}>")
     return loaded, ignored
 
@@ -124,6 +125,11 @@ def read_model_text(text: str, source: str, resources: Resources) -> specs.Model
     refuse_loops(loaded.spec)
     placed = FrameTree(root.find("world") or root, {loaded.spec.name: loaded.placed})
     return dataclasses.replace(loaded.spec, pose=placed.pose_in_model(loaded.spec.name))
+
+
+def _step(world: XmlNode) -> float | None:
+    node = world.find_path("physics", "max_step_size")
+    return None if node is None else node.number()
 
 
 def _gravity(world: XmlNode, version: tuple[int, ...]) -> Vector3:

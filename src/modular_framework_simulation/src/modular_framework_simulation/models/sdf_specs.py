@@ -313,10 +313,12 @@ class World:
         name: Name of the world.
         gravity: [m/s^2]
         models: In file order.
-        ignored: Elements that were read over, each as "file:line: <element>".
+        ignored: Elements that were read over, each as "file:line: <element>"; not those of the look of the world.
+        step_s: Physics step that the file asks for [s]; None: none.
     """
 
     name: str
     gravity: Vector3
     models: tuple[Model, ...]
     ignored: tuple[str, ...]
+    step_s: float | None = None

@@ -42,15 +42,17 @@ def read_friction(collision: XmlNode) -> specs.Friction:
         child = friction.find_path(*path) if friction is not None else None
         return friction_coefficient(child.number()) if child is not None else None
 
-    lateral = coefficient("ode", "mu")
-    if lateral is None:
+    lateral, across = coefficient("ode", "mu"), coefficient("ode", "mu2")
+    if lateral is None and across is None:
+        lateral, across = coefficient("bullet", "friction"), coefficient("bullet", "friction2")
+    elif lateral is None:
         lateral = coefficient("bullet", "friction")
     torsional = non_negative(friction, "torsional", "coefficient")
     return specs.Friction(
         1.0 if lateral is None else lateral,
         torsional,
         non_negative(friction, "bullet", "rolling_friction"),
-        coefficient("ode", "mu2"),
+        across,
     )
 
 

@@ -57,16 +57,18 @@ _WELD_FORCE = 1e5
 
 
 @contextlib.contextmanager
-def _silenced() -> Iterator[None]:
+def silenced() -> Iterator[None]:
     """Keeps the engine's C++ code from writing to the terminal; its problems come back as exceptions."""
-    saved = os.dup(1)
+    saved = [(os.dup(number), number) for number in (1, 2)]
     try:
         with open(os.devnull, "w") as nothing:
-            os.dup2(nothing.fileno(), 1)
+            for _, number in saved:
+                os.dup2(nothing.fileno(), number)
             yield
     finally:
-        os.dup2(saved, 1)
-        os.close(saved)
+        for copy, number in saved:
+            os.dup2(copy, number)
+            os.close(copy)
 
 
 class PyBulletEngine(PhysicsEngine):
@@ -83,7 +85,7 @@ class PyBulletEngine(PhysicsEngine):
     takes_concave_meshes = True
 
     def __init__(self, settings: PhysicsSettings, gravity: Vector3, gui: bool, log: Log) -> None:
-        with _silenced():
+        with silenced():
             import pybullet  # prints its build date when loaded
 
         self.api: Any = pybullet
@@ -192,7 +194,7 @@ class PyBulletEngine(PhysicsEngine):
         file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"
         file.write_text(text, encoding="utf-8")
         try:
-            with _silenced():
+            with silenced():
                 body: int = self.api.loadURDF(
                     str(file),
                     useFixedBase=fixed,

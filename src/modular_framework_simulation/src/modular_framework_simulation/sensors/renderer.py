@@ -14,6 +14,7 @@ from modular_framework_simulation.errors import DescriptionError, SimulationErro
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
+from modular_framework_simulation.physics.pybullet_engine import silenced
 from modular_framework_simulation.sensors.cameras import CameraImage, Pinhole
 from modular_framework_simulation.sensors.visible_scene import SceneUpdate
 from modular_framework_urdf.rotations import rotate_vector
@@ -47,7 +48,8 @@ class Renderer:
     """
 
     def __init__(self, drawing: Drawing, meshes: VisualMeshes, log: Callable[[str], None]) -> None:
-        import pybullet  # prints its build date when loaded
+        with silenced():
+            import pybullet  # prints its build date when loaded
 
         self._api: Any = pybullet
         self._meshes, self._log = meshes, log
