@@ -40,6 +40,7 @@ def test_the_last_fatal_message_is_the_cause_with_all_its_lines(tmp_path: Path) 
         ("gui:=", "argument 'gui' is ''"),
         ("worldfile:=b", "did you mean 'world_file'"),
         ("b.world", "not of the form name:=value"),
+        ("world_file:=a:=b", "argument 'world_file' is 'a:=b'; roslaunch takes no value with ':='"),
         ("gui=false", "'gui=false' is not of the form name:=value; did you mean 'gui:=false'"),
     ],
 )

@@ -85,6 +85,11 @@ def check_arguments(
             faults.append(f"argument '{argument}' is not of the form name:=value{meant}")
         elif name not in known:
             faults.append(f"unknown argument '{name}'{nearest(name, known)}; allowed: {', '.join(sorted(known))}")
+        elif ":=" in value:
+            faults.append(
+                f"argument '{name}' is '{value}'; roslaunch takes no value with ':='; make it the default of the "
+                "argument in a launch file of your own that includes this one"
+            )
         elif str(known[name][1]).lower() in BOOLEANS[:2] and value.lower() not in BOOLEANS:
             faults.append(f"argument '{name}' is '{value}', allowed are true and false; correct it")
     if not faults:
