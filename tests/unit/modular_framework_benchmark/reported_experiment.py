@@ -130,7 +130,7 @@ class ReportedExperiment:
             number = database.add_experiment(self.description(), self.specs())
             for record in self.records():
                 database.write(number, record)
-                if record.cause and self.with_files:
+                if self.with_files:
                     folder = folders / f"{record.spec.number:06d}"
                     folder.mkdir(parents=True)
                     (folder / "episode.log").write_text(record.cause)

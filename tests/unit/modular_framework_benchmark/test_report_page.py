@@ -10,12 +10,16 @@ import urllib.request
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from lxml import html
 from report_pages import Loads, Page, drawn_page
 from reported_experiment import TEXT, ReportedExperiment
 
 from modular_framework_benchmark.commands.report_command import main
+from modular_framework_benchmark.records.episode import EpisodeStatus
+from modular_framework_benchmark.reports.span_tables import ChosenEpisode
+from modular_framework_benchmark.reports.time_figures import timelines_figure
 
 HOSTILE = (
     "<script>document.documentElement.dataset.hacked = 1</script>",
@@ -126,6 +130,30 @@ def test_each_failure_is_linked_to_its_files_relative_to_the_page(page: Page) ->
     assert {link.text_content().split()[0] for link in links} == {"folder", "log", "video"}
     for link in links:
         assert (page.path.parent / urllib.parse.unquote(link.get("href"))).exists()
+
+
+def test_the_episodes_of_the_timelines_are_linked_to_their_files_successes_too(page: Page) -> None:
+    (table,) = page.tree.xpath("//table[caption='The episodes of the timelines.']")
+    rows = [[cell.text_content() for cell in row] for row in table.xpath("tbody/tr")]
+    assert {status for _, _, status, _ in rows} >= {"succeeded", "failed"}
+    assert all("video" in files for _, _, _, files in rows)
+    for link in table.xpath(".//a"):
+        assert (page.path.parent / urllib.parse.unquote(link.get("href"))).exists()
+
+
+def test_a_timeline_says_that_its_episode_started_cold() -> None:
+    spans = pd.DataFrame(
+        [
+            {"number": number, "kind": "state", "name": "/lift", "started_s": 0.0, "ended_s": 1.0}
+            | {"failed": False, "reason": ""}
+            for number in (1, 2)
+        ]
+    )
+    chosen = [ChosenEpisode(number, "a", EpisodeStatus.SUCCEEDED, number == 1, ()) for number in (1, 2)]
+    figure = timelines_figure(chosen, spans)
+    assert figure is not None
+    labels = figure.figure.layout.yaxis.ticktext
+    assert "cold start" in labels[0] and "cold" not in labels[1]
 
 
 def test_failures_are_grouped_by_cause_most_frequent_first(page: Page) -> None:

@@ -24,7 +24,7 @@ from modular_framework_benchmark.reports.run_record import (
     recorded_values,
     warnings_of,
 )
-from modular_framework_benchmark.reports.span_tables import SpanSummary, choose_episodes, summarise_spans
+from modular_framework_benchmark.reports.span_tables import ChosenEpisode, SpanSummary, choose_episodes, summarise_spans
 from modular_framework_benchmark.reports.success_figures import differences_figure, levels_figure, ranking_figure
 from modular_framework_benchmark.reports.time_figures import components_figure, progress_figure, timelines_figure
 from modular_framework_benchmark.statistics.analysis import analyse, summarise_by_level
@@ -91,6 +91,7 @@ class ReportContent:
         metrics: The metrics, in the order of the components.
         levels: Success of each method at each level of the other factors.
         spans: What states and components took.
+        chosen: The episodes whose timelines are shown.
         failures: What did not succeed, by cause.
         figures: All figures.
         recorded: Versions, machine, parameters.
@@ -106,6 +107,7 @@ class ReportContent:
     metrics: tuple[Metric, ...]
     levels: tuple[MethodSummary, ...]
     spans: tuple[SpanSummary, ...]
+    chosen: tuple[ChosenEpisode, ...]
     failures: Failures
     figures: tuple[NamedFigure, ...]
     recorded: tuple[RecordedValue, ...]
@@ -128,7 +130,7 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     description = results.description
     analysis = analyse(results, mean_intervals=mean_intervals)
     levels = _success_by_level(results)
-    chosen = choose_episodes(results)
+    chosen = choose_episodes(results, source.database_folder, source.report_folder)
     timelines = source.spans_of([item.number for item in chosen])
     spans = summarise_spans(results, source.span_totals, timelines)
     failures = group_failures(results, source.database_folder, source.report_folder)
@@ -144,7 +146,7 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     )
     return ReportContent(
         description, results.planned, len(results.episodes), _run_facts(results), analysis, metrics, levels, spans,
-        failures, tuple(figures), recorded, warnings_of(results, recorded, source.snapshots),
+        chosen, failures, tuple(figures), recorded, warnings_of(results, recorded, source.snapshots),
         commands_to_repeat(results, recorded, source.database),
     )  # fmt: skip
 

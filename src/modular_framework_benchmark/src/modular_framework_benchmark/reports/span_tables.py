@@ -5,12 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from modular_framework_benchmark.episodes.snapshot import COLD_START
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.reports.failure_groups import Link, episode_links
 from modular_framework_benchmark.statistics.observations import methods_of
 
 MOST_TIMELINES = 12
@@ -49,32 +52,51 @@ class ChosenEpisode:
         number: Of the episode.
         method: Its method.
         status: How it ended.
+        started_cold: Whether its launch was started for it.
+        links: To its folder and files.
     """
 
     number: int
     method: str
     status: EpisodeStatus
+    started_cold: bool
+    links: tuple[Link, ...]
 
 
-def choose_episodes(results: ExperimentResults) -> tuple[ChosenEpisode, ...]:
+def choose_episodes(
+    results: ExperimentResults, database_folder: Path, report_folder: Path
+) -> tuple[ChosenEpisode, ...]:
     """Returns, for each method, a success of median length and the first failure of its most frequent cause.
 
     At most MOST_TIMELINES episodes, those of the first methods.
+
+    Args:
+        results: The episodes.
+        database_folder: Folder that the episodes' folders are relative to.
+        report_folder: Folder of the report, which links are relative to.
     """
     episodes = results.episodes
-    chosen: list[ChosenEpisode] = []
+    rows: list[pd.Series] = []
     for method in methods_of(results):
         of_method = episodes[episodes[results.description.compared] == method]
         success = of_method[of_method["success"].astype(bool)]
         if len(success):
             taken = success["simulated_s"].astype(float).fillna(success["wall_s"]).to_numpy()
             middle = int(np.argsort(taken, kind="stable")[(len(taken) - 1) // 2])
-            chosen.append(ChosenEpisode(int(success["number"].iloc[middle]), method, EpisodeStatus.SUCCEEDED))
+            rows.append(success.iloc[middle])
         failed = of_method[of_method["status"].isin([EpisodeStatus.FAILED.value, EpisodeStatus.TIMED_OUT.value])]
         if len(failed):
-            row = failed[failed["cause"] == failed["cause"].value_counts().index[0]].iloc[0]
-            chosen.append(ChosenEpisode(int(row["number"]), method, EpisodeStatus(str(row["status"]))))
-    return tuple(chosen[:MOST_TIMELINES])
+            rows.append(failed[failed["cause"] == failed["cause"].value_counts().index[0]].iloc[0])
+    return tuple(
+        ChosenEpisode(
+            int(row["number"]),
+            str(row[results.description.compared]),
+            EpisodeStatus(str(row["status"])),
+            bool(row.get(COLD_START, False)),
+            episode_links(str(row["folder"] or ""), database_folder, report_folder),
+        )
+        for row in rows[:MOST_TIMELINES]
+    )
 
 
 def summarise_spans(results: ExperimentResults, totals: pd.DataFrame, shown: pd.DataFrame) -> tuple[SpanSummary, ...]:

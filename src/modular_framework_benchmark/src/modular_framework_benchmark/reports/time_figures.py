@@ -89,8 +89,12 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
         for span in _components(of_episode[item.number]).to_dict("records"):
             _add_span(figure, span, row + 0.24, 0.14, "#5f6c7b", False)
     styled(figure, height=150 + 52 * len(episodes))
-    figure.update_layout(barmode="overlay", legend={"y": 1.02})
-    labels = [f"{label(item.method, 24)}<br>no. {item.number}, {words(item.status.value)}" for item in episodes]
+    figure.update_layout(barmode="overlay")
+    labels = [
+        f"{label(item.method, 24)}<br>no. {item.number}, {words(item.status.value)}"
+        + (", cold start" if item.started_cold else "")
+        for item in episodes
+    ]
     figure.update_yaxes(
         tickvals=list(range(len(episodes))),
         ticktext=labels,
