@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospy
-from control_msgs.msg import GripperCommandActionGoal, JointTrajectoryControllerState
+from control_msgs.msg import JointControllerState, JointTrajectoryControllerState
 from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import Point, Pose
 from sensor_msgs.msg import JointState
@@ -79,9 +79,9 @@ def test_the_action_of_a_learner_has_the_gripper(tmp_path: Path, monkeypatch: py
     arm = JointTrajectoryControllerState(joint_names=["pan"])
     arm.header.stamp, arm.desired.positions, arm.actual.positions = rospy.Time.from_sec(0.1), [0.5], [0.5]
     samples.controllers = [("arm", arm)]
-    close = GripperCommandActionGoal()
-    close.header.stamp, close.goal.command.position = rospy.Time.from_sec(0.25), 1.2
-    samples.gripper_goals = [("knuckle", close)]
+    close = JointControllerState(set_point=1.2)
+    close.header.stamp = rospy.Time.from_sec(0.25)
+    samples.set_points = [("knuckle", close)]
     write_recording(tmp_path, samples, {}, {"zero": 0.0, "simulated_s": 0.4}, None)
     frames = read_frames(tmp_path / "trajectory.parquet", 10)
     gripper = frames.values[ACTION][:, frames.names[ACTION].index("knuckle")]

@@ -71,6 +71,21 @@ def test_a_free_gripper_reaches_its_goal(loop: Any) -> None:
     assert goal_handle.result is not None and goal_handle.result.reached_goal and not goal_handle.result.stalled
 
 
+def test_its_state_says_what_is_commanded_at_a_fixed_rate(loop: Any) -> None:
+    states: list[Any] = []
+    loop.controllers["gripper"].on_state = states.append
+    loop.run(0.1)
+    send(loop, 0.8)
+    loop.run(1.0)
+    times_s = [state.time_s for state in states[1:]]
+    assert [after - before for before, after in zip(times_s, times_s[1:], strict=False)] == pytest.approx(
+        [0.02] * (len(times_s) - 1), abs=1e-3
+    )
+    assert {state.set_point for state in states} == {0.0, 0.8}
+    last = states[-1]
+    assert (last.process_value, last.error) == (pytest.approx(OBJECT), pytest.approx(0.8 - OBJECT))
+
+
 def test_a_blocked_gripper_stalls_after_the_timeout_and_goes_on_squeezing(loop: Any) -> None:
     goal_handle = send(loop, 0.8)
     loop.run(0.5 + 0.25)

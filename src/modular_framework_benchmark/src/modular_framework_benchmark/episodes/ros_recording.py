@@ -51,7 +51,7 @@ def write_recording(
     tracking = _within(_tracking(samples, zero), end_s)
     joints = samples.joints if turns is None else joint_states_in_turn(samples.joints, turns)
     trajectory = _with_objects(
-        _within(_trajectory(joints, commands_of(tracking, samples.gripper_goals, zero), zero), end_s), poses
+        _within(_trajectory(joints, commands_of(tracking, samples.set_points, zero), zero), end_s), poses
     )
     trajectory.to_parquet(folder / TRAJECTORY)
     tracking.to_parquet(folder / TRACKING)
@@ -187,11 +187,18 @@ def _turns_of(times_s: Any, turns: float) -> Any:
     return np.floor(times_s * turns + SAME_TIME_S)
 
 
-def commands_of(tracking: pd.DataFrame, gripper_goals: Sequence[tuple[str, Any]], zero: float) -> pd.DataFrame:
-    """Returns what joints are commanded, from trajectory and gripper controllers: time_s, joint, desired."""
-    goals = [(goal.header.stamp.to_sec() - zero, joint, goal.goal.command.position) for joint, goal in gripper_goals]
+def commands_of(tracking: pd.DataFrame, set_points: Sequence[tuple[str, Any]], zero: float) -> pd.DataFrame:
+    """Returns what controllers command: time_s, joint, desired.
+
+    Args:
+        tracking: Samples of the trajectory controllers.
+        set_points: Joint and control_msgs/JointControllerState of the controllers of one joint. The stamps of clients'
+            goals depend on when the clock reaches the client.
+        zero: ROS time at which the recording begins [s].
+    """
+    rows = [(state.header.stamp.to_sec() - zero, joint, state.set_point) for joint, state in set_points]
     columns = ["time_s", "joint", "desired"]
-    return pd.concat([tracking[columns], pd.DataFrame(goals, columns=columns)]) if goals else tracking[columns]
+    return pd.concat([tracking[columns], pd.DataFrame(rows, columns=columns)]) if rows else tracking[columns]
 
 
 def _trajectory(joints: Sequence[Any], commands: pd.DataFrame, zero: float) -> pd.DataFrame:

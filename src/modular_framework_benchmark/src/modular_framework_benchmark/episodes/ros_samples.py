@@ -13,7 +13,7 @@ from typing import Any
 import rosgraph
 import roslib.message
 import rospy
-from control_msgs.msg import GripperCommandActionGoal, JointTrajectoryControllerState
+from control_msgs.msg import JointControllerState, JointTrajectoryControllerState
 from gazebo_msgs.msg import ModelStates
 from moveit_msgs.msg import DisplayTrajectory
 from sensor_msgs.msg import JointState
@@ -25,7 +25,7 @@ ACTIONS = {"moveit_msgs/ExecuteTrajectoryActionGoal": "execution", "modular_fram
 """Component that an action belongs to, by the type of its goal."""
 
 CONTROLLER_STATE = "control_msgs/JointTrajectoryControllerState"
-GRIPPER_GOAL = "control_msgs/GripperCommandActionGoal"
+JOINT_STATE = "control_msgs/JointControllerState"
 PLANNING_NODE = "/move_group"
 MODELS, GRASPED, TASK_STATUS = "/gazebo/model_states", "/gazebo/grasped_object", "task_status"
 REPORTS, PATHS = "/move_group/planning_report", "/move_group/display_planned_path"
@@ -39,13 +39,13 @@ class Samples:
     Subscribers: ``joint_states``, ``/gazebo/model_states``, ``/gazebo/grasped_object``, ``task_status``,
     ``component_reports``, ``/move_group/planning_report``, ``/move_group/display_planned_path``, the states of all
     trajectory controllers,
-    goals and results of the actions in `ACTIONS`, goals of gripper controllers.
+    goals and results of the actions in `ACTIONS`, the states of controllers of one joint.
 
     Attributes:
         joints: Joint states.
         models: (simulated time [s], gazebo_msgs/ModelStates).
         controllers: (name of the controller, its state).
-        gripper_goals: (joint of a gripper controller, its control_msgs/GripperCommandActionGoal).
+        set_points: (joint of a controller of one joint, as of a gripper, its control_msgs/JointControllerState).
         planning: (real time [s], report of move_group).
         paths: Motions that move_group shows.
         components: (real time [s], report of a component).
@@ -69,7 +69,7 @@ class Samples:
             self.ends: list[dict[str, Any]] = []
             self.forgeries: set[tuple[str, str]] = set()
             self.controllers: list[tuple[str, Any]] = []
-            self.gripper_goals: list[tuple[str, Any]] = []
+            self.set_points: list[tuple[str, Any]] = []
             self.planning: list[tuple[float, dict[str, Any]]] = []
             self.paths: list[Any] = []
             self.components: list[tuple[float, dict[str, Any]]] = []
@@ -111,8 +111,8 @@ class Samples:
             if type_name == CONTROLLER_STATE:
                 name = topic.strip("/").rpartition("/")[0]
                 self._subscribe(topic, JointTrajectoryControllerState, self._controller(name), SIMULATION_NODE)
-            elif type_name == GRIPPER_GOAL:
-                self._subscribe_gripper(topic)
+            elif type_name == JOINT_STATE:
+                self._subscribe_joint(topic)
             elif type_name in ACTIONS:
                 self._subscribe_action(topic, type_name)
 
@@ -140,11 +140,13 @@ class Samples:
     def _controller(self, name: str) -> Callable[[Any], None]:
         return lambda message: self.controllers.append((name, message))
 
-    def _subscribe_gripper(self, topic: str) -> None:
-        """Subscribes to the goals of a controller, CONTROLLER/gripper_cmd/goal, whose parameters name its joint."""
-        joint = rospy.get_param(f"{topic.rpartition('/')[0].rpartition('/')[0]}/joint", "")
+    def _subscribe_joint(self, topic: str) -> None:
+        """Subscribes to the state of a controller, CONTROLLER/state, whose parameters name its joint."""
+        joint = rospy.get_param(f"{topic.rpartition('/')[0]}/joint", "")
         if joint:
-            self._subscribe(topic, GripperCommandActionGoal, lambda goal: self.gripper_goals.append((joint, goal)))
+            self._subscribe(
+                topic, JointControllerState, lambda state: self.set_points.append((joint, state)), SIMULATION_NODE
+            )
 
     def _subscribe_action(self, topic: str, type_name: str) -> None:
         name, component = topic.rpartition("/")[0], ACTIONS[type_name]

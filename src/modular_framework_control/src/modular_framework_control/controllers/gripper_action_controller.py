@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
+from modular_framework_control.controller_interface.pid import PidGains
+from modular_framework_control.controllers.joint_command_controllers import JointControlSnapshot
 from modular_framework_control.hardware_interface.handles import JointHandle, unmeasured
 from modular_framework_control.hardware_interface.interfaces import HardwareInterface, PositionJointInterface
 from modular_framework_control.hardware_interface.joint_limit_parameters import POINT_MARGIN
@@ -70,15 +72,17 @@ class GripperActionController(Controller):
 
     Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, used for
     goals that give none, 0 = the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
-    1.0; `action_monitor_rate` [1/s] 20.
+    1.0; `action_monitor_rate` [1/s] 20; `state_publish_rate` [1/s] 50.
 
     Attributes:
+        on_state: called in the control loop at `state_publish_rate` with a snapshot, whose gains are 0.
         on_feedback: called in the control loop at `action_monitor_rate` with the active goal handle and the state.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]] = PositionJointInterface
 
     def __init__(self) -> None:
+        self.on_state: Callable[[JointControlSnapshot], None] | None = None
         self.on_feedback: Callable[[GripperGoalHandle, GripperState], None] | None = None
         self._mailbox: Mailbox[_Goal | GripperGoalHandle] = Mailbox()
         self._active: _Goal | None = None
@@ -100,6 +104,7 @@ class GripperActionController(Controller):
         self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
         threshold = read_number(controller_nh, "stall_velocity_threshold", 0.001)
         self._stall_distance = threshold * self._stall_timeout_s
+        self._state_turns = Schedule(read_number(controller_nh, "state_publish_rate", 50.0))
         self._feedback_turns = Schedule(read_number(controller_nh, "action_monitor_rate", 20.0))
         return True
 
@@ -156,6 +161,7 @@ class GripperActionController(Controller):
         self._max_effort = self._default_max_effort
         self._hold()
         self._apply(0.0)
+        self._state_turns.start(time_s)
         self._running = True
 
     def stopping(self, time_s: float) -> None:
@@ -201,6 +207,15 @@ class GripperActionController(Controller):
         self._apply(period_s)
         if self._active is not None:
             self._check(self._active, time_s, period_s)
+        if self.on_state is not None and self._state_turns.take_turn(time_s):
+            self.on_state(self._snapshot(time_s, period_s))
+
+    def _snapshot(self, time_s: float, period_s: float) -> JointControlSnapshot:
+        handle = self._handle
+        error = self._command - handle.position
+        return JointControlSnapshot(
+            time_s, period_s, self._command, handle.position, handle.velocity, error, handle.command, PidGains(0.0)
+        )
 
     def _carry_out(self, goal: _Goal | GripperGoalHandle, time_s: float) -> None:
         if isinstance(goal, _Goal) and self._fault:

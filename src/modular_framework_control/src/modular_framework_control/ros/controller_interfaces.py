@@ -13,6 +13,7 @@ from control_msgs.msg import (
     FollowJointTrajectoryGoal,
     GripperCommandAction,
     GripperCommandGoal,
+    JointControllerState,
     JointTrajectoryControllerState,
 )
 from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateRequest, QueryTrajectoryStateResponse
@@ -36,7 +37,7 @@ from modular_framework_control.realtime.goal_handle import RealtimeGoalHandle
 from modular_framework_control.realtime.loop_time import LoopTime
 from modular_framework_control.ros import conversions
 from modular_framework_control.ros.controller_action_server import ControllerActionServer, GoalRefusedError
-from modular_framework_control.ros.joint_command_interface import JointCommandRosInterface
+from modular_framework_control.ros.joint_command_interface import JointCommandRosInterface, joint_control_to_msg
 from modular_framework_control.ros.mobile_base_interfaces import (
     DiffDriveRosInterface,
     FourWheelSteeringRosInterface,
@@ -162,26 +163,37 @@ def _trajectory_result(goal_handle: RealtimeGoalHandle[TrajectoryErrorCode]) -> 
 
 
 class GripperRosInterface:
-    """Serves `<name>/gripper_cmd` (control_msgs/GripperCommand action)."""
+    """The action and the topic of a gripper controller.
+
+    Serves `<name>/gripper_cmd` (control_msgs/GripperCommand action); publishes `<name>/state`
+    (control_msgs/JointControllerState).
+    """
 
     def __init__(
         self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
     ) -> None:
-        del loop_time
         self._controller = controller
-        self._action = ControllerActionServer(
-            join_names(namespace, f"{name}/gripper_cmd"),
-            GripperCommandAction,
-            self._submit,
-            controller.cancel,
-            _gripper_result,
-            outbox,
+        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
+            state = rospy.Publisher(join_names(namespace, f"{name}/state"), JointControllerState, queue_size=QUEUE_SIZE)
+            opened.callback(state.unregister)
+            self._action = ControllerActionServer(
+                join_names(namespace, f"{name}/gripper_cmd"),
+                GripperCommandAction,
+                self._submit,
+                controller.cancel,
+                _gripper_result,
+                outbox,
+            )
+            opened.callback(self._action.close)
+            self._opened = opened.pop_all()
+        controller.on_state = lambda snapshot: outbox.publish(
+            state, lambda: joint_control_to_msg(snapshot, loop_time.ahead_s)
         )
         controller.on_feedback = lambda goal_handle, state: outbox.put_droppable(self._feedback, goal_handle, state)
 
     def close(self) -> None:
-        """Closes the action."""
-        self._action.close()
+        """Closes topic and action."""
+        self._opened.close()
 
     def _submit(self, message: GripperCommandGoal, goal_handle: GripperGoalHandle) -> None:
         try:
