@@ -27,10 +27,12 @@ def node(monkeypatch: pytest.MonkeyPatch) -> Any:
         SimpleNamespace(
             is_shutdown=lambda: False,
             logwarn=lambda text, *values: state.warnings.append(text % values),
-            logerr_throttle=lambda period_s, text: state.errors.append(text),
         ),
     )
     monkeypatch.setattr(declared_parameters.rospy, "get_param", state.parameters.get)
+    monkeypatch.setattr(
+        declared_parameters.rospy, "logerr_throttle_identical", lambda period_s, text: state.errors.append(text)
+    )
     return state
 
 

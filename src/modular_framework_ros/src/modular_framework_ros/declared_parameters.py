@@ -3,9 +3,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import rospy
 
+from modular_framework_ros.node_handle import ParameterError
 from modular_framework_ros.parameter_declarations import ParameterReader, existing_declaration
+
+_LOG_PERIOD_S = 10.0
 
 
 class DeclaredParameters(ParameterReader):
@@ -23,3 +28,16 @@ class DeclaredParameters(ParameterReader):
         super().__init__(
             existing_declaration(package, node), lambda name: rospy.get_param(name, None), rospy.resolve_name
         )
+
+    def value_or_default(self, name: str) -> Any:
+        """Returns the value of a parameter; the default, with an error in the log, if the value is not allowed.
+
+        Args:
+            name: Name of the parameter, as it is declared.
+        """
+        try:
+            return self.value(name)
+        except ParameterError as error:
+            default = self.declaration(name).default
+            rospy.logerr_throttle_identical(_LOG_PERIOD_S, f"{error}; {default} is used")
+            return default

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import rospy
 
 from modular_framework_ros.declared_parameters import DeclaredParameters
-from modular_framework_ros.node_handle import ParameterError
 
 START_TIMEOUT_PARAMETER = "/start_timeout"
 REPORT_PERIOD_S = 10.0
@@ -21,13 +20,7 @@ def start_timeout() -> float:
 
     A node that died ends the launch that requires it, so this is for nodes that were never started.
     """
-    launch = DeclaredParameters("modular_framework_ros", "launch")
-    try:
-        return float(launch.value(START_TIMEOUT_PARAMETER))
-    except ParameterError as error:
-        default_s = float(launch.declaration(START_TIMEOUT_PARAMETER).default)
-        rospy.logerr_throttle(REPORT_PERIOD_S, f"{error}; {default_s:g} s is used instead")
-        return default_s
+    return float(DeclaredParameters("modular_framework_ros", "launch").value_or_default(START_TIMEOUT_PARAMETER))
 
 
 class WaitReport:

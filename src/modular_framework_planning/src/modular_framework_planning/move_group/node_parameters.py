@@ -8,10 +8,7 @@ from dataclasses import fields
 from functools import cache
 from typing import Any, TypeVar
 
-import rospy
-
 from modular_framework_ros.declared_parameters import DeclaredParameters
-from modular_framework_ros.node_handle import ParameterError
 
 Settings = TypeVar("Settings")
 
@@ -24,12 +21,7 @@ def declared_parameters() -> DeclaredParameters:
 
 def parameter(name: str) -> Any:
     """Returns a parameter; as in MoveIt a value that is not allowed is an error in the log, and the default is used."""
-    try:
-        return declared_parameters().value(name)
-    except ParameterError as error:
-        default = declared_parameters().declaration(name).default
-        rospy.logerr("%s; %s is used", error, default)
-        return default
+    return declared_parameters().value_or_default(name)
 
 
 def settings_below(namespace: str, kind: Callable[..., Settings]) -> Settings:
