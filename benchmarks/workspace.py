@@ -25,16 +25,18 @@ SHARED = (  # several have a module `conftest`: the first is found
     "tests",
 )
 MARK = "MODULAR_FRAMEWORK_BENCHMARK"
-"""Variable of the environment that programs of a benchmark have, with a value of its own."""
+"""Variable of the environment that programs of a benchmark have; a benchmark within another one extends its value."""
+_STARTS = "starts in the workspace"
 
 
 def _enter() -> None:
     sourced = str(ROOT / "src") in os.environ.get("ROS_PACKAGE_PATH", "") and Path(sys.prefix) == ROOT / ".venv"
-    if not sourced and MARK not in os.environ:
-        os.environ[MARK] = "starts in the workspace"
+    outer = os.environ.get(MARK, "")
+    if not sourced and not outer:
+        os.environ[MARK] = _STARTS
         os.execv(ROOT / "install.sh", ["install.sh", "exec", *sys.argv])
     sys.path += [str(ROOT / path) for path in SHARED]
-    os.environ[MARK] = uuid.uuid4().hex
+    os.environ[MARK] = ("" if outer == _STARTS else outer) + uuid.uuid4().hex
     for number in (signal.SIGINT, signal.SIGTERM):  # a shell that starts it in the background ignores SIGINT
         signal.signal(number, signal.default_int_handler)
     os.register_at_fork(after_in_child=lambda: signal.signal(signal.SIGTERM, signal.SIG_DFL))
@@ -46,7 +48,7 @@ def _kill_what_is_left(benchmark: int, mark: str) -> None:
     from modular_framework_core.launching.launch_session import kill_processes_with
 
     if os.getpid() == benchmark:
-        kill_processes_with(MARK, mark)
+        kill_processes_with(MARK, mark, prefix=True)
 
 
 if __name__ != "__main__":

@@ -21,11 +21,22 @@ print(child.pid, flush=True)
 time.sleep(600)
 """
 
+HAS_A_WORKER = f"""
+import workspace
+import subprocess, sys, time
+worker = subprocess.Popen([sys.executable, "-c", {STARTS_A_PROGRAM!r}], stdout=subprocess.PIPE, text=True)
+print(worker.stdout.readline(), flush=True)
+worker.kill()
+time.sleep(600)
+"""
+"""The worker has no time to end what it started."""
 
+
+@pytest.mark.parametrize("program", [STARTS_A_PROGRAM, HAS_A_WORKER], ids=["itself", "a worker"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_what_a_benchmark_started_ends_with_it(number: signal.Signals) -> None:
+def test_what_a_benchmark_started_ends_with_it(number: signal.Signals, program: str) -> None:
     with subprocess.Popen(
-        [sys.executable, "-c", STARTS_A_PROGRAM],
+        [sys.executable, "-c", program],
         env={**os.environ, "PYTHONPATH": f"{ROOT / 'benchmarks'}:{os.environ['PYTHONPATH']}"},
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
