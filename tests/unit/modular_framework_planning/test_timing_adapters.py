@@ -209,6 +209,8 @@ def test_speed_of_the_link_stays_below_the_limit_and_near_it(model: RobotModel, 
     speeds = speeds_by_difference(model, motion, "ezgripper_palm_link")
     assert speeds.max() <= highest
     assert np.quantile(speeds, 0.6) > 0.7 * highest, "only as slow as needed"
+    shortest_s = speeds.sum() * 0.001 / highest
+    assert motion.duration_s < 1.03 * shortest_s + 1.0, "speed is lost where the motion begins and ends only"
     assert (largest(motion, 1) <= model.max_velocity[indices]).all()
     assert (largest(motion, 2) <= model.max_acceleration[indices]).all()
     assert np.diff(motion.times).min() > 1e-3 and np.allclose(motion.positions[[0, -1]], [START, GOAL])

@@ -14,6 +14,7 @@ from modular_framework_planning.trajectory_processing.time_parameterization impo
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 PERIOD_S = 0.005  # of the samples of the link's speed that choose the slow-down
+MOST_SAMPLES = 20_000
 EASE_S = 0.1  # over which the pace changes, on both sides of a fast stretch
 LONGEST_SLOWED_PERIOD_S = 2.5 * LONGEST_PERIOD_S
 
@@ -57,10 +58,14 @@ def _envelope(values: Array, reach: int) -> Array:
 
 def _eased(trajectory: Trajectory, times: Array, slowing: Array) -> Trajectory:
     """Runs the trajectory slower by a factor that changes over time; all arrays of shape (m,)."""
-    from scipy.interpolate import CubicSpline  # 0.4 s of import, for motions that are slowed only
+    from scipy.integrate import cumulative_trapezoid  # 0.4 s of import, for motions that are slowed only
+    from scipy.interpolate import CubicSpline
 
-    reach = max(2, int(min(EASE_S, 0.25 * trajectory.duration_s) / (times[1] - times[0])))
-    pace = CubicSpline(times, _envelope(np.maximum(slowing, 1.0), reach))
+    lowest = np.maximum(slowing, 1.0)
+    slowed = cumulative_trapezoid(lowest, times, initial=0.0)  # a pace that changes at once; it is eased in this time
+    samples = np.linspace(0.0, slowed[-1], min(int(slowed[-1] / PERIOD_S), MOST_SAMPLES) + 20)
+    reach = max(2, int(min(EASE_S, 0.25 * slowed[-1]) / samples[1]))
+    pace = CubicSpline(np.interp(samples, slowed, times), _envelope(np.interp(samples, slowed, lowest), reach))
     clock = pace.antiderivative()
     counts = np.ceil(np.diff(clock(trajectory.times)) / LONGEST_SLOWED_PERIOD_S).astype(int)
     pieces = [
