@@ -107,14 +107,14 @@ def test_object_out_of_reach_ends_the_task_in_failure_and_says_why(session: RosS
 def test_the_pick_benchmark_says_why_a_launch_died(session: RosSession) -> None:
     benchmark = Path(__file__).parents[2] / "benchmarks" / "pick_success"
     run = subprocess.run(
-        [benchmark, "--quick", "--launch", "world_file:=no.world"],
+        [benchmark, "--quick", "--launch", "world_file:=../../../tests/system/nameless_link.world"],
         env=session.env,
         capture_output=True,
         text=True,
         timeout=TASK_TIMEOUT_S,
         check=True,
     )
-    assert re.search(r"FAILURE: the launch died: .*no\.world: cannot be read", run.stdout), run.stdout + run.stderr
+    assert re.search(r"FAILURE: the launch died: .*nameless_link\.world:4", run.stdout), run.stdout + run.stderr
     assert "0 of 1 episodes succeeded" in run.stdout
 
 

@@ -81,7 +81,8 @@ def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None
     [
         ("simulation", "flase", 2, "argument 'simulation' is 'flase', allowed are true and false"),
         ("task_constructor_script", "no.yaml", 2, "no.yaml:1:1: there is no such file"),
-        ("world_file", "no.world", 3, "node 'gazebo' died .*no.world: cannot be read"),
+        ("world_file", "no.world", 2, "argument 'world_file' is 'no.world'.*did you mean 'bin.world'"),
+        ("world_file", "../../../tests/system/nameless_link.world", 3, r"node 'gazebo' died .*nameless_link\.world:4"),
     ],
 )
 def test_the_last_lines_say_what_is_wrong_and_no_interrupted_node_prints_a_traceback(

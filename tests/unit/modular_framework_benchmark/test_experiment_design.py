@@ -53,7 +53,12 @@ def test_the_same_file_gives_the_same_episodes_and_digest_in_any_folder(tmp_path
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [("trials: 6", "trials: 7"), ("time_limit: 60", "time_limit: 61"), ("on: 0.8", "on: 0.81"), ("PRM", "RRT")],
+    [
+        ("trials: 6", "trials: 7"),
+        ("time_limit: 60", "time_limit: 61"),
+        ("rests_at: 0.8", "rests_at: 0.81"),
+        ("PRM", "RRT"),
+    ],
 )
 def test_the_digest_changes_with_what_decides_the_episodes(old: str, new: str, tmp_path: Path) -> None:
     assert laid_out(PICK, tmp_path)[1] != laid_out(PICK.replace(old, new), tmp_path)[1]
