@@ -11,7 +11,6 @@ from typing import Any
 import rospy
 from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus as GoalStatusMsg
-from control_msgs.msg import GripperCommandResult
 
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.ros.outbox import Outbox
@@ -50,6 +49,7 @@ class ControllerActionServer:
         cancel: asks the controller to end a goal handle.
         make_result: result message of a finished goal handle.
         outbox: thread that talks to ROS for the control loop.
+        is_fault: whether the log warns of a goal that ended as aborted or rejected.
     """
 
     def __init__(
@@ -60,10 +60,12 @@ class ControllerActionServer:
         cancel: Callable[[Any], None],
         make_result: MakeResult,
         outbox: Outbox,
+        is_fault: Callable[[RealtimeGoalHandle[Any]], bool] = lambda _: True,
     ) -> None:
         self._submit = submit
         self._cancel = cancel
         self._make_result = make_result
+        self._is_fault = is_fault
         self._outbox = outbox
         self._goals: dict[RealtimeGoalHandle[Any], ServerGoalHandle] = {}
         self._submitting = threading.Lock()  # goals keep their order
@@ -116,10 +118,7 @@ class ControllerActionServer:
             GoalStatus.CANCELED: goal.set_canceled,
             GoalStatus.REJECTED: goal.set_rejected,
         }[status]
-        result = self._make_result(goal_handle)
         if status in (GoalStatus.ABORTED, GoalStatus.REJECTED):
-            # Fingers that close on an object stall: whether that is a fault is for the sender to say.
-            stalled = isinstance(result, GripperCommandResult) and result.stalled
-            log = rospy.logdebug if stalled else rospy.logwarn
+            log = rospy.logwarn if self._is_fault(goal_handle) else rospy.logdebug
             log("%s: goal %s: %s", self._server.ns, status.value, goal_handle.text)
-        finish(result, goal_handle.text)
+        finish(self._make_result(goal_handle), goal_handle.text)

@@ -183,6 +183,7 @@ class GripperRosInterface:
                 controller.cancel,
                 _gripper_result,
                 outbox,
+                _is_gripper_fault,
             )
             opened.callback(self._action.close)
             self._opened = opened.pop_all()
@@ -203,6 +204,11 @@ class GripperRosInterface:
 
     def _feedback(self, goal_handle: GripperGoalHandle, state: GripperState) -> None:
         self._action.publish_feedback(goal_handle, conversions.gripper_feedback_to_msg(state))
+
+
+def _is_gripper_fault(goal_handle: RealtimeGoalHandle[GripperState]) -> bool:
+    """Whether a goal did not end with stalled fingers, which may hold an object: the sender decides what that is."""
+    return goal_handle.result is None or not goal_handle.result.stalled
 
 
 def _gripper_result(goal_handle: RealtimeGoalHandle[GripperState]) -> Any:
