@@ -57,7 +57,7 @@ _WELD_FORCE = 1e5
 
 
 @contextlib.contextmanager
-def silenced() -> Iterator[None]:
+def _silenced() -> Iterator[None]:
     """Keeps the engine's C++ code from writing to the terminal; its problems come back as exceptions."""
     saved = [(os.dup(number), number) for number in (1, 2)]
     try:
@@ -69,6 +69,13 @@ def silenced() -> Iterator[None]:
         for copy, number in saved:
             os.dup2(copy, number)
             os.close(copy)
+
+
+def load_pybullet() -> Any:
+    """Returns the engine's module, without the build date that it prints when it is loaded."""
+    with _silenced():
+        import pybullet
+    return pybullet
 
 
 class PyBulletEngine(PhysicsEngine):
@@ -85,10 +92,7 @@ class PyBulletEngine(PhysicsEngine):
     takes_concave_meshes = True
 
     def __init__(self, settings: PhysicsSettings, gravity: Vector3, gui: bool, log: Log) -> None:
-        with silenced():
-            import pybullet  # prints its build date when loaded
-
-        self.api: Any = pybullet
+        self.api: Any = load_pybullet()
         self.settings = settings
         self.client = -1
         self.has_window = False
@@ -194,7 +198,7 @@ class PyBulletEngine(PhysicsEngine):
         file = Path(self._urdf_folder.name) / f"body_{self._files_written}.urdf"
         file.write_text(text, encoding="utf-8")
         try:
-            with silenced():
+            with _silenced():
                 body: int = self.api.loadURDF(
                     str(file),
                     useFixedBase=fixed,

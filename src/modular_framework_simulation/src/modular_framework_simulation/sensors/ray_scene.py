@@ -19,7 +19,7 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import load_mesh
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
-from modular_framework_simulation.physics.pybullet_engine import silenced
+from modular_framework_simulation.physics.pybullet_engine import load_pybullet
 from modular_framework_simulation.sensors.sensor_xml import LinkShapes
 
 _SECTIONS = 256
@@ -49,11 +49,8 @@ class RayScene:
 
     def _open(self) -> None:
         """Opens the engine; nobody pays for it who casts no ray."""
-        with silenced():
-            import pybullet  # prints its build date when loaded
-
-        self._api = pybullet
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._api = load_pybullet()
+        self._client = self._api.connect(self._api.DIRECT)
         self._folder = tempfile.TemporaryDirectory(prefix="rays_")
 
     def cast(self, starts: Points, ends: Points) -> Points:

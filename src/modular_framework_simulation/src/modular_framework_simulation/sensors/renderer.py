@@ -14,7 +14,7 @@ from modular_framework_simulation.errors import DescriptionError, SimulationErro
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.visual_meshes import VisualMeshes
-from modular_framework_simulation.physics.pybullet_engine import silenced
+from modular_framework_simulation.physics.pybullet_engine import load_pybullet
 from modular_framework_simulation.sensors.cameras import CameraImage, Pinhole
 from modular_framework_simulation.sensors.visible_scene import SceneUpdate
 from modular_framework_urdf.rotations import rotate_vector
@@ -48,13 +48,10 @@ class Renderer:
     """
 
     def __init__(self, drawing: Drawing, meshes: VisualMeshes, log: Callable[[str], None]) -> None:
-        with silenced():
-            import pybullet  # prints its build date when loaded
-
-        self._api: Any = pybullet
+        self._api: Any = load_pybullet()
         self._meshes, self._log = meshes, log
-        self._client: int = pybullet.connect(pybullet.DIRECT)
-        self._flag, self._shift = pybullet.ER_TINY_RENDERER, _TINY_SHIFT
+        self._client: int = self._api.connect(self._api.DIRECT)
+        self._flag, self._shift = self._api.ER_TINY_RENDERER, _TINY_SHIFT
         if drawing is Drawing.EGL:
             self._load_egl()
         self._bodies: dict[int, tuple[tuple[tuple[int, Pose], ...], ...]] = {}
