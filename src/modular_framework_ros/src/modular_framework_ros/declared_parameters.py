@@ -33,7 +33,7 @@ class DeclaredParameters(ParameterReader):
         """Returns the value of a parameter; the default, with an error in the log, if the value is not allowed.
 
         Args:
-            name: Name of the parameter, as it is declared.
+            name: Declared name of the parameter.
         """
         try:
             return self.value(name)

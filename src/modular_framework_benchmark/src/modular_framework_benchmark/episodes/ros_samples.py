@@ -25,7 +25,7 @@ ACTIONS = {"moveit_msgs/ExecuteTrajectoryActionGoal": "execution", "modular_fram
 """Component that an action belongs to, by the type of its goal."""
 
 CONTROLLER_STATE = "control_msgs/JointTrajectoryControllerState"
-JOINT_STATE = "control_msgs/JointControllerState"
+JOINT_CONTROLLER_STATE = "control_msgs/JointControllerState"
 PLANNING_NODE = "/move_group"
 MODELS, GRASPED, TASK_STATUS = "/gazebo/model_states", "/gazebo/grasped_object", "task_status"
 REPORTS, PATHS = "/move_group/planning_report", "/move_group/display_planned_path"
@@ -111,7 +111,7 @@ class Samples:
             if type_name == CONTROLLER_STATE:
                 name = topic.strip("/").rpartition("/")[0]
                 self._subscribe(topic, JointTrajectoryControllerState, self._controller(name), SIMULATION_NODE)
-            elif type_name == JOINT_STATE:
+            elif type_name == JOINT_CONTROLLER_STATE:
                 self._subscribe_joint(topic)
             elif type_name in ACTIONS:
                 self._subscribe_action(topic, type_name)

@@ -134,7 +134,7 @@ def run_launch_file(
 
 
 def _reason(error: Exception, path: str, arguments: list[str]) -> str:
-    """Returns why a launch could not start; of the robot's description roslaunch tells the command only."""
+    """Returns why a launch could not start; of the robot's description roslaunch names the command only."""
     if "command parameter [robot_description]" not in str(error):
         return str(error)
     values = argument_values(path, arguments)

@@ -193,7 +193,7 @@ class PlanningScenePublisher:
         return bool(self._server_uri)
 
     def _fail(self, problem: str) -> float:
-        # A first failure may be that of a move_group that ends before the simulation does; the next try tells.
+        # At the end of a launch move_group may go before the simulation, so that only a failure that repeats is logged.
         if problem == self._last_problem and problem != self._told_problem:
             rospy.logwarn("planning scene: %s; the scene is read and the change sent again", problem)
             self._told_problem = problem
