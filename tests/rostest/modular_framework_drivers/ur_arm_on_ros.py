@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import random
 import threading
@@ -12,7 +11,7 @@ from typing import Any
 
 import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
-from ros_session import until as wait_until
+from ros_session import until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
@@ -48,8 +47,6 @@ LAUNCH = """<launch>
         args="joint_state_controller arm_controller speed_scaling_state_controller"/>
 </launch>"""
 
-until = functools.partial(wait_until, timeout_s=20.0)
-
 
 class Arm:
     """The running launch, as a client sees it."""
@@ -62,7 +59,7 @@ class Arm:
         rospy.Subscriber("arm_ready", Bool, self._on_ready, queue_size=1)
         self.client = SteadyActionClient("arm_controller/follow_joint_trajectory", FollowJointTrajectoryAction)
         assert self.client.wait_for_server(rospy.Duration(60)), session.log()
-        until(lambda: bool(self.positions) and self.ready is True, "a ready arm")
+        self.until(lambda: bool(self.positions) and self.ready is True, "a ready arm")
 
     def _on_joint_state(self, message: JointState) -> None:
         self.positions = [message.position[message.name.index(name)] for name in JOINT_NAMES]
@@ -70,12 +67,19 @@ class Arm:
     def _on_ready(self, message: Bool) -> None:
         self.ready = message.data
 
+    def until(self, condition: Callable[[], Any], what: str) -> None:
+        """Waits until a condition holds; the failure shows what the driver logged."""
+        try:
+            until(condition, what)
+        except AssertionError as error:
+            raise AssertionError(f"{error}\n{self.session.log()}") from error
+
     def well(self) -> None:
         """End all faults, and have the arm follow."""
         for command in ("restore", "unlock", "release_emergency_stop", "power_on"):
             self.command(command)
         self.command("slider", value=1.0)
-        until(lambda: self.call("resume")[0], "an arm that follows again")
+        self.until(lambda: self.call("resume")[0], "an arm that follows again")
 
     def true_positions(self) -> list[float]:
         """Where the emulated joints are, whatever the driver knows [rad]."""

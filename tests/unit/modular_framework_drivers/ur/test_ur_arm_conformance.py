@@ -30,7 +30,7 @@ class TestUrArm(RobotHWConformance):
     def arm_of_all(cls) -> Iterator[None]:
         emulator = EmulatedArm()
         robot_hw = cls.arm = UrArmHardware()
-        settings = {"robot_ip_address": emulator.address, "link_timeout": 0.5}
+        settings = {"robot_ip_address": emulator.address, "link_timeout": 2.0}
         assert robot_hw.init(MappingNodeHandle({}), MappingNodeHandle(settings, "/arm_hw"))
         yield
         robot_hw.close()
@@ -49,7 +49,7 @@ class TestUrArm(RobotHWConformance):
             return self.arm
         self._emulators.append(EmulatedArm(positions=[positions[name] for name in JOINT_NAMES]))
         robot_hw = UrArmHardware()
-        settings = {"robot_ip_address": self._emulators[-1].address, "link_timeout": 0.5}
+        settings = {"robot_ip_address": self._emulators[-1].address, "link_timeout": 2.0}
         assert robot_hw.init(MappingNodeHandle({}), MappingNodeHandle(settings, "/arm_hw"))
         return robot_hw
 

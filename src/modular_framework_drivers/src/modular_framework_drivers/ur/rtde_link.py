@@ -33,9 +33,9 @@ _MODULE = "modular_framework_drivers.ur.rtde_process"
 _KEEPER_PERIOD_S = 0.02
 _CONNECT_TIMEOUT_S = 5.0  # from then to the first state
 _PROGRAM_TIMEOUT_S = 15.0  # from then until the program is uploaded and runs
-_SILENCE_TIMEOUT_S = 0.5  # a process that sends nothing for so long counts as failed
+_SILENCE_MARGIN_S = 0.38  # a process may be silent for so much longer than the arm before it counts as failed [s]
 _LONGEST_RETRY_S = 2.0  # each attempt starts an interpreter, which takes 0.3 s of a processor
-_STOP_PATIENCE_S = 1.5  # for the arm to come to rest when the link is closed
+_STOP_PATIENCE_S = 3.0  # for the arm to come to rest when the link is closed
 _FINAL_STOP_S = 0.1  # for a process that is ended to send its stop, behind all commands still queued
 
 
@@ -109,6 +109,7 @@ class RtdeLink:
 
     def __init__(self, settings: LinkSettings) -> None:
         self._settings = settings
+        self._silence_timeout_s = settings.timeout_s + _SILENCE_MARGIN_S
         self._closing = threading.Event()
         self._keeper: threading.Thread | None = None
         self._states: _RtdeProcess | None = None
@@ -200,8 +201,9 @@ class RtdeLink:
             self.state, self.lost, states.working = ArmState.unpacked(newest), "", True
         if states.process.ended:
             self._lose(states, "the process that reads the arm's state ended")
-        elif states.working and silent_s > _SILENCE_TIMEOUT_S:
-            self._lose(states, f"the process that reads the arm's state has said nothing for {_SILENCE_TIMEOUT_S:g} s")
+        elif states.working and silent_s > self._silence_timeout_s:
+            timeout = f"{self._silence_timeout_s:g} s"
+            self._lose(states, f"the process that reads the arm's state has said nothing for {timeout}")
 
     def _lose(self, states: _RtdeProcess, reason: str) -> None:
         if not self.lost:
@@ -231,8 +233,9 @@ class RtdeLink:
             return
         if control.process.ended:
             self.drop_program("the process that commands the arm ended")
-        elif control.silence.update(now_s, answered) > _SILENCE_TIMEOUT_S:
-            self.drop_program(f"the process that commands the arm has taken no command for {_SILENCE_TIMEOUT_S:g} s")
+        elif control.silence.update(now_s, answered) > self._silence_timeout_s:
+            timeout = f"{self._silence_timeout_s:g} s"
+            self.drop_program(f"the process that commands the arm has taken no command for {timeout}")
 
     def _keep(self) -> None:
         next_attempt_s, retry_s = 0.0, self._settings.retry_s
