@@ -44,10 +44,12 @@ class Rviz:
         self.home: Any = None
         self.ghosts: dict[str, list[Marker]] = {"goal": [], "start": []}
         self.motions: list[DisplayTrajectory] = []
+        self.paths: list[list[Marker]] = []
         rospy.Subscriber(f"{NODE}/marker/update_full", InteractiveMarkerInit, self._on_marker)
         for name in self.ghosts:
             rospy.Subscriber(f"{NODE}/{name}_ghost", MarkerArray, self._on_ghost, callback_args=name)
         rospy.Subscriber("/move_group/display_planned_path", DisplayTrajectory, self.motions.append)
+        rospy.Subscriber("/move_group/display_planned_path_markers", MarkerArray, self._on_path)
         self._feedback = rospy.Publisher(f"{NODE}/marker/feedback", InteractiveMarkerFeedback, queue_size=10)
         self._panel = {
             name: rospy.Publisher(f"/rviz/moveit/{name}", Empty, queue_size=1)
@@ -68,6 +70,9 @@ class Rviz:
         self.ghosts[name] = [item for item in message.markers if item.action == Marker.ADD]
         if name == "goal":
             LAST_WORDS.append(self.status)
+
+    def _on_path(self, message: MarkerArray) -> None:
+        self.paths.append([item for item in message.markers if item.action == Marker.ADD])
 
     def drag(self, pose: Pose) -> None:
         self._say(event_type=InteractiveMarkerFeedback.POSE_UPDATE, pose=pose)
@@ -155,9 +160,13 @@ def test_a_dragged_goal_is_planned_to_and_executed_by_the_menu(rviz: Rviz, arm: 
     until(lambda: bool(rviz.motions), "the planned motion on display")
     assert arm.positions["elbow_joint"] == START[2], "planning does not move the robot"
     end = rviz.motions[-1].trajectory[0].joint_trajectory.points[-1].positions
+    until(lambda: {item.ns for item in rviz.paths[-1]} == {"tip", "ghost"}, "the plan: line and hand")
+    rviz.paths.clear()
     rviz.select("Execute")
     until(lambda: rviz.status == "executed", "the execution", 60.0)
     assert np.allclose([arm.positions[name] for name in ARM], end, atol=1e-6)
+    until(lambda: [{item.ns for item in path} for path in rviz.paths] == [{"tip"}, set()], "a line during the motion")
+    until(lambda: not [item for item in rviz.ghosts["goal"] if item.ns == "goal"], "no ghost where the robot stands")
     rviz.select("Execute")
     until(lambda: "nothing is planned" in rviz.status, "the refusal to do it twice")
 

@@ -69,11 +69,13 @@ class WatchedMotion:
         columns = [number for number, name in enumerate(motion.joint_names) if name in context.model.index]
         self._joints = [motion.joint_names[number] for number in columns]
         self._watch: PathWatch | None = None
+        self._rows = np.empty((0, len(columns)))
         if motion.points and columns:
             rows = np.array([point.positions for point in motion.points], dtype=float)[:, columns]
             times = [point.time_from_start.to_sec() for point in motion.points]
             times = np.array(times) / context.execution.settings.execution_velocity_scaling
             seen, was_planned = self._as_planned(planned_in), change is not None
+            self._rows = rows
             self._watch = PathWatch(self._joints, times, rows, seen, context.new_checker, was_planned)
         self._seen_version = planned_in.geometry_version
         self._watching = threading.Lock()
@@ -140,6 +142,10 @@ class WatchedMotion:
             )
 
     def _monitor(self, stop: threading.Event) -> None:
+        with self._context.markers.shown_motion(self._context.monitor.snapshot(), self._joints, self._rows):
+            self._watch_until_end(stop)
+
+    def _watch_until_end(self, stop: threading.Event) -> None:
         pause_s, due_s = min(PERIOD_S, self._period_s), time.monotonic() + self._period_s
         while not self._ended.is_set():
             if time.monotonic() >= due_s:

@@ -111,9 +111,7 @@ class GoalMarker:
         ball.scale.x = ball.scale.y = ball.scale.z = 0.25 * scale_m
         ball.color.r, ball.color.g, ball.color.b, ball.color.a = 0.2, 0.6, 1.0, 0.6
         marker.controls.append(
-            InteractiveMarkerControl(
-                name="menu", interaction_mode=InteractiveMarkerControl.MENU, always_visible=True, markers=[ball]
-            )
+            InteractiveMarkerControl(name="menu", interaction_mode=InteractiveMarkerControl.MENU, markers=[ball])
         )
         marker.controls += [
             InteractiveMarkerControl(name=way, orientation=turn, interaction_mode=mode) for way, mode, turn in ways

@@ -21,7 +21,7 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.messages.conversions import joint_values, state_message
 from modular_framework_planning.messages.multi_dof import goal_values, with_multi_dof
 from modular_framework_planning.messages.poses import pose_message, transform_from_pose
-from modular_framework_planning.move_group.markers.scene_markers import robot_markers
+from modular_framework_planning.move_group.markers.scene_markers import numbered, robot_markers
 from modular_framework_planning.move_group.robot_parameters import load_robot_model
 from modular_framework_planning.planning_scene.planning_scene import empty_scene
 from modular_framework_planning.robot_model.multi_dof_joint import PLANAR
@@ -47,8 +47,9 @@ DEFAULT_PLANNER = "move_group's default"
 class InteractiveGoal:
     """A marker at the tip to drag the goal with, ghosts of start and goal, and a menu.
 
-    A group with a planar or floating base has a second marker, which places the base. The goal follows the robot until
-    it is set: at start-up the joints that move_group knows may not be those of the robot yet.
+    A group with a planar or floating base has a second marker, which places the base. The goal follows the robot, and
+    has no ghost, until it is set and after a motion to it: at start-up the joints that move_group knows may not be
+    those of the robot yet.
 
     Publishes: ~goal_ghost, ~start_ghost (visualization_msgs/MarkerArray, latched).
     Interactive marker: ~marker.
@@ -163,7 +164,7 @@ class InteractiveGoal:
     def follow_robot(self) -> None:
         """Lets motions start where the robot is."""
         self._start = None
-        publish(self._ghosts["start"], MarkerArray([Marker(action=Marker.DELETEALL)]))
+        publish(self._ghosts["start"], numbered([], self._model.planning_frame))
 
     def _choose_planner(self, entry: str) -> None:
         pipeline, _, planner = entry.rpartition(": ")
@@ -220,6 +221,8 @@ class InteractiveGoal:
             return
         trajectory, self._trajectory = self._trajectory, None
         self._client.execute(trajectory)
+        with self._goal_changing:
+            self._goal_is_set = False
         self._set_status("executed")
 
     def _random_goal(self) -> None:
@@ -325,10 +328,8 @@ class InteractiveGoal:
     def _take_start(self, state: RobotState) -> None:
         positions = self._positions_of(state)
         self._start, self._trajectory = state, None
-        publish(
-            self._ghosts["start"],
-            _numbered([Marker(action=Marker.DELETEALL), *robot_markers(self._model, positions, "start", START_COLOR)]),
-        )
+        ghost = robot_markers(self._model, positions, "start", START_COLOR)
+        publish(self._ghosts["start"], numbered(ghost, self._model.planning_frame))
 
     def _set_goal(self, positions: Array, color: tuple[float, float, float, float], status: str) -> None:
         with self._goal_changing:
@@ -343,7 +344,9 @@ class InteractiveGoal:
         self._show_goal()
 
     def _show_goal(self) -> None:
-        markers = [Marker(action=Marker.DELETEALL), *robot_markers(self._model, self._goal, "goal", self._goal_color)]
+        markers: list[Marker] = []
+        if self._goal_is_set:  # else the robot itself stands there
+            markers = robot_markers(self._model, self._goal, "goal", self._goal_color)
         text = Marker(
             type=Marker.TEXT_VIEW_FACING,
             ns="status",
@@ -354,7 +357,7 @@ class InteractiveGoal:
         text.pose.position.z += TEXT_ABOVE_TIP_M
         text.scale.z = 0.04
         text.color.r = text.color.g = text.color.b = text.color.a = 1.0
-        publish(self._ghosts["goal"], _numbered([*markers, text] if text.text else markers))
+        publish(self._ghosts["goal"], numbered([*markers, text] if text.text else markers, self._model.planning_frame))
 
     # ---------------------------------------------------------------- states
     def _tip_pose(self) -> Pose:
@@ -373,12 +376,6 @@ class InteractiveGoal:
         state = state_message(self._scene, positions, with_attached=False)
         state.is_diff = True
         return state
-
-
-def _numbered(markers: list[Marker]) -> MarkerArray:
-    for number, marker in enumerate(markers):
-        marker.id = number
-    return MarkerArray(markers)
 
 
 def main() -> int:

@@ -13,6 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
+from modular_framework_planning.move_group.markers.scene_markers import delete_all
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene
 from modular_framework_ros.publishing import publish
@@ -33,7 +34,7 @@ class OctomapMarkers:
         if scene.octomap is self._shown:
             return
         self._shown = scene.octomap
-        markers = [Marker(action=Marker.DELETEALL)]
+        markers = [delete_all(scene.model.planning_frame)]
         markers += [
             _cubes(body, shape, scene.model.planning_frame)
             for body in (scene.octomap,)

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -19,13 +21,14 @@ from modular_framework_planning.messages.poses import pose_message
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
 from modular_framework_planning.planning_scene.planning_scene import Color, PlanningScene
-from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_ros.publishing import publish
 
 OBJECT_COLOR = (0.45, 0.75, 0.35, 1.0)  # opaque: RViz does not sort transparent markers by depth
 ATTACHED_COLOR = (0.75, 0.3, 0.75, 1.0)
 GHOST_COLOR = (1.0, 0.6, 0.1)
-INTERMEDIATE_GHOSTS = 3
+GHOST_ALPHA = 0.6
+FIXED = 1.0e-4  # a link whose pose in the frame of the tip changes by less is part of the hand [m, rad]
 LINE_POINTS = 60
 PLANE_SIZE_M = 3.0
 CONTACT_COLOR = (1.0, 0.0, 0.0, 0.8)
@@ -49,10 +52,12 @@ class MarkerPublisher:
         self._scene = rospy.Publisher(names.SCENE_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
         self._path = rospy.Publisher(names.PATH_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
         self._display = rospy.Publisher(names.DISPLAY_PATH_TOPIC, DisplayTrajectory, queue_size=5, latch=True)
+        self._motions: list[list[Marker]] = []
+        self._motions_changing = threading.Lock()
 
     def show_scene(self, scene: PlanningScene) -> None:
         """Publishes one marker per shape; attached ones are given in their link's frame, so they follow it."""
-        markers = [Marker(action=Marker.DELETEALL)]
+        markers = [delete_all(self._frame)]
         for body in scene.objects.values():
             color = scene.colors.get(body.name, OBJECT_COLOR)
             for number, (shape, pose) in enumerate(body.shapes):
@@ -66,24 +71,46 @@ class MarkerPublisher:
         publish(self._scene, MarkerArray(markers))
 
     def show_path(self, scene: PlanningScene, response: Any, answer: PlanningAnswer) -> None:
-        """Publishes the planned motion: the path of the tip as a line, and the robot at states along it."""
+        """Publishes the planned motion: the path of the tip as a line, and the hand where the motion ends."""
         publish(self._display, DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
         group = scene.model.group(response.group_name)
         rows = answer.trajectory.positions
-        markers = [Marker(action=Marker.DELETEALL), *_tip_line(scene, group, rows, answer.start)]
-        for share in np.linspace(0.0, 1.0, INTERMEDIATE_GHOSTS + 2)[1:]:
-            positions = answer.start.copy()
-            positions[group.indices] = rows[int(round(share * (len(rows) - 1)))]
-            markers += robot_markers(
-                scene.model, positions, f"ghost_{share:.2f}", (*GHOST_COLOR, 0.6 if share == 1.0 else 0.15)
-            )
-        for number, marker in enumerate(markers):
-            marker.id = number
-        publish(self._path, MarkerArray(markers))
+        line = _tip_line(scene, group.tip_link or group.links[-1], group.indices, rows, answer.start)
+        end = answer.start.copy()
+        end[group.indices] = rows[-1]
+        hand = _hand_links(scene.model, group, answer.start, end)
+        ghost = robot_markers(scene.model, end, "ghost", (*GHOST_COLOR, GHOST_ALPHA), hand)
+        publish(self._path, numbered([*line, *ghost], self._frame))
+
+    @contextmanager
+    def shown_motion(self, scene: PlanningScene, joints: Sequence[str], rows: Array) -> Iterator[None]:
+        """Shows a motion under way, in place of the plan: the path of the tip as a line, until the motion has ended.
+
+        Args:
+            scene: in which the motion begins.
+            joints: of the motion; without a planning group that has exactly these joints no line is drawn.
+            rows: positions of the joints, shape (n, joints) [rad or m].
+        """
+        moved = {scene.model.index[name] for name in joints}
+        groups = (group for group in scene.model.groups.values() if group.is_chain and set(group.indices) == moved)
+        line: list[Marker] = []
+        if (group := next(groups, None)) is not None:
+            indices = np.array([scene.model.index[name] for name in joints])
+            line = _tip_line(scene, group.tip_link, indices, rows, scene.positions)
+        self._change_motions(line, begins=True)
+        try:
+            yield
+        finally:
+            self._change_motions(line, begins=False)
+
+    def _change_motions(self, line: list[Marker], begins: bool) -> None:
+        with self._motions_changing:
+            self._motions = [known for known in self._motions if known is not line] + ([line] if begins else [])
+            publish(self._path, numbered([marker for known in self._motions for marker in known], self._frame))
 
     def show_contacts(self, contacts: Sequence[Contact]) -> None:
         """Publishes a ball where bodies touch, named by them; without contacts the old ones are deleted."""
-        markers = [Marker(action=Marker.DELETEALL)]
+        markers = [delete_all(self._frame)]
         for number, contact in enumerate(contacts):
             marker = _marker(Marker.SPHERE, self._frame, f"{contact.first.name}={contact.second.name}", number)
             marker.pose.position = Point(*(float(value) for value in contact.position))
@@ -156,35 +183,74 @@ def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, num
     return marker
 
 
-def _tip_line(scene: PlanningScene, group: Any, rows: Any, start: Any) -> list[Marker]:
-    """The path of the tip as a line; none for a motion of one point, which RViz reports as an error."""
+def _tip_line(scene: PlanningScene, link: str, indices: Array, rows: Array, start: Array) -> list[Marker]:
+    """The path of a link as a line; none for a motion of one point, which RViz reports as an error."""
     if len(rows) < 2:
         return []
     line = _marker(Marker.LINE_STRIP, scene.model.planning_frame, "tip")
     line.scale.x = 0.006
     _paint(line, (*GHOST_COLOR, 1.0))
-    link = group.tip_link or group.links[-1]
     for number in np.linspace(0, len(rows) - 1, min(len(rows), LINE_POINTS)).round().astype(int):
         positions = start.copy()
-        positions[group.indices] = rows[number]
+        positions[indices] = rows[number]
         line.points.append(Point(*scene.model.link_transforms(positions)[link].translation))
     return [line]
 
 
-def robot_markers(model: RobotModel, positions: Array, namespace: str, color: Color) -> list[Marker]:
-    """Markers of the visual geometry of every link, at the given positions (of the whole robot), in one colour.
+def delete_all(frame: str) -> Marker:
+    """Returns the marker that deletes what a topic showed, for the front of a message.
 
-    Their ids are 0: number them, or give each robot a namespace and number within it, before publishing.
+    Args:
+        frame: any frame that is known: RViz obeys a marker without one at once, before the markers of earlier messages.
+    """
+    marker = Marker(action=Marker.DELETEALL)
+    marker.header.frame_id = frame
+    return marker
+
+
+def numbered(markers: Sequence[Marker], frame: str) -> MarkerArray:
+    """Returns the message that replaces what a topic showed by these markers; `frame` is any known one."""
+    for number, marker in enumerate(markers):
+        marker.id = number
+    return MarkerArray([delete_all(frame), *markers])
+
+
+def _hand_links(model: RobotModel, group: JointGroup, start: Array, end: Array) -> set[str]:
+    """Returns the links fixed to the group's tip, from states at both ends of a motion; all links without a tip."""
+    before, after = model.link_transforms(start), model.link_transforms(end)
+    tip = group.tip_link
+    if not tip:
+        return set(after)
+    return {
+        link
+        for link, pose in after.items()
+        if before[tip].actInv(before[link]).isApprox(after[tip].actInv(pose), FIXED)
+    }
+
+
+def robot_markers(
+    model: RobotModel, positions: Array, namespace: str, color: Color, links: Collection[str] | None = None
+) -> list[Marker]:
+    """Markers of the visual geometry of links in one colour; number them before publishing.
+
+    Args:
+        model: the robot.
+        positions: of all joints [rad or m].
+        namespace: of the markers.
+        color: red, green, blue and alpha, 0 to 1.
+        links: which to show; None for all.
     """
     transforms = model.link_transforms(positions)
+    shown = transforms.keys() if links is None else links
     frame = model.planning_frame
     markers = [
         _shape_marker(shape, transforms[link] * origin, frame, namespace, 0)
         for link, shapes in model.document.visual_shapes.items()
+        if link in shown
         for shape, origin in shapes
     ]
     for link, visuals in model.document.visual_meshes.items():
-        for uri, origin, scale in visuals:
+        for uri, origin, scale in visuals if link in shown else ():
             marker = _marker(Marker.MESH_RESOURCE, frame, namespace)
             marker.mesh_resource = uri
             marker.pose = pose_message(transforms[link] * origin)
