@@ -280,12 +280,37 @@ def test_a_goal_is_reported_after_its_client_has_answered_a_call(
     client.send_goal(GripperCommandGoal())
     assert called.wait(60.0) and ended.wait(60.0)
     seen = len(lists)
-    until(lambda: len(lists) >= seen + 2, "two more status messages")
+    until(lambda: len(lists) > seen, "another status message")
     assert not any(message.status_list for message in lists) and client.get_result() is None
     may_answer.set()
     assert client.wait_for_result(rospy.Duration(60.0)) and client.get_result().reached_goal
     until(lambda: any(item.status == GoalStatus.SUCCEEDED for item in lists[-1].status_list), "the status of the goal")
     subscriber.unregister()
+    server.stop()
+
+
+def test_a_goal_that_is_cancelled_before_it_is_reported_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An actionlib client takes a goal it has cancelled for lost when a status does not contain the goal."""
+    called, may_answer = threading.Event(), threading.Event()
+
+    def process_id(address: str, timeout_s: float) -> int:
+        called.set()
+        assert may_answer.wait(60.0)
+        return 1
+
+    monkeypatch.setattr(action_server, "process_id", process_id)
+    server = SteadyActionServer(
+        "slow_grip", GripperCommandAction, ServerGoalHandle.set_accepted, ServerGoalHandle.set_canceled, False
+    )
+    server.start()
+    client = actionlib.SimpleActionClient("slow_grip", GripperCommandAction)
+    assert client.wait_for_server(rospy.Duration(60.0))
+    client.send_goal(GripperCommandGoal())
+    assert called.wait(60.0)
+    client.cancel_goal()
+    threading.Timer(3.0 / server.status_frequency, may_answer.set).start()
+    assert client.wait_for_result(rospy.Duration(60.0))
+    assert client.get_state() == GoalStatus.PREEMPTED
     server.stop()
 
 

@@ -23,6 +23,8 @@ CLIENT_TIMEOUT_S = 0.5
 _QUICK_ANSWER_S = 0.005
 """Switch interval of Python's threads. A client that answers later is busy and may be in send_goal() still [s]."""
 _MOST_CALLS = 3
+LONGEST_STATUS_PAUSE_S = 2.0
+"""Longer than a goal remains unreported; only goals that come one upon another put off the status for so long [s]."""
 CLOSING_DELAY_S = 0.15
 """For a result to get out: to close a topic drops what rospy's threads have still to write [s]."""
 
@@ -58,6 +60,7 @@ class SteadyActionServer(ActionServer):
     def initialize(self) -> None:
         self._client_addresses: dict[str, str] = {}
         self._last_result_s = -CLOSING_DELAY_S
+        self._last_status_s = -LONGEST_STATUS_PAUSE_S
         self._unreported: dict[str, tuple[Any, Any] | None] = {}
         """Status and result, if the goal has ended, of the goals that are not reported yet, by their ID."""
         self._reports: set[threading.Thread] = set()
@@ -122,7 +125,15 @@ class SteadyActionServer(ActionServer):
         super().stop()
 
     def publish_status(self) -> None:
+        """Publishes the status of the goals, later if a goal is not reported yet.
+
+        A client that cancels such a goal would take a status without the goal for its loss.
+        """
         with self.lock:
+            now_s = time.monotonic()
+            if self._unreported and now_s < self._last_status_s + LONGEST_STATUS_PAUSE_S:
+                return
+            self._last_status_s = now_s
             items, self.status_list = self.status_list, []
             unreported: list[Any] = []
             for item in items:
