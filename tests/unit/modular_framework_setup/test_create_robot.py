@@ -25,6 +25,7 @@ from xacro_rospkg import expand
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_setup.checks.package_check import check_package
 from modular_framework_setup.commands.create_command import main
+from modular_framework_setup.config_files.config_package import find_package, packages_beside
 
 PYPI = Path(pybullet_data.getDataPath())
 BARE = {"panda": PYPI / "franka_panda" / "panda.urdf", "lbr_iiwa": PYPI / "kuka_iiwa" / "model.urdf"}
@@ -325,3 +326,20 @@ def test_on_a_terminal_it_asks(package_path: Path, monkeypatch: pytest.MonkeyPat
     chain = Made("asked", package_path).srdf().find("group[@name='arm']/chain")
     assert chain is not None
     assert chain.get("tip_link") == "stick"
+
+
+def test_packages_are_looked_for_around_the_urdf_and_not_in_all_folders_beside_it(tmp_path: Path) -> None:
+    """A URDF in the home folder must not have all home folders searched."""
+    places = {"crane": "lab/crane", "meshes": "lab/meshes", "tools": "lab/stack/tools", "far": "lab/a/b/far"}
+    for name, place in places.items():
+        (tmp_path / place).mkdir(parents=True)
+        (tmp_path / place / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    urdf_folder = tmp_path / "lab" / "crane" / "urdf"
+    urdf_folder.mkdir()
+    with packages_beside(urdf_folder):
+        for name in ("crane", "meshes", "tools"):
+            assert Path(find_package(name)) == tmp_path / places[name]
+        with pytest.raises(KeyError):
+            find_package("far")
+    with pytest.raises(KeyError):
+        find_package("meshes")

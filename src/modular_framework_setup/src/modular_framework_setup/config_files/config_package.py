@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -104,13 +105,18 @@ def folder_of(name: str) -> Path:
 
 @contextmanager
 def packages_beside(folder: Path) -> Iterator[None]:
-    """Also finds the packages that lie beside a folder, for as long as the context lasts; they need not be built."""
+    """Also finds the package around a folder and those beside it, for as long as the context lasts.
+
+    They need not be built. The packages beside it lie in the same folder, or in a folder of that one.
+    """
+    own = next((place for place in (folder, *folder.parents) if (place / "package.xml").is_file()), folder).resolve()
     before = os.environ.get("ROS_PACKAGE_PATH")
     known = {Path(path).resolve() for path in _package_paths()}
-    if folder.resolve() in known:
+    if own in known:
         yield
         return
-    os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join([str(folder.resolve().parent), *([before] if before else [])])
+    found = [own, *(file.parent for depth in ("*", "*/*") for file in own.parent.glob(f"{depth}/package.xml"))]
+    os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join([*map(str, found), *([before] if before else [])])
     try:
         yield
     finally:
@@ -120,14 +126,24 @@ def packages_beside(folder: Path) -> Iterator[None]:
             os.environ["ROS_PACKAGE_PATH"] = before
 
 
+@functools.cache
+def _packages_on(paths: tuple[str, ...]) -> rospkg.RosPack:
+    """Returns the packages on search paths; cached, because each RosPack walks through all folders once."""
+    return rospkg.RosPack(list(paths))
+
+
+def _packages() -> rospkg.RosPack:
+    return _packages_on(tuple(rospkg.get_ros_paths()))
+
+
 def _package_paths() -> list[str]:
-    packages = rospkg.RosPack()
+    packages = _packages()
     return [packages.get_path(name) for name in packages.list()]
 
 
 def find_package(name: str) -> str:
     """Returns the folder of a ROS package; raises KeyError naming the nearest one when it is not there."""
-    packages = rospkg.RosPack()
+    packages = _packages()
     try:
         return str(packages.get_path(name))
     except rospkg.ResourceNotFound:
