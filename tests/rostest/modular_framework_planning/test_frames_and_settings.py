@@ -271,6 +271,26 @@ def test_contacts_that_made_a_plan_fail_are_shown_until_the_next_plan() -> None:
         until(lambda: len(messages[-1].markers) == 1, "their end")
 
 
+def test_the_newest_planned_path_is_shown_also_to_those_who_look_later() -> None:
+    def tip(answer: Any) -> tuple[float, float, float]:
+        path = answer.trajectory.joint_trajectory
+        return tuple(vector(tip_pose([path.points[-1].positions[path.joint_names.index(name)] for name in ARM])))
+
+    def is_shown(messages: list[MarkerArray], place: tuple[float, float, float]) -> bool:
+        lines = [marker for marker in messages[-1].markers if marker.type == Marker.LINE_STRIP] if messages else []
+        ends = [(line.points[-1].x, line.points[-1].y, line.points[-1].z) for line in lines]
+        return len(ends) == 1 and ends[0] == pytest.approx(place, abs=1e-6)
+
+    first, second = (plan(request(joint_goal(ARM[0], START[0] + turn))) for turn in (-0.8, 0.4))
+    assert tip(first) != pytest.approx(tip(second), abs=0.1)
+    with heard("display_planned_path_markers", MarkerArray) as messages:
+        until(lambda: is_shown(messages, tip(second)), "the path planned before")
+        third = plan(request(joint_goal(ARM[0], START[0] - 0.5)))
+        until(lambda: is_shown(messages, tip(third)), "the next path")
+        with heard("display_planned_path_markers", MarkerArray) as others:
+            until(lambda: is_shown(others, tip(third)), "the newest path")
+
+
 def test_requests_are_published_where_the_launch_file_asks_for_it() -> None:
     assert plan(request(planner_id="RRTConnect")).error_code.val == OK
     with heard("motion_plan_request", MotionPlanRequest) as messages:  # latched

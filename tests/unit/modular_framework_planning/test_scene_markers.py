@@ -30,8 +30,10 @@ def box(name: str) -> CollisionObject:
 def published(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The messages that were published."""
     messages: list[Any] = []
+    picture = SimpleNamespace(show=lambda draw: messages.append(draw()))
     monkeypatch.setattr(scene_markers.rospy, "Publisher", lambda *_, **__: None)
-    monkeypatch.setattr(scene_markers, "publish", lambda _, message: messages.append(message))
+    monkeypatch.setattr(scene_markers, "PicturePublisher", lambda *_: picture)
+    monkeypatch.setattr(scene_markers, "publish", lambda *_: None)
     return messages
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import colorsys
 
 import numpy as np
-import rospy
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
@@ -16,7 +15,7 @@ from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.markers.scene_markers import delete_all
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene
-from modular_framework_ros.publishing import publish
+from modular_framework_ros.publishing import PicturePublisher
 
 MAX_CUBES = 100_000
 SHADES = [ColorRGBA(*colorsys.hsv_to_rgb(hue, 0.8, 0.9), 1.0) for hue in np.linspace(0.7, 0.0, 32)]  # blue to red
@@ -26,7 +25,7 @@ class OctomapMarkers:
     """Publishes ~octomap_markers (MarkerArray, latched) when the octomap changes."""
 
     def __init__(self) -> None:
-        self._publisher = rospy.Publisher(names.OCTOMAP_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
+        self._publisher = PicturePublisher(names.OCTOMAP_MARKERS_TOPIC, MarkerArray)
         self._shown: object = None
 
     def show(self, scene: PlanningScene) -> None:
@@ -34,15 +33,16 @@ class OctomapMarkers:
         if scene.octomap is self._shown:
             return
         self._shown = scene.octomap
-        markers = [delete_all(scene.model.planning_frame)]
+        self._publisher.show(lambda: _octomap_markers(scene.octomap, scene.model.planning_frame))
+
+
+def _octomap_markers(body: CollisionObject | None, frame: str) -> MarkerArray:
+    markers = [delete_all(frame)]
+    if body is not None:
         markers += [
-            _cubes(body, shape, scene.model.planning_frame)
-            for body in (scene.octomap,)
-            if body is not None
-            for shape, _ in body.shapes
-            if isinstance(shape, Octree) and len(shape.centers)
+            _cubes(body, shape, frame) for shape, _ in body.shapes if isinstance(shape, Octree) and len(shape.centers)
         ]
-        publish(self._publisher, MarkerArray(markers))
+    return MarkerArray(markers)
 
 
 def _cubes(body: CollisionObject, octree: Octree, frame: str) -> Marker:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import rospy
 from geometry_msgs.msg import Point
 from moveit_msgs.msg import DisplayTrajectory
@@ -22,7 +23,7 @@ from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.planning_interface.planning_request import PlanningAnswer
 from modular_framework_planning.planning_scene.planning_scene import Color, PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
-from modular_framework_ros.publishing import publish
+from modular_framework_ros.publishing import PicturePublisher, publish
 
 OBJECT_COLOR = (0.45, 0.75, 0.35, 1.0)  # opaque: RViz does not sort transparent markers by depth
 ATTACHED_COLOR = (0.75, 0.3, 0.75, 1.0)
@@ -49,14 +50,17 @@ class MarkerPublisher:
         """
         self._frame = planning_frame
         self._contacts = rospy.Publisher(names.DISPLAY_CONTACTS_TOPIC, MarkerArray, queue_size=5, latch=True)
-        self._scene = rospy.Publisher(names.SCENE_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
-        self._path = rospy.Publisher(names.PATH_MARKERS_TOPIC, MarkerArray, queue_size=1, latch=True)
+        self._scene = PicturePublisher(names.SCENE_MARKERS_TOPIC, MarkerArray)
+        self._path = PicturePublisher(names.PATH_MARKERS_TOPIC, MarkerArray)
         self._display = rospy.Publisher(names.DISPLAY_PATH_TOPIC, DisplayTrajectory, queue_size=5, latch=True)
         self._motions: list[list[Marker]] = []
         self._motions_changing = threading.Lock()
 
     def show_scene(self, scene: PlanningScene) -> None:
         """Publishes one marker per shape; attached ones are given in their link's frame, so they follow it."""
+        self._scene.show(lambda: self._scene_markers(scene))
+
+    def _scene_markers(self, scene: PlanningScene) -> MarkerArray:
         markers = [delete_all(self._frame)]
         for body in scene.objects.values():
             color = scene.colors.get(body.name, OBJECT_COLOR)
@@ -68,19 +72,22 @@ class MarkerPublisher:
                 markers.append(_shape_marker(shape, held.body.pose * pose, held.link, held.name, number))
                 markers[-1].frame_locked = True
                 _paint(markers[-1], scene.colors.get(held.name, ATTACHED_COLOR))
-        publish(self._scene, MarkerArray(markers))
+        return MarkerArray(markers)
 
     def show_path(self, scene: PlanningScene, response: Any, answer: PlanningAnswer) -> None:
         """Publishes the planned motion: the path of the tip as a line, and the hand where the motion ends."""
         publish(self._display, DisplayTrajectory(scene.model.name, [response.trajectory], response.trajectory_start))
         group = scene.model.group(response.group_name)
+        self._path.show(lambda: self._path_markers(scene.model, group, answer))
+
+    def _path_markers(self, model: RobotModel, group: JointGroup, answer: PlanningAnswer) -> MarkerArray:
         rows = answer.trajectory.positions
-        line = _tip_line(scene, group.tip_link or group.links[-1], group.indices, rows, answer.start)
+        line = _tip_line(model, group.tip_link or group.links[-1], group.indices, rows, answer.start)
         end = answer.start.copy()
         end[group.indices] = rows[-1]
-        hand = _hand_links(scene.model, group, answer.start, end)
-        ghost = robot_markers(scene.model, end, "ghost", (*GHOST_COLOR, GHOST_ALPHA), hand)
-        publish(self._path, numbered([*line, *ghost], self._frame))
+        hand = _hand_links(model, group, answer.start, end)
+        ghost = robot_markers(model, end, "ghost", (*GHOST_COLOR, GHOST_ALPHA), hand)
+        return numbered([*line, *ghost], self._frame)
 
     @contextmanager
     def shown_motion(self, scene: PlanningScene, joints: Sequence[str], rows: Array) -> Iterator[None]:
@@ -96,7 +103,7 @@ class MarkerPublisher:
         line: list[Marker] = []
         if (group := next(groups, None)) is not None:
             indices = np.array([scene.model.index[name] for name in joints])
-            line = _tip_line(scene, group.tip_link, indices, rows, scene.positions)
+            line = _tip_line(scene.model, group.tip_link, indices, rows, scene.positions)
         self._change_motions(line, begins=True)
         try:
             yield
@@ -106,7 +113,8 @@ class MarkerPublisher:
     def _change_motions(self, line: list[Marker], begins: bool) -> None:
         with self._motions_changing:
             self._motions = [known for known in self._motions if known is not line] + ([line] if begins else [])
-            publish(self._path, numbered([marker for known in self._motions for marker in known], self._frame))
+            markers = [marker for known in self._motions for marker in known]
+            self._path.show(lambda: numbered(markers, self._frame))
 
     def show_contacts(self, contacts: Sequence[Contact]) -> None:
         """Publishes a ball where bodies touch, named by them; without contacts the old ones are deleted."""
@@ -172,8 +180,6 @@ def _cone_points(cone: Cone, sides: int = 24) -> list[Point]:
 
 def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, number: int) -> Marker:
     """A thin square around the plane's point nearest to its frame's origin."""
-    import pinocchio as pin
-
     normal = np.array([shape.a, shape.b, shape.c])
     length = float(np.linalg.norm(normal))
     rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal / length).toRotationMatrix()
@@ -183,17 +189,18 @@ def _plane_marker(shape: Plane, pose: Transform, frame: str, namespace: str, num
     return marker
 
 
-def _tip_line(scene: PlanningScene, link: str, indices: Array, rows: Array, start: Array) -> list[Marker]:
+def _tip_line(model: RobotModel, link: str, indices: Array, rows: Array, start: Array) -> list[Marker]:
     """The path of a link as a line; none for a motion of one point, which RViz reports as an error."""
     if len(rows) < 2:
         return []
-    line = _marker(Marker.LINE_STRIP, scene.model.planning_frame, "tip")
+    line = _marker(Marker.LINE_STRIP, model.planning_frame, "tip")
     line.scale.x = 0.006
     _paint(line, (*GHOST_COLOR, 1.0))
+    frame, data, positions = model.frame_ids[link], model.pin_model.createData(), start.copy()
     for number in np.linspace(0, len(rows) - 1, min(len(rows), LINE_POINTS)).round().astype(int):
-        positions = start.copy()
         positions[indices] = rows[number]
-        line.points.append(Point(*scene.model.link_transforms(positions)[link].translation))
+        pin.forwardKinematics(model.pin_model, data, positions)
+        line.points.append(Point(*pin.updateFramePlacement(model.pin_model, data, frame).translation))
     return [line]
 
 
