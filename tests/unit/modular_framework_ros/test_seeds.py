@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from rospy.impl.paramserver import ParamServerCache
 
 from modular_framework_ros import seeds
 
@@ -18,6 +19,23 @@ def with_parameter(monkeypatch: pytest.MonkeyPatch, value: Any) -> None:
 def test_without_the_parameter_there_is_no_seed(monkeypatch: pytest.MonkeyPatch, value: Any) -> None:
     with_parameter(monkeypatch, value)
     assert seeds.seed_parameter() is None
+
+
+def test_the_master_is_asked_once_and_tells_of_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    known, asked = ParamServerCache(), []
+
+    def ask(name: str, default: Any) -> Any:  # as rospy.get_param_cached where the master knows no such parameter
+        asked.append(name)
+        known.set(name, {})
+        return default
+
+    monkeypatch.setattr(seeds, "get_param_server_cache", lambda: known)
+    monkeypatch.setattr(seeds.rospy, "get_param_cached", ask)
+    assert [seeds.seed_parameter() for _ in range(3)] == [None] * 3 and asked == ["/seed"]
+    known.update("/seed", 7)
+    assert seeds.seed_parameter() == 7
+    known.update("/seed", {})
+    assert seeds.seed_parameter() is None and asked == ["/seed"]
 
 
 def test_zero_is_a_seed(monkeypatch: pytest.MonkeyPatch) -> None:

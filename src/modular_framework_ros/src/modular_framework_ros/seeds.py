@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import hashlib
+from typing import Any
 
 import rospy
+from rospy.impl.paramserver import get_param_server_cache
 
 from modular_framework_ros.parameter_declarations import existing_declaration
 
@@ -23,13 +25,23 @@ def seed_parameter() -> int | None:
     Raises:
         SeedError: it is no whole number in range.
     """
-    value = rospy.get_param_cached(SEED_PARAMETER, None)
-    if value is None or value in ("", {}):  # {} stands for a parameter that was deleted
+    value = _newest_value()
+    if value is None or value in ("", {}):  # {} stands for a parameter that is not set
         return None
     fault = existing_declaration("modular_framework_ros", "launch").parameters[SEED_PARAMETER].fault(value)
     if fault:
         raise SeedError(f"parameter '{SEED_PARAMETER}' {fault}")
     return int(value)
+
+
+def _newest_value() -> Any:
+    """Returns what the master told last; rospy.get_param_cached asks it every time while the parameter is not set."""
+    cache = get_param_server_cache()
+    with cache.lock:
+        known, name = cache.d or {}, SEED_PARAMETER.strip("/")
+        if name in known:
+            return known[name]
+    return rospy.get_param_cached(SEED_PARAMETER, None)
 
 
 def derived_seed(seed: int, *purpose: object) -> int:
