@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import logging
 import threading
 import time
+from collections.abc import Iterator
 from types import SimpleNamespace
 
 import actionlib
@@ -13,7 +16,7 @@ import pytest
 import rospy
 from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from control_msgs.msg import GripperCommandAction, GripperCommandGoal, GripperCommandResult
+from control_msgs.msg import GripperCommand, GripperCommandAction, GripperCommandGoal, GripperCommandResult
 from gazebo_msgs.srv import DeleteModel, DeleteModelResponse, SpawnModel, SpawnModelResponse
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from ros_session import until
@@ -25,7 +28,8 @@ from std_srvs.srv import SetBool, SetBoolResponse
 import smach
 from modular_framework_core import srv
 from modular_framework_core.commander.arm_commander import CommanderError
-from modular_framework_ros import action_server
+from modular_framework_ros import ros_goal_senders
+from modular_framework_ros.action_client import is_connected
 from modular_framework_ros.action_server import SteadyActionServer
 from modular_framework_ros.ros_node_calls import NodeCallError
 from modular_framework_states.states.call_action import CallAction
@@ -41,6 +45,7 @@ from modular_framework_states.states.store import Store
 from modular_framework_states.states.wait import Wait
 from modular_framework_states.states.wait_for_message import WaitForMessage
 
+SERVERS = itertools.count(1)
 LAUNCH = """<launch><node name="managers" pkg="modular_framework_core" type="managers" output="screen" required="true"
 args="{file}"/></launch>"""
 
@@ -250,55 +255,95 @@ def test_no_result_is_lost_while_its_topic_is_still_being_connected(monkeypatch:
     assert ended.is_set()
 
 
-@pytest.mark.parametrize("answers", [True, False], ids=["a client that answers late", "a client that cannot be called"])
+@pytest.fixture
+def quick_grip() -> Iterator[SteadyActionServer]:
+    """A server whose goals end at once; no client has sent goals under its name before."""
+
+    def answer(goal: ServerGoalHandle) -> None:
+        goal.set_accepted()
+        goal.set_succeeded(GripperCommandResult(position=goal.get_goal().command.position))
+
+    server = SteadyActionServer(f"quick_grip_{next(SERVERS)}", GripperCommandAction, answer, auto_start=False)
+    server.start()
+    yield server
+    server.stop()
+
+
+@pytest.mark.parametrize("answers", [True, False], ids=["a client that counts late", "a client that cannot be called"])
 def test_a_goal_is_reported_after_its_client_has_answered_a_call(
-    monkeypatch: pytest.MonkeyPatch, answers: bool
+    monkeypatch: pytest.MonkeyPatch, quick_grip: SteadyActionServer, answers: bool
 ) -> None:
-    """A client misses what it hears before its send_goal() has returned."""
     called, may_answer = threading.Event(), threading.Event()
 
-    def process_id(address: str, timeout_s: float) -> int:
+    def published_bytes(address: str, topic: str, timeout_s: float) -> int:
         called.set()
         assert may_answer.wait(60.0)
         if not answers:
             raise NodeCallError(address)
-        return 1
+        return 10**6
 
-    def answer(goal: ServerGoalHandle) -> None:
-        goal.set_accepted()
-        goal.set_succeeded(GripperCommandResult(reached_goal=True))
-        ended.set()
-
-    monkeypatch.setattr(action_server, "process_id", process_id)
-    ended = threading.Event()
-    server = SteadyActionServer("quick_grip", GripperCommandAction, answer, auto_start=False)
-    server.start()
-    client = actionlib.SimpleActionClient("quick_grip", GripperCommandAction)
+    monkeypatch.setattr(ros_goal_senders, "published_bytes", published_bytes)
+    client = actionlib.SimpleActionClient(quick_grip.ns, GripperCommandAction)
     assert client.wait_for_server(rospy.Duration(60.0))
     lists: list[GoalStatusArray] = []
-    subscriber = rospy.Subscriber("quick_grip/status", GoalStatusArray, lists.append)
+    subscriber = rospy.Subscriber(f"{quick_grip.ns}/status", GoalStatusArray, lists.append)
     client.send_goal(GripperCommandGoal())
-    assert called.wait(60.0) and ended.wait(60.0)
+    assert called.wait(60.0)
     seen = len(lists)
     until(lambda: len(lists) > seen, "another status message")
     assert not any(message.status_list for message in lists) and client.get_result() is None
     may_answer.set()
-    assert client.wait_for_result(rospy.Duration(60.0)) and client.get_result().reached_goal
+    assert client.wait_for_result(rospy.Duration(60.0))
     until(lambda: any(item.status == GoalStatus.SUCCEEDED for item in lists[-1].status_list), "the status of the goal")
     subscriber.unregister()
-    server.stop()
+
+
+@pytest.mark.parametrize(
+    "server_is_new", [False, True], ids=["the client's first server", "a server that was restarted"]
+)
+def test_no_client_is_told_of_a_goal_while_it_still_sends_it(
+    quick_grip: SteadyActionServer, caplog: pytest.LogCaptureFixture, server_is_new: bool
+) -> None:
+    """A publisher of rospy yields the processor once the message is queued; a busy machine returns it late."""
+    client = actionlib.SimpleActionClient(quick_grip.ns, GripperCommandAction)
+    assert client.wait_for_server(rospy.Duration(60.0))
+    if server_is_new:
+        for position in (0.1, 0.2):
+            client.send_goal_and_wait(GripperCommandGoal(GripperCommand(position=position)))
+        quick_grip.stop()
+        until(lambda: not client.action_client.pub_goal.get_num_connections(), "the end of the connection")
+        quick_grip.start()
+        until(lambda: is_connected(client), "the new connections")
+        client.send_goal_and_wait(GripperCommandGoal())  # the new server learns what the client has published
+    (connection,) = client.action_client.pub_goal.impl.connections
+    write = connection.write_data
+
+    def write_and_yield(data: bytes) -> bool:
+        write(data)
+        time.sleep(0.1)
+        return True
+
+    connection.write_data = write_and_yield
+    logging.getLogger("rosout").addHandler(caplog.handler)
+    try:
+        for position in (0.3, 0.4, 0.5):
+            client.send_goal(GripperCommandGoal(GripperCommand(position=position)))
+            assert client.wait_for_result(rospy.Duration(20.0)) and client.get_result().position == position
+    finally:
+        logging.getLogger("rosout").removeHandler(caplog.handler)
+    assert not [record for record in caplog.records if record.levelno >= logging.ERROR]
 
 
 def test_a_goal_that_is_cancelled_before_it_is_reported_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """An actionlib client takes a goal it has cancelled for lost when a status does not contain the goal."""
     called, may_answer = threading.Event(), threading.Event()
 
-    def process_id(address: str, timeout_s: float) -> int:
+    def published_bytes(address: str, topic: str, timeout_s: float) -> int:
         called.set()
         assert may_answer.wait(60.0)
-        return 1
+        return 10**6
 
-    monkeypatch.setattr(action_server, "process_id", process_id)
+    monkeypatch.setattr(ros_goal_senders, "published_bytes", published_bytes)
     server = SteadyActionServer(
         "slow_grip", GripperCommandAction, ServerGoalHandle.set_accepted, ServerGoalHandle.set_canceled, False
     )

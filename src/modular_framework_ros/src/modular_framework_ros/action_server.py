@@ -2,7 +2,7 @@
 """Action servers that report the end of every goal to the client, also of a goal that ends at once.
 
 A client of actionlib misses what it hears of a goal before its send_goal() has returned. So a server reports a goal
-only after the client's node has answered a call that began after the goal's arrival.
+only after the client has sent it to the end.
 """
 
 from __future__ import annotations
@@ -16,13 +16,8 @@ import rospy
 from actionlib import ActionServer, SimpleActionServer
 
 from modular_framework_ros.publishing import going_down
-from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
+from modular_framework_ros.ros_goal_senders import GoalSenders
 
-CLIENT_TIMEOUT_S = 0.5
-"""How long a goal is not reported if the client's node does not answer [s]."""
-_QUICK_ANSWER_S = 0.005
-"""Switch interval of Python's threads. A client that answers later is busy and may be in send_goal() still [s]."""
-_MOST_CALLS = 3
 LONGEST_STATUS_PAUSE_S = 2.0
 """Longer than a goal remains unreported; only goals that come one upon another put off the status for so long [s]."""
 CLOSING_DELAY_S = 0.15
@@ -58,13 +53,13 @@ class SteadyActionServer(ActionServer):
     """An action server whose status topic does not depend on simulated time, and whose clients hear of every end."""
 
     def initialize(self) -> None:
-        self._client_addresses: dict[str, str] = {}
         self._last_result_s = -CLOSING_DELAY_S
         self._last_status_s = -LONGEST_STATUS_PAUSE_S
         self._unreported: dict[str, tuple[Any, Any] | None] = {}
         """Status and result, if the goal has ended, of the goals that are not reported yet, by their ID."""
         self._reports: set[threading.Thread] = set()
         super().initialize()
+        self._senders = GoalSenders(self.goal_sub)
         timer: rospy.Timer | None = getattr(self, "status_timer", None)
         if timer is not None:
             timer.shutdown()
@@ -77,13 +72,14 @@ class SteadyActionServer(ActionServer):
             known = {item.status.goal_id.id for item in self.status_list}
             if self.started and goal_id and goal_id not in known:
                 self._unreported[goal_id] = None
-                report = threading.Thread(target=self._report, args=(goal_id, client), daemon=True)
+                received = self._senders.received_bytes(goal)
+                report = threading.Thread(target=self._report, args=(goal_id, client, received), daemon=True)
                 self._reports.add(report)
                 report.start()
             super().internal_goal_callback(goal)
 
-    def _report(self, goal_id: str, client: str) -> None:
-        self._wait_for_client(client)
+    def _report(self, goal_id: str, client: str, received: int) -> None:
+        self._senders.wait(client, received)
         with self.lock:
             ended = self._unreported.pop(goal_id)
             if ended is not None:
@@ -91,19 +87,6 @@ class SteadyActionServer(ActionServer):
             else:
                 self.publish_status()
         self._reports.discard(threading.current_thread())
-
-    def _wait_for_client(self, client: str) -> None:
-        try:
-            if client not in self._client_addresses:
-                self._client_addresses[client] = node_address(client)
-            for _ in range(_MOST_CALLS):
-                begun_s = time.monotonic()
-                process_id(self._client_addresses[client], CLIENT_TIMEOUT_S)
-                if time.monotonic() - begun_s < _QUICK_ANSWER_S:
-                    return
-        except NodeCallError as error:
-            self._client_addresses.pop(client, None)
-            rospy.logdebug("%s: a goal is reported though its client did not answer: %s", self.ns, error)
 
     def publish_result(self, status: Any, result: Any) -> None:
         with self.lock:

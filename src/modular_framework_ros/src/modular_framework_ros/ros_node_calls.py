@@ -54,8 +54,42 @@ def process_id(address: str, timeout_s: float) -> int:
     Raises:
         NodeCallError: The node does not answer in time.
     """
+    return int(_call(address, "getPid", timeout_s))
+
+
+def published_bytes(address: str, topic: str, timeout_s: float) -> int | None:
+    """Asks a node for the size of all messages that it has published on a topic since it has a subscriber [bytes].
+
+    A node of rospy counts a message at the end of the publishing thread's work, once all subscribers' connections have
+    taken the message.
+
+    Args:
+        address: URI of the node's XML-RPC interface.
+        topic: Resolved name of the topic.
+        timeout_s: Longest wait for the connection, and for the answer [s].
+
+    Returns:
+        The count. None if the node does not count: nodes of roscpp, and nodes of rospy beyond 2 GiB.
+
+    Raises:
+        NodeCallError: The node does not answer in time.
+    """
     try:
-        answer: Any = xmlrpc.client.ServerProxy(address, _Transport(timeout_s)).getPid(rospy.get_name())
-        return int(answer[2])
+        publishers = _call(address, "getBusStats", timeout_s)[0]
+    except _NodeFault:
+        return None
+    count = next((item[1] for item in publishers if item[0] == topic), None)
+    return count if isinstance(count, int) else None
+
+
+class _NodeFault(NodeCallError):
+    """The node answered with a fault."""
+
+
+def _call(address: str, method: str, timeout_s: float) -> Any:
+    try:
+        return getattr(xmlrpc.client.ServerProxy(address, _Transport(timeout_s)), method)(rospy.get_name())[2]
+    except xmlrpc.client.Fault as error:
+        raise _NodeFault(f"node at {address}: {error}") from error
     except (OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError, IndexError, TypeError) as error:
         raise NodeCallError(f"node at {address}: {error}") from error
