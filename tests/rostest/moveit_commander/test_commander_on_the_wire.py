@@ -15,15 +15,19 @@ from typing import Any
 import actionlib
 import moveit_commander
 import numpy as np
+import pinocchio as pin
 import pytest
 import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from moveit_commander import MoveGroupCommander, MoveItCommanderException, RobotCommander
+from moveit_commander import MoveGroupCommander, MoveItCommanderException, PlanningSceneInterface, RobotCommander
 from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
     Constraints,
     ExecuteTrajectoryAction,
     MoveGroupAction,
     MoveItErrorCodes,
+    OrientationConstraint,
     RobotState,
     RobotTrajectory,
     TrajectoryConstraints,
@@ -31,8 +35,9 @@ from moveit_msgs.msg import (
 from moveit_msgs.srv import GetPositionFK
 from ros_session import until
 from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
-from trajectory_msgs.msg import JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 START = {
     "shoulder_pan_joint": 1.57,
@@ -529,3 +534,105 @@ def test_a_straight_line_is_followed_or_the_missing_service_named(arm: MoveGroup
         arm.compute_cartesian_path([pose], 0.01, 0.0, True, None, 1)
     with pytest.raises(MoveItCommanderException, match="constraint type"):
         arm.compute_cartesian_path([pose], 0.01, path_constraints="upright")
+
+
+# ---------------------------------------------------------------- MoveGroupCommander: held objects and subframes
+def transform(pose: Pose) -> pin.SE3:
+    return pin.XYZQUATToSE3(np.array(moveit_commander.conversions.pose_to_list(pose)))
+
+
+def message(place: pin.SE3) -> Pose:
+    return moveit_commander.conversions.list_to_pose(pin.SE3ToXYZQUAT(place).tolist())
+
+
+TOOL_IN_LINK = Pose(Point(0.0, 0.01, 0.12), Quaternion(math.sin(0.2), 0.0, 0.0, math.cos(0.2)))
+TIP_IN_TOOL = Pose(Point(0.0, 0.02, 0.05), Quaternion(0.0, 0.0, math.sin(0.4), math.cos(0.4)))
+TIP_IN_LINK = transform(TOOL_IN_LINK) * transform(TIP_IN_TOOL)
+
+
+@pytest.fixture
+def tool(arm: MoveGroupCommander, robot: RobotCommander) -> Iterator[str]:
+    """A held tool; yields the name of its subframe."""
+    scene = PlanningSceneInterface()
+    item = CollisionObject(id="tool", pose=TOOL_IN_LINK, subframe_names=["tip"], subframe_poses=[TIP_IN_TOOL])
+    item.header.frame_id = "eg_manipulator"
+    item.primitives = [SolidPrimitive(SolidPrimitive.BOX, [0.01, 0.01, 0.1])]
+    item.primitive_poses = [Pose(orientation=Quaternion(0, 0, 0, 1))]
+    touched = [*robot.get_link_names("ezgripper"), PALM]
+    scene.attach_object(AttachedCollisionObject("eg_manipulator", item, touched, JointTrajectory(), 0.0))
+    yield "tool/tip"
+    scene.remove_attached_object("eg_manipulator", "tool")
+    scene.remove_world_object("tool")
+    arm.set_end_effector_link("eg_manipulator")
+    arm.clear_pose_targets()
+    arm.clear_path_constraints()
+
+
+def link_in(trajectory: RobotTrajectory, point: int) -> pin.SE3:
+    """Where the link that holds the tool is at a point of a trajectory."""
+    path = trajectory.joint_trajectory
+    state = RobotState(joint_state=JointState(name=path.joint_names, position=path.points[point].positions))
+    state.is_diff = True
+    return transform(pose_of("eg_manipulator", state).pose)
+
+
+def test_a_subframe_is_an_end_effector_of_every_call(arm: MoveGroupCommander, tool: str) -> None:
+    above = deepcopy(GOAL)
+    above.position.z += 0.04
+    places = [transform(GOAL), transform(above)]
+    assert arm.go(NEAR)
+    arm.set_end_effector_link(tool)
+    assert arm.get_end_effector_link() == tool
+    arm.set_pose_target(message(places[0] * TIP_IN_LINK))
+    success, trajectory, _, _ = arm.plan()
+    assert success and link_in(trajectory, -1).isApprox(places[0], 2e-3)
+    arm.set_end_effector_link("eg_manipulator")
+    arm.clear_pose_targets()
+    arm.set_pose_target(message(places[0] * TIP_IN_LINK), tool)
+    assert arm.go()
+    assert transform(arm.get_current_pose("eg_manipulator").pose).isApprox(places[0], 3e-3)
+    assert transform(arm.get_current_pose(tool).pose).isApprox(places[0] * TIP_IN_LINK, 3e-3)
+    arm.set_joint_value_target(message(places[1] * TIP_IN_LINK), tool)
+    success, trajectory, _, _ = arm.plan()
+    assert success and link_in(trajectory, -1).isApprox(places[1], 2e-3)
+    far = pin.SE3(places[1].rotation, np.array([0.0, 5.0, 1.0]))
+    found = []
+    for place, link in ((far * TIP_IN_LINK, tool), (far, "eg_manipulator")):
+        arm.set_joint_value_target(NEAR)
+        arm.set_joint_value_target(message(place), link, True)
+        found.append(arm.get_joint_value_target())
+    assert found[0] != NEAR and found[0] == pytest.approx(found[1], abs=1e-3), "as near as the link that holds the tool"
+    arm.set_end_effector_link(tool)
+    arm.limit_max_cartesian_link_speed(0.05)
+    trajectory, fraction = arm.compute_cartesian_path([message(places[1] * TIP_IN_LINK)], 0.01)
+    arm.clear_max_cartesian_link_speed()
+    assert fraction == 1.0 and link_in(trajectory, -1).isApprox(places[1], 2e-3)
+
+
+def test_a_subframe_is_kept_within_path_constraints(arm: MoveGroupCommander, tool: str) -> None:
+    assert arm.go(NEAR)
+    start = transform(arm.get_current_pose("eg_manipulator").pose)
+    turn = OrientationConstraint(link_name=tool, weight=1.0)
+    turn.header.frame_id = "world"
+    turn.orientation = message(start * TIP_IN_LINK).orientation
+    turn.absolute_x_axis_tolerance = turn.absolute_y_axis_tolerance = turn.absolute_z_axis_tolerance = 0.3
+    arm.set_path_constraints(Constraints(orientation_constraints=[turn]))
+    goal = pin.SE3(start.rotation, start.translation + [0.1, 0.0, -0.1])
+    arm.set_pose_target(message(goal * TIP_IN_LINK), tool)
+    success, trajectory, _, _ = arm.plan()
+    assert success and link_in(trajectory, -1).isApprox(goal, 3e-3)
+    for point in range(len(trajectory.joint_trajectory.points)):
+        turned = pin.log3(start.rotation.T @ link_in(trajectory, point).rotation)
+        assert np.linalg.norm(turned) <= math.sqrt(3.0) * 0.31
+
+
+def test_forward_kinematics_knows_what_is_held(arm: MoveGroupCommander, tool: str) -> None:
+    state = RobotState(is_diff=True)
+    link = transform(pose_of("eg_manipulator", state).pose)
+    assert transform(pose_of("tool", state).pose).isApprox(link * transform(TOOL_IN_LINK), 1e-6)
+    assert transform(pose_of(tool, state).pose).isApprox(link * TIP_IN_LINK, 1e-6)
+    for name in ("tool/handle", "table/leg", "nobody"):
+        with pytest.raises(MoveItCommanderException, match="attached objects and subframes are: tool, tool/tip"):
+            arm.set_end_effector_link(name)
+        code = rospy.ServiceProxy("compute_fk", GetPositionFK)(Header(), [name], state).error_code.val
+        assert code == MoveItErrorCodes.INVALID_LINK_NAME

@@ -13,9 +13,17 @@ from moveit_msgs.msg import (
     MoveGroupAction,
     MoveItErrorCodes,
     PlannerInterfaceDescription,
+    PlanningSceneComponents,
     RobotState,
 )
-from moveit_msgs.srv import GetPositionFK, GetPositionFKRequest, QueryPlannerInterfaces, QueryPlannerInterfacesRequest
+from moveit_msgs.srv import (
+    GetPlanningScene,
+    GetPlanningSceneRequest,
+    GetPositionFK,
+    GetPositionFKRequest,
+    QueryPlannerInterfaces,
+    QueryPlannerInterfacesRequest,
+)
 
 from modular_framework_ros.parameter_search import nearest_parameter
 from moveit_commander import conversions
@@ -36,7 +44,7 @@ def code_text(code: MoveItErrorCodes) -> str:
 
 
 def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotState) -> PoseStamped:
-    """Returns the pose of a link in a state, by compute_fk.
+    """Returns the pose of a link, an attached object or a subframe in a state, by compute_fk.
 
     Raises:
         ServerError: compute_fk is not there.
@@ -51,6 +59,21 @@ def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotStat
             f"'{frame}': {code_text(answer.error_code)}"
         )
     return answer.pose_stamped[0]
+
+
+def held_frames(servers: Servers) -> dict[str, str]:
+    """Returns the links that hold the attached objects and their subframes, by name of the object or subframe.
+
+    Raises:
+        ServerError: get_planning_scene is not there.
+    """
+    request = GetPlanningSceneRequest(PlanningSceneComponents(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS))
+    state = servers.call("get_planning_scene", GetPlanningScene, request).scene.robot_state
+    return {
+        name: held.link_name
+        for held in state.attached_collision_objects
+        for name in (held.object.id, *(f"{held.object.id}/{inner}" for inner in held.object.subframe_names))
+    }
 
 
 class GroupConnection:
@@ -96,11 +119,12 @@ class GroupConnection:
         return self._end_effector_link
 
     def set_end_effector_link(self, link_name: str) -> None:
-        """Sets the end effector link; raises MoveItCommanderException if the robot has no such link."""
-        if link_name not in self._model.links:
-            raise MoveItCommanderException(
-                f"Unable to set end effector link: robot '{self._model.name}' has no link '{link_name}'"
-            )
+        """Sets the end effector link, which may be an attached object or a subframe ("object/subframe").
+
+        Raises:
+            MoveItCommanderException: the robot has no such link and holds no such object.
+        """
+        self._require_frame(link_name, "Unable to set end effector link")
         self._end_effector_link = link_name
 
     def get_pose_reference_frame(self) -> str:
@@ -165,7 +189,9 @@ class GroupConnection:
         return conversions.rpy_from_quaternion(conversions.pose_to_list(pose.pose)[3:])
 
     def _pose_of(self, link: str, state: RobotState) -> PoseStamped:
-        pose = forward_kinematics(self._servers, self._model.planning_frame, self._link(link, "get the pose of"), state)
+        link = self._link(link, "get the pose of")
+        state.is_diff = link not in self._model.links  # with the attached objects, which the state does not have
+        pose = forward_kinematics(self._servers, self._model.planning_frame, link, state)
         pose.header.stamp = rospy.Time.now()
         return pose
 
@@ -177,12 +203,19 @@ class GroupConnection:
                 f"There is no end effector to {purpose}: group '{self._group.name}' is not "
                 "a chain; name the link, or call set_end_effector_link"
             )
-        if chosen not in self._model.links:
-            raise MoveItCommanderException(
-                f"robot '{self._model.name}' has no link '{chosen}'; get_link_names of "
-                "RobotCommander lists those it has"
-            )
+        self._require_frame(chosen, f"Unable to {purpose} '{chosen}'")
         return chosen
+
+    def _require_frame(self, name: str, failure: str) -> None:
+        """Checks that the robot has a link, or holds an object or a subframe, of a name."""
+        if name in self._model.links:
+            return
+        held = held_frames(self._servers)
+        if name not in held:
+            raise MoveItCommanderException(
+                f"{failure}: robot '{self._model.name}' has no link '{name}', and its attached objects and subframes "
+                f"are: {', '.join(held) or 'none'}; get_link_names of RobotCommander lists the links"
+            )
 
     def _group_names(self) -> list[str]:
         return [joint.name for joint in self._group.variables]

@@ -9,7 +9,7 @@ from enum import Enum, auto
 from typing import Any
 
 from geometry_msgs.msg import Pose, PoseStamped
-from moveit_msgs.msg import MoveItErrorCodes
+from moveit_msgs.msg import MoveItErrorCodes, RobotState
 from moveit_msgs.srv import GetPositionIK, GetPositionIKRequest
 from sensor_msgs.msg import JointState
 
@@ -17,7 +17,7 @@ from modular_framework_urdf.mimics import with_leaders
 from moveit_commander import conversions
 from moveit_commander.approximate_kinematics import nearest_values, rotation_and_position
 from moveit_commander.exception import MoveItCommanderException
-from moveit_commander.group_connection import code_text, forward_kinematics
+from moveit_commander.group_connection import code_text, forward_kinematics, held_frames
 from moveit_commander.group_settings import GroupSettings
 from moveit_commander.robot_model import group_values
 
@@ -198,6 +198,12 @@ class GroupJointTargets(GroupSettings):
         base_pose = forward_kinematics(self._servers, pose.header.frame_id, base, self._state.message_of(start)).pose
         base_rotation, base_position = rotation_and_position(conversions.pose_to_list(base_pose))
         rotation, position = rotation_and_position(conversions.pose_to_list(pose.pose))
+        if link not in self._model.links:
+            holder = held_frames(self._servers)[link]
+            held_pose = forward_kinematics(self._servers, holder, link, RobotState(is_diff=True)).pose
+            held_rotation, held_position = rotation_and_position(conversions.pose_to_list(held_pose))
+            link, rotation = holder, rotation * held_rotation.inv()
+            position = position - rotation.apply(held_position)
         frame_to_base = base_rotation.inv()
         return nearest_values(
             self._model.chain(base, link),

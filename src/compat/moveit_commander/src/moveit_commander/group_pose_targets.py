@@ -111,7 +111,9 @@ class GroupPoseTargets(GroupJointTargets):
         )
 
     def _limited_link(self) -> str:
-        return (self._speed_limited_link or self._end_effector_link) if self._speed_limit > 0.0 else ""
+        """Returns the link of the speed limit; "" for no limit, and for the tip if the end effector is held."""
+        tip = self._end_effector_link if self._end_effector_link in self._model.links else ""
+        return (self._speed_limited_link or tip) if self._speed_limit > 0.0 else ""
 
     def _goals(self) -> list[Constraints]:
         """Returns the goals: the k-th holds the k-th pose of every link."""

@@ -21,7 +21,7 @@ from modular_framework_planning.contacts import describe_contacts
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.solution_choice import clearest, first_free
-from modular_framework_planning.messages.constraint_conversions import constraints_from_message
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
 from modular_framework_planning.messages.conversions import scene_with_state, state_message
 from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.messages.poses import pose_message
@@ -44,6 +44,7 @@ class KinematicsService(MoveGroupCapability):
     """Offers compute_ik (GetPositionIK) and compute_fk (GetPositionFK).
 
     As in MoveIt, pose_stamped_vector with ik_link_names asks for several tips of a group that holds a chain for each.
+    Links may be attached objects and their subframes ("object/subframe").
     """
 
     def connect(self) -> None:
@@ -128,11 +129,11 @@ class KinematicsService(MoveGroupCapability):
                 raise PlanningError(ErrorCode.INVALID_LINK_NAME, "fk_link_names is empty; name at least one link")
             scene = self._scene(request.robot_state)
             base = scene.frame_transform(request.header.frame_id)
-            transforms = scene.model.link_transforms(scene.positions)
             for link in request.fk_link_names:
-                if link not in transforms:
-                    raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", link, transforms)
-                stamped = PoseStamped(pose=pose_message(base.actInv(transforms[link])))
+                if not holding_link(scene, link):
+                    known = [*scene.model.frame_ids, *scene.attached]
+                    raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", link, known)
+                stamped = PoseStamped(pose=pose_message(base.actInv(scene.frame_transform(link))))
                 stamped.header.frame_id = request.header.frame_id or scene.model.planning_frame
                 stamped.header.stamp = rospy.Time.now()
                 response.pose_stamped.append(stamped)
