@@ -209,6 +209,10 @@ def test_the_srdf_is_expanded_with_the_arguments_of_the_setup_assistant(small: S
     assert any("lost" in fault.message for fault in small.faults())
     small.edit(".setup_assistant", "crane.urdf\n", "crane.urdf\n    xacro_args: tip:=palm\n")
     assert small.faults() == ()
+    small.edit(".setup_assistant", "tip:=palm", "side:=$(arg side) tip:=$(arg tool)")
+    assert any("lost" in fault.message for fault in small.faults()), "nothing says what the tool is"
+    small.edit(LAUNCH, "<launch>", '<launch><arg name="tool" default="palm"/>')
+    assert small.faults() == ()
 
 
 def test_a_xacro_file_that_fails_is_named_with_its_line(small: SmallPackage) -> None:

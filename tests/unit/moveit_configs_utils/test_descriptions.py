@@ -90,6 +90,14 @@ def test_arguments_of_setup_assistant_also_count_for_the_urdf_of_the_package(
     assert links(MoveItConfigsBuilder("r").to_moveit_configs().robot_description) == ["own", "hand", "left one"]
 
 
+def test_arguments_of_setup_assistant_may_be_those_of_the_launch_files(
+    make_package: PackageMaker, described: Path
+) -> None:
+    launch = {"launch/planning_context.launch": '<launch><arg name="hand" default="claw"/></launch>'}
+    make_package({**setup(arguments="tool:=$(arg hand) side:=$(arg side) speed:=$(optenv SPEED 1)"), **launch})
+    assert links(MoveItConfigsBuilder("r").to_moveit_configs().robot_description) == ["described", "claw", "no_side"]
+
+
 def test_mappings_take_the_place_of_the_arguments_of_setup_assistant(
     make_package: PackageMaker, described: Path
 ) -> None:

@@ -18,7 +18,8 @@ ARGUMENT = re.compile(r"\$\(arg +([^)\s]+) *\)")
 """`$(arg NAME)`; its group is the name."""
 _FIRST = ("planning_context.launch", "move_group.launch")
 _SUBSTITUTION = re.compile(r"\$\([^()]*(?:\([^()]*\)[^()]*)*\)")
-_UNKNOWN = "$()"
+UNKNOWN = "$()"
+"""What stands for a substitution whose value is not known."""
 
 
 def launch_files(package: Path) -> list[Path]:
@@ -41,17 +42,26 @@ def xacro_arguments(launch_files: Iterable[Element], file_name: str, values: Map
     found: dict[str, str] = {}
     for root in launch_files:
         for command in (item.get("command", "") for item in root.iter("param")):
-            for word in _words(command, values) if file_name in command else ():
-                name, is_argument, value = word.partition(":=")
-                if is_argument and _UNKNOWN not in word:
-                    found.setdefault(name, value)
+            if file_name in command:
+                found = {**known_arguments(command_words(command, values)), **found}
     return found
 
 
-def _words(command: str, values: Mapping[str, str]) -> list[str]:
-    """Returns the words of a command as a shell would, with `$()` for what is not known; none if it has open quotes."""
-    known = ARGUMENT.sub(lambda match: values.get(match[1], _UNKNOWN), command)
+def known_arguments(words: Iterable[str]) -> dict[str, str]:
+    """Returns the arguments among the words of a command, `NAME:=VALUE`, those whose values are known."""
+    pairs = (word.partition(":=") for word in words if UNKNOWN not in word)
+    return {name: value for name, is_argument, value in pairs if is_argument}
+
+
+def command_words(command: str, values: Mapping[str, str]) -> list[str]:
+    """Returns the words of a command as a shell would, with UNKNOWN for what is not known; none if a quote is open.
+
+    Args:
+        command: may have substitutions of roslaunch, such as `$(arg NAME)`.
+        values: of the launch files' arguments.
+    """
+    known = ARGUMENT.sub(lambda match: values.get(match[1], UNKNOWN), command)
     try:
-        return shlex.split(_SUBSTITUTION.sub(_UNKNOWN, known))
+        return shlex.split(_SUBSTITUTION.sub(UNKNOWN, known))
     except ValueError:
         return []

@@ -63,8 +63,9 @@ class MoveItConfigsBuilder(ParameterBuilder):
         self._robot_name = robot_name
         self._description = robot_description
         self._configs = MoveItConfigs(package_path=self._package_path)
-        self._setup = read_setup_assistant_file(self._package_path)
-        self._yaml = PackageYaml(self._package_path, dict(self._setup.xacro_arguments))
+        self._yaml = PackageYaml(self._package_path)
+        self._setup = read_setup_assistant_file(self._package_path, self._yaml.values())
+        self._yaml.arguments.update(self._setup.xacro_arguments)
         own = CONFIG / f"{robot_name}.urdf.xacro"
         self._own_urdf: Path | None = own if (self._package_path / own).is_file() else None
         if self._own_urdf is None and not self._setup.urdf_path:

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from launch_param_builder import ParameterFileError, load_yaml
+
+from modular_framework_urdf.launch_arguments import UNKNOWN, command_words, known_arguments
 
 FILE_NAME = ".setup_assistant"
 
@@ -31,8 +32,12 @@ class SetupAssistantFile:
     srdf_path: str = ""
 
 
-def read_setup_assistant_file(package_path: Path) -> SetupAssistantFile:
+def read_setup_assistant_file(package_path: Path, values: Mapping[str, str]) -> SetupAssistantFile:
     """Reads the file of a config package; an empty result where there is none.
+
+    Args:
+        package_path: Folder of the package.
+        values: Values of the arguments of the package's launch files, for `$(arg NAME)`.
 
     Raises:
         ParameterFileError: it is not as the Setup Assistant writes it.
@@ -47,7 +52,7 @@ def read_setup_assistant_file(package_path: Path) -> SetupAssistantFile:
     return SetupAssistantFile(
         str(urdf.get("package", "")),
         _relative(urdf) if urdf.get("package") else str(urdf.get("relative_path", "")),
-        _arguments(str(urdf.get("xacro_args", "")), path),
+        _arguments(str(urdf.get("xacro_args", "")), values, path),
         _relative(srdf),
     )
 
@@ -63,12 +68,15 @@ def _relative(section: Mapping[str, Any]) -> str:
     return str(section.get("relative_path", "")).lstrip("/")
 
 
-def _arguments(text: str, path: Path) -> dict[str, str]:
-    """Reads `name:=value name:=value`; options of the xacro command such as --inorder have no effect."""
-    words = [word for word in shlex.split(text) if not word.startswith("-")]
-    wrong = [word for word in words if ":=" not in word]
+def _arguments(text: str, values: Mapping[str, str], path: Path) -> dict[str, str]:
+    """Reads `name:=value name:=value`; options of the xacro command such as --inorder have no effect.
+
+    An argument whose value is not known, such as `$(arg NAME)` that no launch file has, keeps the xacro file's default.
+    """
+    words = command_words(text, values)
+    wrong = [word for word in words if ":=" not in word and UNKNOWN not in word and not word.startswith("-")]
     if wrong:
         raise ParameterFileError(
             f"{path}: xacro_args has '{' '.join(wrong)}'; every argument is needed as name:=value, separated by spaces"
         )
-    return dict(word.split(":=", 1) for word in words)
+    return known_arguments(words)

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import functools
 import os
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import rospkg
@@ -19,11 +18,10 @@ from modular_framework_core.files.located_yaml import Scalar
 from modular_framework_setup.config_files.yaml_files import load_yaml
 from modular_framework_setup.errors import NoConfigPackageError
 from modular_framework_urdf import xml_text
-from modular_framework_urdf.launch_arguments import launch_files, xacro_arguments
+from modular_framework_urdf.launch_arguments import command_words, known_arguments, launch_files, xacro_arguments
 
 SETTINGS = ".setup_assistant"
 SETTINGS_KEY = "moveit_setup_assistant_config"
-_XACRO_ARGUMENT = re.compile(r"(\w+):=['\"]?([^\s'\"]+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +174,8 @@ def read_config_package(folder: Path, faults: FaultList) -> ConfigPackage:
         urdf = _only(folder, ("*.urdf.xacro", "*.urdf"), "robot description", faults)
     if srdf is None and not settings.names_srdf:
         srdf = _only(folder, ("*.srdf", "*.srdf.xacro"), "semantic description", faults)
-    return ConfigPackage(folder, name, urdf, srdf, settings.xacro_arguments(), urdf_package)
+    package = ConfigPackage(folder, name, urdf, srdf, urdf_package=urdf_package)
+    return replace(package, xacro_arguments=settings.xacro_arguments(package.launch_arguments()))
 
 
 def _only(folder: Path, patterns: tuple[str, ...], what: str, faults: FaultList) -> Path | None:
@@ -216,9 +215,10 @@ class _Settings:
     def names_srdf(self) -> bool:
         return self._entry("SRDF", "relative_path") is not None
 
-    def xacro_arguments(self) -> dict[str, str]:
+    def xacro_arguments(self, values: Mapping[str, str]) -> dict[str, str]:
+        """Returns the arguments, with `$(arg NAME)` as the launch files' arguments are by default."""
         given = self._entry("URDF", "xacro_args")
-        return dict(_XACRO_ARGUMENT.findall(str(given.value))) if given else {}
+        return known_arguments(command_words(str(given.value), values)) if given else {}
 
     def urdf(self) -> tuple[Path | None, Path | None]:
         """Returns the robot description, and the folder of its package when that is another one."""
