@@ -66,6 +66,29 @@ def arm(prefix: str, base: str, xyz: str) -> str:
 
 
 CRANE = f'<robot name="Crane-1">{link("base", "0.2 0.2 0.1", "0 0 -0.05")}{arm("", "base", "0 0 0.01")}</robot>'
+
+
+def four_bar_crane() -> str:
+    """The crane with a hand whose fingers hang on the palm by two knuckles each; a pad stays upright on each."""
+    head, tail = CRANE.split(link("finger_a", "0.02 0.01 0.08", "0 0.005 0.04"))
+    tail = tail[tail.index('<joint name="pan"') : tail.index('<joint name="slide_a"')]
+    parts = [head, tail]
+    for side, name in ((1, "left"), (-1, "right")):
+        for knuckle, place, length in (("outer", 0.03, 0.05), ("inner", 0.013, 0.04)):
+            parts.append(link(f"{name}_{knuckle}", f"0.02 0.008 {length}", f"0 {side * 0.03} {length / 2}"))
+            turn = joint(f"{name}_{knuckle}_j", "palm", f"{name}_{knuckle}", f"0 {side * place} 0.05", f"{side} 0 0")
+            turn = turn.replace('lower="-2" upper="2"', 'lower="0" upper="0.8"')
+            parts.append(turn if (name, knuckle) == ("left", "outer") else following(turn, 1.0))
+        parts.append(link(f"{name}_pad", "0.022 0.006 0.038", "0 0 0.02"))
+        pad = joint(f"{name}_pad_j", f"{name}_outer", f"{name}_pad", f"0 {side * 0.03} 0.05", f"{side} 0 0")
+        parts.append(following(pad, -1.0))
+    return "".join((*parts, "</robot>"))
+
+
+def following(turn: str, multiplier: float) -> str:
+    return turn.replace("</joint>", f'<mimic joint="left_outer_j" multiplier="{multiplier}"/></joint>')
+
+
 TWINS = (
     f'<robot name="twins">{link("base", "0.2 0.2 0.1")}{link("chest", "0.2 0.2 0.2", "0 0 0.2")}'
     f"{joint('waist', 'base', 'chest', '0 0 0', '0 0 1')}"
@@ -231,6 +254,16 @@ def test_a_gripper_gets_a_grasp_frame_and_its_second_finger_follows_the_first(pa
     pair = made.srdf().find("disable_collisions[@link1='finger_a'][@link2='finger_b']")
     assert pair is not None
     assert pair.get("reason") == "Default"
+
+
+def test_the_grasp_frame_of_fingers_on_two_links_each_is_straight_and_in_the_middle(package_path: Path) -> None:
+    made = make("crane_1", package_path, write(package_path, four_bar_crane()), "--samples", "100")
+    origin = ElementTree.fromstring(made.text()).find("joint[@name='gripper_grasp_frame_joint']/origin")
+    assert origin is not None
+    turn = pinocchio.rpy.rpyToMatrix(*map(float, origin.get("rpy", "").split()))
+    assert abs(turn[:, 0]) == pytest.approx([0.0, 1.0, 0.0], abs=1e-4), "the fingers close along y of the palm"
+    assert turn[:, 2] == pytest.approx([0.0, 0.0, 1.0], abs=1e-4), "they stand out along z"
+    assert list(map(float, origin.get("xyz", "").split()))[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
 
 
 def test_two_arms_on_a_torso_get_groups_of_their_own(package_path: Path) -> None:

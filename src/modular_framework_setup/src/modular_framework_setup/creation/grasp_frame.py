@@ -21,8 +21,8 @@ def grasp_pose(model: RobotModel, gripper: Gripper, open_position: float, closed
     """
     opened, closed = (finger_points(model, gripper, position) for position in (open_position, closed_position))
     fingers = sorted(opened)
-    motion = np.array([opened[name].mean(axis=0) - closed[name].mean(axis=0) for name in fingers])
-    closing = _unit(motion[0] - motion[1:].mean(axis=0) if len(motion) > 1 else motion[0])
+    centres = np.array([opened[name].mean(axis=0) for name in fingers])
+    closing = _closing(centres, centres - np.array([closed[name].mean(axis=0) for name in fingers]))
     points = np.concatenate([opened[name] for name in fingers])
     approach = _approach(points, closing)
     along = points @ approach
@@ -46,6 +46,24 @@ def approach_axis(model: RobotModel, gripper: Gripper, tip: str, open_position: 
     axis = np.zeros(3)
     axis[np.argmax(np.abs(local))] = np.sign(local[np.argmax(np.abs(local))])
     return axis
+
+
+def _closing(centres: Array, motion: Array) -> Array:
+    """Returns the axis along which fingers close, shape (3,).
+
+    A finger may hang on the palm by several links. The links on both sides are told apart by the motion of the first.
+
+    Args:
+        centres: of what hangs on the palm, opened, shape (n, 3) [m].
+        motion: of the centres from closed to open, shape (n, 3) [m].
+    """
+    if len(motion) == 1:
+        return _unit(motion[0])
+    away = motion[0] - motion[1:].mean(axis=0)
+    on_first_side = (centres - centres.mean(axis=0)) @ away > 0.0
+    if on_first_side.all() or not on_first_side.any():
+        return _unit(away)
+    return _unit(motion[on_first_side].mean(axis=0) - motion[~on_first_side].mean(axis=0))
 
 
 def _approach(points: Array, closing: Array) -> Array:
