@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -200,6 +201,34 @@ def test_a_controller_of_the_root_namespace_has_an_empty_name(small: SmallPackag
     )
     small.edit(MOVEIT, "    action_ns: gripper_cmd\n", "")
     assert small.faults() == ()
+
+
+def test_a_posture_in_collision_is_a_fault_at_the_state_or_the_robot(small: SmallPackage) -> None:
+    """The stick reaches from 0.1 to 0.5 m along x where lift and elbow are 0; a ball stands at 0.4 m above the base."""
+    ball = '<collision><origin xyz="0 0 0.4"/><geometry><sphere radius="0.05"/></geometry></collision>'
+    stick = '<collision><origin xyz="0.3 0 0"/><geometry><box size="0.4 0.1 0.1"/></geometry></collision>'
+    text = small.path("urdf").read_text()
+    begin = text.index('<link name="boom">')
+    text = text[:begin] + '<link name="boom"/>' + text[text.index("\n", begin) :]
+    text = text.replace('<link name="base"/>', f'<link name="base">{ball}</link>')
+    text = text.replace('<link name="stick"/>', f'<link name="stick">{stick}</link>')
+    small.path("urdf").write_text(text)
+    assert small.faults() == ()
+    line = small.edit(SRDF, '<joint name="elbow" value="1"/>', '<joint name="elbow" value="-2"/>') - 3
+    (fault,) = small.faults()
+    assert fault.location.line == line, "lift and elbow together turn the stick up by 1.5 rad, into the ball"
+    for words in ("state 'home' of group 'arm' is in collision", "'base'", "'stick'"):
+        assert words in fault.message
+    small.path("urdf").write_text(text.replace('"0.3 0 0"', '"0.2 0 0"'))
+    small.edit(SRDF, 'value="-2"', 'value="1"')
+    (fault,) = small.faults()
+    assert "state 'home'" in fault.message and "'turret'" in fault.message and "'stick'" in fault.message
+    srdf = small.path(SRDF).read_text()
+    small.path(SRDF).write_text(re.sub("<group_state .*?</group_state>", "", srdf, flags=re.DOTALL))
+    (fault,) = small.faults()
+    assert fault.location.line == 2
+    for words in ("no state is named", "the default posture is in collision", "'turret'", "'stick'"):
+        assert words in fault.message
 
 
 def test_the_srdf_is_expanded_with_the_arguments_of_the_setup_assistant(small: SmallPackage) -> None:

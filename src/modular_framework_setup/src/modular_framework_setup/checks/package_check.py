@@ -14,13 +14,20 @@ from modular_framework_setup.checks.joint_limit_checks import check_cartesian_li
 from modular_framework_setup.checks.kinematics_checks import check_kinematics
 from modular_framework_setup.checks.launch_checks import check_launch_files
 from modular_framework_setup.checks.pipeline_checks import check_planners
+from modular_framework_setup.checks.posture_checks import check_postures
 from modular_framework_setup.checks.sensor_checks import check_sensors
 from modular_framework_setup.checks.srdf_checks import check_srdf
 from modular_framework_setup.checks.urdf_checks import check_urdf
-from modular_framework_setup.config_files.config_package import ConfigPackage, packages_beside, read_config_package
+from modular_framework_setup.config_files.config_package import (
+    ConfigPackage,
+    find_package,
+    packages_beside,
+    read_config_package,
+)
 from modular_framework_setup.config_files.description_files import XmlDocument, package_document, parse_document
 from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
 from modular_framework_setup.config_files.yaml_files import is_open, load_yaml
+from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.srdf_reader import SemanticDescription, read_srdf
 from modular_framework_urdf.xml_text import XmlError
 
@@ -62,18 +69,16 @@ def read_and_check(folder: Path) -> CheckedPackage:
     faults = FaultList()
     with packages_beside(folder):
         package = read_config_package(folder, faults)
-        tree = _read_robot(package, faults)
+        urdf = package_document(package, package.urdf, faults)
+        tree = check_urdf(urdf, faults) if urdf else None
         document = package_document(package, package.srdf, faults)
         root = parse_document(document, faults) if document else None
         semantics = check_srdf(root, document.where, tree, faults) if document and root is not None and tree else None
+        if urdf and tree and document and root is not None:
+            check_postures(urdf, document, root, lambda uri: str(mesh_path(uri, find_package)), faults)
         files = _check_yaml_files(package, tree, semantics, faults)
         check_launch_files(package, faults)
     return CheckedPackage(package, tree, semantics, _contents(document), files, faults.sorted())
-
-
-def _read_robot(package: ConfigPackage, faults: FaultList) -> RobotTree | None:
-    document = package_document(package, package.urdf, faults)
-    return check_urdf(document, faults) if document else None
 
 
 def _contents(document: XmlDocument | None) -> SemanticDescription | None:

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks that no named state is in collision, and the default posture neither if no state is named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from modular_framework_core.files.faults import FaultList, SourceLocation
+from modular_framework_planning.contacts import Contact, describe_contacts
+from modular_framework_planning.errors import PlanningError
+from modular_framework_planning.geometry.spatial import Array
+from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
+from modular_framework_planning.planning_scene.planning_scene import empty_scene
+from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_setup.config_files.description_files import XmlDocument
+from modular_framework_urdf.xml_text import Element
+
+
+def check_postures(
+    urdf: XmlDocument, srdf: XmlDocument, root: Element, resolve: Callable[[str], str], faults: FaultList
+) -> None:
+    """Checks the postures of a robot.
+
+    Args:
+        urdf: Robot description.
+        srdf: Semantic description.
+        root: Root element of the semantic description.
+        resolve: Returns the path of a mesh file, from its URI.
+        faults: Where faults are noted; not for a robot that cannot be loaded, which has faults of its own.
+    """
+    try:
+        model = RobotModel(urdf.text, srdf.text, resolve=resolve)
+        states = root.findall("group_state")
+        for element in states:
+            _check_state(model, element, srdf.where, faults)
+        default = model.default_positions()
+        if not states and (contacts := _contacts(model, default)):
+            faults.add(
+                SourceLocation(srdf.where, root.sourceline, 1),
+                "no state is named to begin at, and the default posture is in collision: "
+                f"{describe_contacts(contacts)}; name a state, or disable the collisions of links that may touch",
+            )
+    except PlanningError:
+        return
+
+
+def _check_state(model: RobotModel, element: Element, where: str, faults: FaultList) -> None:
+    """Checks one named state, for links that only the joints of the state move against each other."""
+    group, name = element.get("group", ""), element.get("name", "")
+    values = model.semantics.group_states.get(group, {}).get(name, {})
+    positions, placed = model.default_positions(), {model.index[joint] for joint in values if joint in model.index}
+    for joint, value in values.items():
+        if joint in model.index:
+            positions[model.index[joint]] = value
+    placed |= {follower for follower, leader, _, _ in model.mimics if leader in placed}
+    contacts = [
+        contact
+        for contact in _contacts(model, model.with_mimics(positions))
+        if placed.issuperset(_joints_between(model, contact))
+    ]
+    if contacts:
+        faults.add(
+            SourceLocation(where, element.sourceline, 1),
+            f"state '{name}' of group '{group}' is in collision: {describe_contacts(contacts)}; correct the state, or "
+            "disable the collisions of links that may touch",
+        )
+
+
+def _joints_between(model: RobotModel, contact: Contact) -> set[int]:
+    """Returns the indices of the joints that move two links against each other."""
+    robot = model.pin_model
+    one, other = (
+        set(robot.supports[robot.frames[model.frame_ids[body.name]].parentJoint])
+        for body in (contact.first, contact.second)
+    )
+    return {model.index[robot.names[number]] for number in one ^ other}
+
+
+def _contacts(model: RobotModel, positions: Array) -> list[Contact]:
+    checker = DEFAULT_CHECKER(empty_scene(model, positions), np.arange(len(positions)))
+    return checker.contacts(positions)
