@@ -10,7 +10,10 @@ import coal
 import numpy as np
 import pinocchio
 import pytest
+import trimesh
+from scipy.spatial import HalfspaceIntersection
 
+from modular_framework_core.grasp_generation.convex_bodies import MESH_TOLERANCE_M, convex_hull
 from modular_framework_core.grasp_generation.gripper_geometry import (
     GripperGeometry,
     GripperGeometryError,
@@ -143,3 +146,15 @@ def test_the_fingertips_of_a_four_bar_hand_are_in_front_of_the_pads() -> None:
 def test_a_joint_that_is_no_mirror_image_does_not_move_with_the_gripper(second: str, axis: str) -> None:
     with pytest.raises(GripperGeometryError, match=r"fewer than two of the finger links \['left_pad'\]"):
         measure_gripper(jaws(second, axis), "palm", "drive")
+
+
+@pytest.mark.parametrize("size", [0.02, 0.05, 0.1])
+def test_the_body_around_a_rounded_mesh_has_few_faces_and_is_hardly_larger(size: float) -> None:
+    points = np.asarray(trimesh.creation.capsule(size, size / 2, count=[64, 64]).vertices)
+    body = convex_hull(points, MESH_TOLERANCE_M)
+    assert (body.planes[:, :3] @ points.T + body.planes[:, 3:]).max() < 1e-9, "all of the mesh is inside"
+    assert len(body.planes) < len(convex_hull(points).planes) / 4
+    corners = HalfspaceIntersection(body.planes, points.mean(axis=0)).intersections
+    exact = trimesh.convex.convex_hull(points)
+    heights = np.einsum("cfi,fi->cf", corners[:, None] - exact.triangles_center, exact.face_normals)
+    assert heights.max() < MESH_TOLERANCE_M, "above a face of the exact hull"

@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 
 ROUND_SIDES = 24
 PARALLEL = 1e-9
+MESH_TOLERANCE_M = 1.0e-3
+"""How far the body around a mesh may reach beyond the mesh; rounded meshes have thousands of faces, which take time."""
 
 
 class ShapeError(ValueError):
@@ -45,23 +47,30 @@ class ConvexBody:
         return ConvexBody(self.corners @ transform[:3, :3].T + transform[:3, 3], np.column_stack([normals, offsets]))
 
 
-def convex_hull(points: Array) -> ConvexBody:
+def convex_hull(points: Array, tolerance_m: float = 0.0) -> ConvexBody:
     """Computes the convex hull of points (n, 3) [m].
+
+    Args:
+        points: At least four, not in one plane.
+        tolerance_m: How far the faces may be outside of the points, so that there are fewer of them.
 
     Raises:
         ShapeError: They lie in one plane.
     """
     try:
-        hull = ConvexHull(points)
+        hull = ConvexHull(points, qhull_options=f"Qt W{tolerance_m}" if tolerance_m else "Qt")
     except QhullError as error:
         raise ShapeError(f"has no volume: {len(points)} points, all in one plane; a solid is needed") from error
-    return ConvexBody(points[hull.vertices], np.unique(np.round(hull.equations, 12), axis=0))
+    planes = np.unique(np.round(hull.equations, 12), axis=0)
+    if tolerance_m:  # the points that Qhull left out are still outside
+        planes[:, 3] = -(planes[:, :3] @ points.T).max(axis=1)
+    return ConvexBody(points[hull.vertices], planes)
 
 
 def collision_body(collision: PlacedShapes) -> ConvexBody:
     """Makes the convex body of a URDF collision element, in the frame of the shape.
 
-    Round shapes become prisms of 24 sides around them. A mesh becomes its convex hull.
+    Round shapes become prisms of 24 sides around them. A mesh becomes a body at most 1 mm around its convex hull.
 
     Raises:
         ShapeError: The element has no shape that is known, or its mesh cannot be read.
@@ -77,7 +86,7 @@ def collision_body(collision: PlacedShapes) -> ConvexBody:
             _positive("radius", (radius,))
             return convex_hull(_around_sphere(radius))
         case MeshFile() as mesh:
-            return convex_hull(_mesh_vertices(mesh))
+            return convex_hull(_mesh_vertices(mesh), MESH_TOLERANCE_M)
         case other:
             raise ShapeError(f"is {other.tag!r}; allowed are box, cylinder, sphere and mesh")
 
