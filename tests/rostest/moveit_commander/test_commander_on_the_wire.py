@@ -636,3 +636,30 @@ def test_forward_kinematics_knows_what_is_held(arm: MoveGroupCommander, tool: st
             arm.set_end_effector_link(name)
         code = rospy.ServiceProxy("compute_fk", GetPositionFK)(Header(), [name], state).error_code.val
         assert code == MoveItErrorCodes.INVALID_LINK_NAME
+
+
+@pytest.mark.parametrize("by_name", [False, True], ids=["attach_box", "attach_object"])
+def test_a_held_box_may_overlap_its_touch_links_and_no_others(
+    arm: MoveGroupCommander, robot: RobotCommander, by_name: bool
+) -> None:
+    scene = PlanningSceneInterface()
+    place = PoseStamped(Header(frame_id="eg_manipulator"), Pose(orientation=Quaternion(0, 0, 0, 1)))
+    hand = [*robot.get_link_names("ezgripper"), PALM]
+
+    def planned_with(touched: list[str]) -> int:
+        """The code of a plan with a box that fills the hand."""
+        if by_name:
+            scene.add_box("box", place, (0.16, 0.16, 0.16))
+            arm.attach_object("box", "eg_manipulator", touched)
+            until(lambda: "box" in scene.get_attached_objects(), "the box in the hand")
+        else:
+            scene.attach_box("eg_manipulator", "box", place, (0.16, 0.16, 0.16), touched)
+        code = arm.plan(NEAR)[3].val
+        scene.remove_attached_object("eg_manipulator", "box")
+        scene.remove_world_object("box")
+        return int(code)
+
+    assert arm.go(list(START.values()))
+    assert planned_with(hand) == MoveItErrorCodes.SUCCESS
+    for touched in ([], [name for name in hand if "L1" in name], [PALM]):
+        assert planned_with(touched) == MoveItErrorCodes.START_STATE_IN_COLLISION
