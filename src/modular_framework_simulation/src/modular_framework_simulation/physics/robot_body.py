@@ -79,12 +79,19 @@ class Gripper:
 
 
 class _Follows(NamedTuple):
-    """How a mimic joint follows its leader: `multiplier` times its position plus `offset`, with an effort [Nm or N]."""
+    """Motion of a mimic joint: `multiplier` times its leader's position plus `offset`.
+
+    Attributes:
+        leader: Rank of the leader among the joints.
+        effort: Largest effort of the coupling [Nm or N].
+        fastest: Velocity limit [rad/s or m/s]; never below the velocity that belongs to the leader's limit.
+    """
 
     leader: int
     multiplier: float
     offset: float
     effort: float
+    fastest: float
 
 
 class RobotBody:
@@ -161,8 +168,10 @@ class RobotBody:
     def _how_it_follows(self, joint: RobotJoint) -> _Follows | None:
         if joint.mimic is None or joint.mimic.leader not in self._rank:
             return None
+        mimic, rank = joint.mimic, self._rank[joint.mimic.leader]
         effort = joint.effort * (_COUPLING_FACTOR if self.roles[joint.name] is Role.COUPLED else 1.0)
-        return _Follows(self._rank[joint.mimic.leader], joint.mimic.multiplier, joint.mimic.offset, effort)
+        fastest = max(joint.velocity, abs(mimic.multiplier) * self._joints[rank].velocity)
+        return _Follows(rank, mimic.multiplier, mimic.offset, effort, fastest)
 
     def _grippers(self) -> tuple[Gripper, ...]:
         """Sorts the joints of grippers by the link below which their leaders' fingers begin."""
@@ -222,19 +231,20 @@ class RobotBody:
         velocities: list[float] = []
         efforts: list[float] = []
         for joint, reading, follows in zip(self._joints, self.readings, self._follows, strict=True):
-            position, drive = reading.position, drives.get(joint.name)
+            position, drive, fastest = reading.position, drives.get(joint.name), joint.velocity
             if drive is not None and drive.mode is Mode.POSITION:
                 target, velocity, effort = drive.command, drive.feed_forward, drive.effort_limit
             elif drive is not None and drive.mode is Mode.VELOCITY:
                 target, velocity, effort = position, drive.command, drive.effort_limit
             elif follows is not None:
-                target = follows.multiplier * self.readings[follows.leader].position + follows.offset
-                velocity, effort = 0.0, follows.effort
+                leader = self.readings[follows.leader]
+                target = follows.multiplier * leader.position + follows.offset
+                velocity, effort, fastest = follows.multiplier * leader.velocity, follows.effort, follows.fastest
             else:  # a joint that nothing drives is held by its friction alone
                 target, velocity, effort = position, 0.0, self._dynamics[joint.name].friction
             # The drive adds the velocity that corrects the position to the one fed forward; the sum stays in bounds.
-            ahead = position + max(0.0, joint.velocity - velocity) * reach_s
-            behind = position - max(0.0, joint.velocity + velocity) * reach_s
+            ahead = position + max(0.0, fastest - velocity) * reach_s
+            behind = position - max(0.0, fastest + velocity) * reach_s
             targets.append(max(behind, min(ahead, target)))
             velocities.append(velocity)
             efforts.append(effort)
