@@ -8,6 +8,7 @@ import math
 import socket
 from pathlib import Path
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pinocchio
@@ -27,12 +28,13 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.sensors import scene_text
 from modular_framework_simulation.viewer.glb_files import bodies_of_visuals, glb_of, pose_matrix
-from modular_framework_simulation.viewer.layers import Layer, tree_name
+from modular_framework_simulation.viewer.layers import Layer, Look, tree_name
 from modular_framework_simulation.viewer.pictures import picture_of
-from modular_framework_simulation.viewer.plan_playback import plan_of
+from modular_framework_simulation.viewer.plan_playback import Plan, plan_of
 from modular_framework_simulation.viewer.planning_scene_objects import PlanningSceneObjects
 from modular_framework_simulation.viewer.planning_scene_view import PlanningSceneView
 from modular_framework_simulation.viewer.robot_links import RobotLinks, finite_positions
+from modular_framework_simulation.viewer.robot_view import PlanView, RobotView
 from modular_framework_simulation.viewer.web_server import AddressError, free_port
 from modular_framework_simulation.viewer.world_view import RealTimeFactor, WorldView
 from modular_framework_urdf.urdf_reader import read_urdf
@@ -362,6 +364,38 @@ def test_drawn_shapes_have_the_size_the_place_and_the_colour_of_the_visual(tmp_p
     assert mesh.visual.material.alphaMode == "BLEND"
     larger = load(glb_of(bodies, outset_m=0.01))
     assert larger.extents == pytest.approx(scene.extents + 0.02, abs=1e-6)
+
+
+class KeptShapes:
+    """A layer that keeps what is drawn."""
+
+    def __init__(self) -> None:
+        self.shapes: dict[str, Any] = {}
+
+    def clear(self) -> None:
+        self.shapes.clear()
+
+    def add(self, path: str, content: bytes | None, look: Look = Look.SOLID) -> None:
+        self.shapes[path] = load(content)
+
+    def place(self, path: str, pose: Pose) -> None:
+        pass
+
+
+def test_the_ghost_of_a_plan_has_no_surface_in_those_of_the_robot() -> None:
+    text = """<robot name="r"><link name="base"/><link name="bar"><visual><geometry><box size="0.2 0.1 0.4"/></geometry>
+      </visual></link><joint name="hinge" type="revolute"><parent link="base"/><child link="bar"/><axis xyz="0 0 1"/>
+      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    robot_layer, plan_layer = KeptShapes(), KeptShapes()
+    robot = RobotView(robot_layer, text, str, pytest.fail)  # type: ignore[arg-type]
+    plan = PlanView(plan_layer, MagicMock())  # type: ignore[arg-type]
+    plan.show(Plan({}, ("hinge",), np.array([0.0, 1.0]), np.array([[0.0], [1.0]])), robot)
+    plan.show_ghost(0.0)
+    ghost = plan_layer.shapes["ghost/bar"]
+    half = np.array([0.1, 0.05, 0.2])
+    mesh = ghost.to_mesh()
+    depths = np.abs(mesh.face_normals) @ half - np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles_center)
+    assert depths == pytest.approx(0.001, abs=1e-6)
 
 
 def test_a_mesh_is_drawn_in_metres_with_its_picture(tmp_path: Path) -> None:

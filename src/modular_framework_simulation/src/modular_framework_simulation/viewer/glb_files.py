@@ -44,7 +44,8 @@ def glb_of(bodies: Iterable[PlacedBody], tint: Colour | None = None, outset_m: f
     Args:
         bodies: What to draw.
         tint: The colour of everything; None: as the bodies say.
-        outset_m: How far surfaces are moved outwards [m]: so they are seen around others in the same place.
+        outset_m: Distance by which surfaces are moved outwards [m], so that they are seen around others in the same
+            place; below 0 inwards, so that they are hidden there.
     """
     import trimesh.exchange.gltf
 

@@ -19,6 +19,8 @@ from modular_framework_urdf.mesh_paths import PackageFinder
 from modular_framework_urdf.urdf_reader import read_urdf
 
 _GHOST: Colour = (1.0, 0.55, 0.1, 0.5)
+_GHOST_OUTSET_M = -0.001
+"""Outset of the ghost's surfaces: negative, so that none lies in a surface of the robot and flickers there."""
 _LINE_RGB = (255, 140, 20)
 _LINE_WIDTH_PX = 3.0
 
@@ -115,7 +117,7 @@ class PlanView:
         if not self._links:
             bodies = robot.bodies_carried_by(plan.joints)
             for link, shapes in bodies.items():
-                self._layer.add(f"ghost/{tree_name(link)}", glb_of(shapes, _GHOST), Look.GHOST)
+                self._layer.add(f"ghost/{tree_name(link)}", glb_of(shapes, _GHOST, _GHOST_OUTSET_M), Look.GHOST)
             self._links = tuple(bodies)
         poses = robot.links.poses(plan.positions_at(time_s))
         for link in self._links:

@@ -62,7 +62,12 @@ class WebServer:
         with contextlib.redirect_stdout(io.StringIO()), self._access.enforced():  # without viser's banner
             self.viser: Any = viser.ViserServer(host=host, port=port, label=_TITLE, verbose=False)
         self.host, self.port = host, int(self.viser.get_port())
-        self.viser.gui.configure_theme(show_share_button=False, show_logo=False, dark_mode=False)
+        self.viser.gui.configure_theme(
+            control_layout="collapsible",  # beside the scene; a floating panel hides a part of it
+            show_share_button=False,
+            show_logo=False,
+            dark_mode=False,
+        )
         self._grid = self.viser.scene.add_grid("/grid", width=10.0, height=10.0, cell_size=0.1, visible=False)
         self._shadows: bool | None = None
         self.show_shadows(True)
