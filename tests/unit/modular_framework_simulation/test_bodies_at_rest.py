@@ -10,6 +10,8 @@ import pytest
 from simulated_samples import exact_state, run, solid
 
 from modular_framework_simulation.errors import SimulationError
+from modular_framework_simulation.loop.referee import Referee
+from modular_framework_simulation.loop.snapshots import take_snapshot
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
@@ -74,13 +76,15 @@ def test_contact_forces_of_a_body_at_rest_are_its_weight(table: PhysicsWorld) ->
     )
 
 
-def test_the_load_on_a_joint_of_a_body_that_lies_still_is_measured(world: PhysicsWorld) -> None:
+@pytest.mark.parametrize("fastened", [False, True])
+def test_the_load_on_a_joint_of_a_body_that_lies_still_is_measured(world: PhysicsWorld, fastened: bool) -> None:
     crate = solid("crate", CUBE, Pose((0, 0, 0.025)))
     lid = replace(crate.links[0], name="lid", pose=Pose((0, 0, 0.05)))
     bolt = specs.Joint("bolt", specs.JointType.FIXED, "link", "lid", Pose(), (0, 0, 1), 0.0, 0.0)
-    world.spawn(replace(crate, links=(*crate.links, lid), joints=(bolt,)))
+    anchor = replace(bolt, name="anchor", parent=specs.WORLD, child="link")
+    world.spawn(replace(crate, links=(*crate.links, lid), joints=(bolt, anchor) if fastened else (bolt,)))
     (tree,) = world.body("crate").parts
-    (joint,) = world.engine.joints(tree.number)
+    joint = next(each for each in world.engine.joints(tree.number) if each.child_link == "lid")
     world.engine.measure_joint_load(tree.number, joint.index)
     run(world, LONG_S)
     force, _ = world.engine.joint_load(tree.number, joint.index)
@@ -105,6 +109,88 @@ def test_what_lay_on_a_box_falls_when_that_is_moved(table: PhysicsWorld) -> None
     table.set_state("cube", BodyState(Pose((3, 0, 0.025)), Twist()))
     run(table, 0.5)
     assert height(table, "upper") == pytest.approx(0.575, abs=0.001)
+
+
+def test_a_tower_falls_when_what_its_lowest_box_lay_on_is_moved(table: PhysicsWorld) -> None:
+    table.spawn(solid("upper", CUBE, Pose((0, 0, 0.6251))))
+    run(table, LONG_S)
+    table.set_state("table", BodyState(Pose((3, 0, 0.5)), Twist()))
+    run(table, 1.0)
+    assert height(table, "upper") == pytest.approx(0.075, abs=0.003)
+
+
+@pytest.mark.parametrize("spawned", [False, True])
+def test_a_static_model_that_is_put_into_a_body_at_rest_pushes_it_out(table: PhysicsWorld, spawned: bool) -> None:
+    shelf = solid("shelf", specs.Box((0.4, 0.4, 0.05)), Pose((0, 0, 0.55 if spawned else 3.0)), static=True)
+    table.spawn(shelf)
+    if not spawned:
+        run(table, LONG_S)
+        table.set_state("shelf", BodyState(Pose((0, 0, 0.55)), Twist()))
+    run(table, 2.0)
+    assert height(table) > 0.59
+
+
+def test_a_robot_lifts_a_body_at_rest(make_world: MakeWorld, convex_parts: ConvexParts) -> None:
+    world = make_world()
+    tray = RobotBody(world, read_robot(TRAY, str, convex_parts, False), "tray", Pose(), {"lift": -0.2})
+    for x in (-0.2, 0.2):
+        world.spawn(solid(f"post_{x}", specs.Box((0.1, 0.1, 0.4)), Pose((x, 0, 0.2)), static=True))
+    world.spawn(solid("beam", specs.Box((0.5, 0.05, 0.05)), Pose((0, 0, 0.425))))
+    lift_m = -0.2
+    for step in range(round(6.0 / world.settings.time_step_s)):
+        lift_m = min(-0.2 + max(0.0, step * world.settings.time_step_s - LONG_S) * 0.2, 0.1)
+        tray.read()
+        tray.drive({"lift": Drive(Mode.POSITION, lift_m, 0.0, 500.0)})
+        world.step()
+    assert height(world, "beam") == pytest.approx(0.635, abs=0.005)
+
+
+@pytest.mark.parametrize("engine", [PYBULLET])  # the other one computes every body in every step
+def test_models_elsewhere_go_on_resting_when_a_model_comes_moves_and_goes(make_world: MakeWorld) -> None:
+    world = make_world()
+    for number in range(3):
+        world.spawn(solid(f"cube_{number}", CUBE, Pose((number, 0, 0.025))))
+    run(world, LONG_S)
+    changed = "cube_0"
+    world.set_state(changed, BodyState(Pose((0, 1, 0.025)), Twist()))
+    world.spawn(solid("other", CUBE, Pose((0, 2, 0.025))))
+    run(world, 0.5)
+    assert world.moving() == {changed, "other"}
+    world.delete("other")
+    run(world, LONG_S)
+    assert world.moving() == set()
+
+
+def test_a_snapshot_follows_a_model_that_a_moving_one_woke(make_world: MakeWorld) -> None:
+    world = make_world()
+    world.spawn(solid("cube", CUBE, Pose((0, 0, 0.025))))
+    run(world, LONG_S)
+    world.spawn(solid("ball", specs.Sphere(0.05), Pose((-0.3, 0, 0.05)), mass=2.0))
+    world.set_state("ball", BodyState(Pose((-0.3, 0, 0.05)), Twist((1.5, 0, 0))))
+    shown, path, found = take_snapshot(world, ()), [], []
+    for _ in range(25):
+        run(world, 0.04)
+        shown = take_snapshot(world, (), shown)
+        path.append(world.entity_state("cube").pose)
+        found.append(next(model for model in shown.models if model.name == "cube").links[0].pose_in_world)
+    assert path[-1].position[0] > 0.05
+    late = sum(1 for real, seen in zip(path, found, strict=True) if real != seen)
+    assert late <= 3  # 0.1 s
+    assert found[-1] == path[-1]
+
+
+def test_the_referee_takes_no_hit_for_a_jump(make_world: MakeWorld) -> None:
+    world = make_world()
+    world.spawn(solid("block", specs.Box((0.1, 0.1, 0.15)), Pose((0, 0, 0.075))))
+    world.spawn(solid("ball", specs.Sphere(0.05), Pose((-0.5, 0, 0.05)), mass=2.0))
+    run(world, LONG_S)
+    referee = Referee(world)
+    world.set_state("ball", BodyState(Pose((-0.5, 0, 0.05)), Twist((6.0, 0, 0))))
+    for _ in range(50):
+        run(world, 0.02)
+        referee.look()
+    assert world.entity_state("block").pose.position[0] > 0.3
+    assert referee.interventions == ()
 
 
 def test_a_body_at_rest_that_is_set_in_motion_moves(make_world: MakeWorld) -> None:

@@ -121,6 +121,7 @@ class SimulationNode:
         self._visible = VisibleSceneTopics(self._world, lambda: self._loop.paused) if self._topics else None
         self._services = GazeboServices(self._loop, self._resources)
         self._scene = PlanningScenePublisher()
+        self._shown: WorldSnapshot | None = None
         digest = WorldDigest(self._world, actors.robot if actors else None) if parameters["~state_digest"] else None
         self._time_services = TimeServices(
             self._loop,
@@ -245,7 +246,8 @@ class SimulationNode:
         self._cameras.tick(self._world.time_ns)
 
     def _show_snapshot(self) -> None:
-        self._scene.show(self._snapshot())
+        self._shown = take_snapshot(self._world, self._loop.held_objects(), self._shown)
+        self._scene.show(self._shown)
 
     def _snapshot(self) -> WorldSnapshot:
         return take_snapshot(self._world, self._loop.held_objects())

@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from modular_framework_simulation.physics.physics_engine import REST_LOOK_S
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_urdf.rotations import Vector3
 
@@ -38,10 +40,11 @@ class Intervention:
 
 @dataclass(frozen=True, slots=True)
 class _Motion:
-    """Centre of mass [m] and speed [m/s] of a model."""
+    """Centre of mass [m] and speed [m/s] of a model, and when it had them [ns]."""
 
     centre: Vector3
     speed: float
+    time_ns: int
 
 
 class Referee:
@@ -76,20 +79,31 @@ class Referee:
 
         After a request that moved models, which is noted by its service, the look begins again.
         """
-        world, before, passed_s = self._world, self._seen, (self._world.time_ns - self._seen_ns) * 1e-9
+        world, passed_s = self._world, (self._world.time_ns - self._seen_ns) * 1e-9
         same_world = world.revision == self._seen_revision and passed_s > 0.0
-        self._seen, self._seen_ns, self._seen_revision = self._motions(), world.time_ns, world.revision
-        fall = math.hypot(*world.gravity) * passed_s
-        for name, now in self._seen.items() if same_world else ():
-            moved_m = math.dist(now.centre, before[name].centre)
-            if moved_m > (max(now.speed, before[name].speed) + fall) * passed_s + JUMP_M:
-                speed = f"{before[name].speed:.2f} m/s before and {now.speed:.2f} m/s after"
-                self.note(f"a jump of '{name}' by {moved_m:.3f} m in {passed_s:.3f} s, at {speed}", "")
+        self._seen_ns, self._seen_revision = world.time_ns, world.revision
+        if not same_world:
+            self._seen = self._motions(world.bodies)
+            return
+        moving = self._motions(sorted(world.moving()))
+        for name, now in moving.items():
+            self._judge(name, self._seen[name], now, passed_s)
+        self._seen |= moving
 
-    def _motions(self) -> dict[str, _Motion]:
-        engine, found = self._world.engine, {}
-        for name, body in self._world.bodies.items():
+    def _judge(self, name: str, before: _Motion, now: _Motion, passed_s: float) -> None:
+        """Notes a jump; a model that was at rest moves for at most REST_LOOK_S before the world says so."""
+        passed_s = min((now.time_ns - before.time_ns) * 1e-9, passed_s + REST_LOOK_S)
+        fall = math.hypot(*self._world.gravity) * passed_s
+        moved_m = math.dist(now.centre, before.centre)
+        if moved_m > (max(now.speed, before.speed) + fall) * passed_s + JUMP_M:
+            speed = f"{before.speed:.2f} m/s before and {now.speed:.2f} m/s after"
+            self.note(f"a jump of '{name}' by {moved_m:.3f} m in {passed_s:.3f} s, at {speed}", "")
+
+    def _motions(self, names: Iterable[str]) -> dict[str, _Motion]:
+        world, found = self._world, {}
+        for name in names:
+            body = world.bodies[name]
             if body.spec is not None and not body.static:
-                speed = math.hypot(*engine.base_twist(body.number)[0])
-                found[name] = _Motion(engine.base_centre(body.number).position, speed)
+                speed = math.hypot(*world.engine.base_twist(body.number)[0])
+                found[name] = _Motion(world.engine.base_centre(body.number).position, speed, world.time_ns)
         return found

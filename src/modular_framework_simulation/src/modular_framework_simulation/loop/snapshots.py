@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.poses import Pose
+from modular_framework_simulation.physics.physics_engine import REST_LOOK_S
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
+
+_LONGEST_NS = round(REST_LOOK_S * 1e9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,15 +74,27 @@ class WorldSnapshot:
     revision: int = 0
 
 
-def take_snapshot(world: PhysicsWorld, held: tuple[HeldObject, ...]) -> WorldSnapshot:
-    """Copies the state of the world; to be called from the loop's thread."""
-    models = []
-    for name in world.names():
-        body = world.body(name)
-        if body.spec is None:
-            continue
-        links = tuple(
-            LinkSnapshot(link, body.link_state(link.name).pose) for link in body.spec.links if link.collisions
-        )
-        models.append(ModelSnapshot(name, world.instance(name), body.static, links))
-    return WorldSnapshot(world.time_ns * 1e-9, tuple(models), held, world.time_ns, world.revision)
+def take_snapshot(
+    world: PhysicsWorld, held: tuple[HeldObject, ...], before: WorldSnapshot | None = None
+) -> WorldSnapshot:
+    """Copies the state of the world; to be called from the loop's thread.
+
+    Args:
+        world: The models.
+        held: What the grippers hold.
+        before: The last snapshot, at most REST_LOOK_S ago: models at rest are taken from it, which one that was touched
+            since then may not be any more. None copies every model as it is now.
+    """
+    if before is not None and before.revision == world.revision and 0 <= world.time_ns - before.time_ns <= _LONGEST_NS:
+        moving = world.moving()
+        models = tuple(_copy(world, model.name) if model.name in moving else model for model in before.models)
+    else:
+        models = tuple(_copy(world, name) for name, body in world.bodies.items() if body.spec is not None)
+    return WorldSnapshot(world.time_ns * 1e-9, models, held, world.time_ns, world.revision)
+
+
+def _copy(world: PhysicsWorld, name: str) -> ModelSnapshot:
+    body = world.body(name)
+    assert body.spec is not None
+    links = tuple(LinkSnapshot(link, body.link_state(link.name).pose) for link in body.spec.links if link.collisions)
+    return ModelSnapshot(name, world.instance(name), body.static, links)

@@ -135,8 +135,9 @@ class MujocoEngine(PhysicsEngine):
         """Advances the physics by one time step."""
         self._dynamics.step()
 
-    def wake(self) -> None:
-        """Does nothing: every body is computed in every step."""
+    def resting(self) -> Collection[int]:
+        """Returns no body: each is computed in every step."""
+        return ()
 
     def close(self) -> None:
         """Does nothing: MuJoCo's memory is freed with this object."""

@@ -26,6 +26,9 @@ from modular_framework_urdf.rotations import Quaternion, Vector3
 BASE_INDEX = -1
 """The number of a body's root link."""
 
+REST_LOOK_S = 0.1
+"""Period with which an engine that lets bodies rest looks which of them do [s of simulated time]."""
+
 LONGEST_NAME_BYTES = 1023
 """PyBullet copies names and file names into arrays of 1,024 bytes without checking their length, and crashes."""
 
@@ -186,8 +189,8 @@ class PhysicsEngine(ABC):
         """Advances the physics by one time step; forces and efforts that were applied end with it."""
 
     @abstractmethod
-    def wake(self) -> None:
-        """Computes the motion of bodies at rest again: something has changed that they would not feel."""
+    def resting(self) -> Collection[int]:
+        """Returns the bodies that have not moved for REST_LOOK_S; a touch that moved one is noticed in that time."""
 
     @abstractmethod
     def save_state(self) -> Any:

@@ -24,7 +24,7 @@ from modular_framework_simulation.physics.carried_object import CarriedObject
 from modular_framework_simulation.physics.engine_choice import PYBULLET, make_engine
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.part_names import SCOPE
-from modular_framework_simulation.physics.physics_engine import BASE_INDEX, Log
+from modular_framework_simulation.physics.physics_engine import BASE_INDEX, REST_LOOK_S, Log
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.simulated_body import BodyState, SimulatedBody, Twist, twist_in_frame
 from modular_framework_simulation.physics.surfaces import surface_of
@@ -137,7 +137,7 @@ class PhysicsWorld:
         self.weld_grasps = weld_grasps
         self._carried: dict[tuple[str, str], CarriedObject] = {}
         self._welds: dict[tuple[str, str], int] = {}
-        self._steps = self._time_ns = 0
+        self._steps = self._time_ns = self._computed_until = 0
         self.revision = 0
         """Changes whenever a model is spawned, deleted or moved by a request."""
 
@@ -162,6 +162,7 @@ class PhysicsWorld:
             if self.forces.pending or self.engine.has_window:  # in a window, the mouse moves bodies
                 self.rest.disturb()
             self._compute_step()
+            self._computed_until = self._steps + 1
             self.rest.after_step(self._bodies.values())
         self._steps += 1
         self._time_ns += self.settings.time_step_ns
@@ -198,7 +199,12 @@ class PhysicsWorld:
         """Says that a request has changed something in the world."""
         self.revision += 1
         self.rest.disturb()
-        self.engine.wake()
+
+    def moving(self) -> set[str]:
+        """Returns the names of the models that are not known to have been at rest for REST_LOOK_S."""
+        if (self._steps - self._computed_until) * self.settings.time_step_s > REST_LOOK_S:
+            return set()
+        return {self._names_by_number[number] for number in self._names_by_number.keys() - self.engine.resting()}
 
     @property
     def bodies(self) -> Mapping[str, SimulatedBody]:
@@ -503,7 +509,8 @@ class PhysicsWorld:
         if state.welded != tuple(self._welds):
             raise SimulationError("what the hands hold has changed since the state was saved; restore it before")
         self.engine.restore_state(state.engine)
-        self._steps, self._time_ns = state.steps, state.time_ns
+        self._steps = self._computed_until = state.steps
+        self._time_ns = state.time_ns
         self.forces.restore(state.forces)
         self.note_change()
 
@@ -516,7 +523,7 @@ class PhysicsWorld:
 
     def reset_time(self) -> None:
         """Starts simulated time at 0 again."""
-        self._steps = self._time_ns = 0
+        self._steps = self._time_ns = self._computed_until = 0
 
     def close(self) -> None:
         """Closes the physics engine; may be called twice."""

@@ -252,9 +252,9 @@ class PyBulletEngine(PhysicsEngine):
             self.client = -1
             self._urdf_folder.cleanup()
 
-    def wake(self) -> None:
-        """Computes the motion of bodies at rest again."""
-        self._rest.wake_all()
+    def resting(self) -> Collection[int]:
+        """Returns the bodies that have not moved for a while."""
+        return self._rest.known
 
     def save_state(self) -> int:
         """Saves the state in the memory of the engine, contacts and their caches too.
@@ -279,6 +279,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def remove_body(self, number: int) -> None:
         """Takes a body out."""
+        self._rest.wake_touching(number)
         self._rest.remove(number)
         self._impossible_moments.pop(number, None)
         self.api.removeBody(number, physicsClientId=self.client)
@@ -391,8 +392,10 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_base_centre(self, number: int, pose: Pose) -> None:
         """Puts a body somewhere."""
+        self._rest.wake_touching(number)
         self._rest.wake(number)
         self.api.resetBasePositionAndOrientation(number, pose.position, pose.quaternion, physicsClientId=self.client)
+        self._rest.wake_near(number)
 
     def set_base_twist(self, number: int, linear: Vector3, angular: Vector3) -> None:
         """Sets the velocity of the root link's centre."""
@@ -455,6 +458,7 @@ class PyBulletEngine(PhysicsEngine):
 
     def set_joint_state(self, number: int, index: int, position: float, velocity: float) -> None:
         """Puts a joint somewhere."""
+        self._rest.wake_touching(number)
         self.api.resetJointState(number, index, position, velocity, physicsClientId=self.client)
 
     def ball_joint_state(self, number: int, index: int) -> tuple[Quaternion, Vector3]:
