@@ -83,6 +83,17 @@ def test_a_cpp_class_is_refused_as_such(lab: Callable[..., PluginIndex], tmp_pat
         index.load("lab_arms/Other", RobotHW)
 
 
+@pytest.mark.parametrize(
+    ("library", "cls"), [("lib/liblab_arms", "Cpp"), ("liblab_arms.so", "Cpp"), ("liblab_arms", "lab_arms::Cpp")]
+)
+def test_a_cpp_class_under_the_tag_of_python_classes_is_refused_as_such(
+    lab: Callable[..., PluginIndex], library: str, cls: str
+) -> None:
+    index = lab(("lab_arms/Cpp", cls, ROBOT_HW_BASE), module=library)
+    with pytest.raises(PluginError, match=rf"lab_arms/Cpp is a C\+\+ class \(library {library}, offered by .*p.xml\)"):
+        index.load("lab_arms/Cpp", RobotHW)
+
+
 def test_a_module_that_was_changed_is_imported_anew_after_a_reload(
     lab: Callable[..., PluginIndex], tmp_path: Path
 ) -> None:

@@ -53,6 +53,11 @@ class Plugin:
     class_name: str
     origin: Path
 
+    @property
+    def is_cpp(self) -> bool:
+        """Whether it is a C++ class of a library, whatever tag offers it."""
+        return "::" in self.class_name or "/" in self.module or self.module.endswith(".so")
+
 
 def _packages_of_workspace() -> Mapping[str, Path]:
     # Imported here, because only a search for plugins needs the workspace.
@@ -110,6 +115,8 @@ class PluginIndex:
                 f"{', '.join(self.names) or 'none'}{faults}. A package offers one by <export>"
                 f'<{EXPORT_TAG} plugin="${{prefix}}/plugins.xml"/></export> in its package.xml'
             )
+        if plugin.is_cpp:
+            raise _cpp_error(plugin, expected)
         where = f"{plugin.class_name} of {plugin.module} (offered as {name} by {plugin.origin})"
         try:
             loaded = getattr(self._module(plugin.module), plugin.class_name)
@@ -126,13 +133,7 @@ class PluginIndex:
         for package, folder in sorted(self._packages().items()):
             for plugin in self._of_package(package, folder, [], CPP_EXPORT_TAGS):
                 if plugin.name == name:
-                    raise PluginError(
-                        f"{name} is a C++ class (library {plugin.module}, offered by {plugin.origin}), and only Python "
-                        f"classes can be loaded; derive a Python class from {expected.__module__}.{expected.__name__}, "
-                        "as docs/robots.md and docs/contributing.md show, or keep the C++ code in a node of its own "
-                        "that serves the action of its controller, which controllers.yaml of the moveit_config package "
-                        "names"
-                    )
+                    raise _cpp_error(plugin, expected)
 
     def reload(self) -> None:
         """Makes the next use search again, also for modules that were installed or changed since their import."""
@@ -172,6 +173,15 @@ class PluginIndex:
             except PluginError as error:
                 faults.append(str(error))
         return plugins
+
+
+def _cpp_error(plugin: Plugin, expected: type[Any]) -> PluginError:
+    return PluginError(
+        f"{plugin.name} is a C++ class (library {plugin.module}, offered by {plugin.origin}), and only Python classes "
+        f"can be loaded; derive a Python class from {expected.__module__}.{expected.__name__}, as docs/robots.md and "
+        "docs/contributing.md show, or keep the C++ code in a node of its own that serves the action of its "
+        "controller, which controllers.yaml of the moveit_config package names"
+    )
 
 
 def _descriptions(package: str, manifest: Path, faults: list[str], tags: Sequence[str]) -> list[Path]:
