@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells when the client of an action has sent a goal to the end, so that it hears what the server says of the goal.
+"""Determines when the client of an action has sent a goal completely, so that it hears the server's reports.
 
 actionlib's SimpleActionClient misses what it hears of a goal before its send_goal() has returned, and logs an error.
 The server has the goal earlier: rospy hands the message to a thread of the connection, yields the processor, and counts

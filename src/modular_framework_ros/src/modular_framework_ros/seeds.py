@@ -35,7 +35,7 @@ def seed_parameter() -> int | None:
 
 
 def _newest_value() -> Any:
-    """Returns what the master told last; rospy.get_param_cached asks it every time while the parameter is not set."""
+    """Returns the value the master sent last; rospy.get_param_cached asks every time while the parameter is not set."""
     cache = get_param_server_cache()
     with cache.lock:
         known, name = cache.d or {}, SEED_PARAMETER.strip("/")

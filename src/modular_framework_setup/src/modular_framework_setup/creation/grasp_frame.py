@@ -51,7 +51,7 @@ def approach_axis(model: RobotModel, gripper: Gripper, tip: str, open_position: 
 def _closing(centres: Array, motion: Array) -> Array:
     """Returns the axis along which fingers close, shape (3,).
 
-    A finger may hang on the palm by several links. The links on both sides are told apart by the motion of the first.
+    A finger may hang on the palm by several links. The motion of the first link shows on which side each one is.
 
     Args:
         centres: of what hangs on the palm, opened, shape (n, 3) [m].

@@ -83,7 +83,7 @@ def take_snapshot(
         world: The models.
         held: What the grippers hold.
         before: The last snapshot, at most REST_LOOK_S ago: models at rest are taken from it, which one that was touched
-            since then may not be any more. None copies every model as it is now.
+            since then may not be any more. None copies the present state of every model.
     """
     if before is not None and before.revision == world.revision and 0 <= world.time_ns - before.time_ns <= _LONGEST_NS:
         moving = world.moving()
