@@ -184,12 +184,13 @@ class RobotModel:
 
     def is_carried(self, link: str, carrier: str) -> bool:
         """Whether only fixed and passive joints lie between a link and the one that carries it (or it is that link)."""
-        paths = [
-            self.pin_model.supports[self.pin_model.frames[self.frame_ids[name]].parentJoint] for name in (link, carrier)
-        ]
-        path, above = ([int(number) for number in numbers] for numbers in paths)
-        between = [self.pin_model.names[number] for number in path[len(above) :]]
-        return path[: len(above)] == above and self.passive_joints.issuperset(between)
+        path, above = self.joints_above(link), self.joints_above(carrier)
+        return path[: len(above)] == above and self.passive_joints.issuperset(path[len(above) :])
+
+    def joints_above(self, link: str) -> list[str]:
+        """Returns the names of the joints that move a link, the root's first: Pinocchio's "universe" and below."""
+        joint = self.pin_model.frames[self.frame_ids[link]].parentJoint
+        return [self.pin_model.names[number] for number in self.pin_model.supports[joint]]
 
     def _group_joints(self, spec: GroupSpec, seen: tuple[str, ...] = ()) -> set[str]:
         if spec.name in seen:

@@ -70,12 +70,8 @@ def _check_state(model: RobotModel, element: Element, where: str, faults: FaultL
 
 def _joints_between(model: RobotModel, contact: Contact) -> set[int]:
     """Returns the indices of the joints that move two links against each other."""
-    robot = model.pin_model
-    one, other = (
-        set(robot.supports[robot.frames[model.frame_ids[body.name]].parentJoint])
-        for body in (contact.first, contact.second)
-    )
-    return {model.index[robot.names[number]] for number in one ^ other}
+    one, other = (set(model.joints_above(body.name)) for body in (contact.first, contact.second))
+    return {model.index[joint] for joint in one ^ other}
 
 
 def _contacts(model: RobotModel, positions: Array) -> list[Contact]:
