@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, NoReturn
 
 from launch.core.errors import LaunchError
@@ -14,6 +15,7 @@ from launch.core.parameter_plan import Lookup
 from launch_ros import ros2_control
 from launch_ros.node_parameters import ParameterSource
 from launch_ros.ros2_control_hardware import hardware_plan
+from launch_ros.rviz_config import ros1_config_file
 
 
 @dataclass(frozen=True)
@@ -77,9 +79,24 @@ def _rviz(plan: NodePlan) -> NodePlan:
     program = "interactive_goal"
     marker = NodePlan("modular_framework_planning", program, plan.namespace, program, sources=(patience,))
     companions = (marker,) if "robot_description_semantic" in given else ()
-    return replace(plan, package="rviz", executable="rviz", companions=companions)
+    return replace(_rviz_ros1(plan), package="rviz", executable="rviz", companions=companions)
 
 
+def _rviz_ros1(plan: NodePlan) -> NodePlan:
+    """RViz with a configuration that RViz of ROS 1 reads."""
+    arguments: list[str] = []
+    for argument in plan.arguments:
+        option, equals, value = argument.partition("=")
+        if arguments and arguments[-1] in RVIZ_CONFIG:
+            arguments.append(str(ros1_config_file(Path(argument))))
+        elif equals and option in RVIZ_CONFIG:
+            arguments.append(f"{option}={ros1_config_file(Path(value))}")
+        else:
+            arguments.append(argument)
+    return replace(plan, arguments=tuple(arguments))
+
+
+RVIZ_CONFIG = ("-d", "--display-config")
 SIMULATION = ("modular_framework_simulation", "simulation")
 MARKER_TIMEOUT_S = 300.0
 """How long the marker for goals waits for move_group [s], whose first start compiles what it runs."""
@@ -181,6 +198,7 @@ def _unspawner(plan: NodePlan) -> NodePlan:
 
 ROS1_PROGRAMS: Mapping[tuple[str, str], Callable[[NodePlan], NodePlan]] = {
     ("rviz2", "rviz2"): _rviz,
+    ("rviz", "rviz"): _rviz_ros1,
     ("tf2_ros", "static_transform_publisher"): _static_transform,
     ("controller_manager", "ros2_control_node"): _control_node,
     ("controller_manager", "spawner"): _spawner,
