@@ -44,6 +44,28 @@ def test_the_sentence_names_argument_value_and_what_is_allowed(start: str, argum
         check_arguments(start, arguments)
 
 
+@pytest.mark.parametrize("name", ["named_poses.yaml", "named_joint_states.yaml", "named_trajectories.yaml"])
+def test_a_broken_file_of_names_is_named_with_its_line(start: str, tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "config"
+    shutil.copytree(Path(rospkg.RosPack().get_path(API)) / "config", folder)
+    (folder / name).write_text("a: 1\nb: [1\n")
+    with pytest.raises(roslaunch.core.RLException, match=f"{name}:3: not valid YAML"):
+        check_arguments(start, [f"config_directory:={folder}"])
+    (folder / name).unlink()
+    check_arguments(start, [f"config_directory:={folder}"])
+
+
+def test_a_task_that_cannot_be_read_is_refused_before_anything_starts(start: str, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("a: [1")
+    for value, fault in ((str(broken), "is not valid YAML"), ("pick.yaml", "no such file; .*simulation_pick.yaml")):
+        with pytest.raises(
+            roslaunch.core.RLException, match=f"argument 'task_constructor_script' is '{value}'.*{fault}"
+        ):
+            check_arguments(start, [f"task_constructor_script:={value}"])
+    check_arguments(start, [f"task_constructor_script:={broken}", "state_machine_to_load:=machine.py"])
+
+
 @pytest.mark.parametrize(
     ("text", "fault"), [("a: [1", "2:1: this is not valid YAML"), (None, "1:1: there is no such file")]
 )
@@ -66,10 +88,22 @@ def test_broken_files_of_world_and_robot_are_named_with_their_line(start: str, t
             check_arguments(start, [f"{argument}:={below_root}{tmp_path}/broken.world"])
 
 
-def test_roslaunch_prints_the_sentence_before_its_own_error(start: str, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("argument", "sentence"),
+    [
+        ("world_file:=ur5_setp.world", "argument 'world_file' is 'ur5_setp.world', and "),
+        ("simulation:=maybe", "argument 'simulation' is 'maybe', allowed are true and false"),
+        ("task_constructor_script:=/none.yaml", "argument 'task_constructor_script' is '/none.yaml': "),
+    ],
+)
+def test_roslaunch_prints_the_sentence_before_its_own_error(
+    start: str, capfd: pytest.CaptureFixture[str], argument: str, sentence: str
+) -> None:
     with pytest.raises(roslaunch.core.RLException, match="checked_arguments"):
-        roslaunch.config.load_config_default([(start, ["world_file:=ur5_setp.world"])], None, verbose=False)
-    assert capfd.readouterr().err.startswith("argument 'world_file' is 'ur5_setp.world', and ")
+        roslaunch.config.load_config_default([(start, [argument])], None, verbose=False)
+    fault, note = capfd.readouterr().err.splitlines()
+    assert fault.startswith(sentence)
+    assert note.startswith("Nothing was started.")
 
 
 def test_a_robot_that_xacro_cannot_expand_ends_with_one_sentence(

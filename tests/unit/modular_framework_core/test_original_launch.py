@@ -84,13 +84,16 @@ def test_its_states_folder_without_states_and_its_script_by_name_are_no_fault(
     ("given", "expected"),
     [
         ("pick_and_hold.yaml", "{api}/task_constructor_scripts/pick_and_hold.yaml"),
-        ("/tasks/mine.yaml", "/tasks/mine.yaml"),
+        ("{own}/mine.yaml", "{own}/mine.yaml"),
     ],
 )
-def test_a_task_is_given_by_its_name_or_by_its_path_and_1_is_a_simulation(given: str, expected: str) -> None:
+def test_a_task_is_given_by_its_name_or_by_its_path_and_1_is_a_simulation(
+    tmp_path: Path, given: str, expected: str
+) -> None:
+    (tmp_path / "mine.yaml").write_text("name: mine")
     api = rospkg.RosPack().get_path("modular_framework_api")
-    arguments = [f"task_constructor_script:={given}", "simulation:=1"]
+    arguments = [f"task_constructor_script:={given.format(own=tmp_path)}", "simulation:=1"]
     file = f"{api}/launch/start_framework.launch"
     params = roslaunch.config.load_config_default([(file, arguments)], None, verbose=False).params
-    assert params["/task/task_constructor_script"].value == expected.format(api=api)
+    assert params["/task/task_constructor_script"].value == expected.format(api=api, own=tmp_path)
     assert params["/use_sim_time"].value is True and params["/simulation"].value is True

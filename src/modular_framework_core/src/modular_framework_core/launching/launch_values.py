@@ -12,8 +12,10 @@ from pathlib import Path
 
 import roslaunch.loader
 import rospkg
+import yaml
 
-from modular_framework_core.files import located_yaml
+from modular_framework_core.files import default_folders, located_yaml, shallow_yaml
+from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import FaultList, TaskFault, listing, nearest
 from modular_framework_ros.parameter_declarations import node_declaration
 from modular_framework_urdf import xml_text
@@ -34,6 +36,10 @@ CONFIGURATION_FILES = (
     "manipulator_controller_parameters.yaml",
 )
 """Files of the configuration folder without which nothing starts."""
+NAMES_FILES = ("named_joint_states.yaml", "named_trajectories.yaml", "named_poses.yaml")
+"""Files of the configuration folder that may be left out."""
+SCRIPT, MACHINE = "task_constructor_script", "state_machine_to_load"
+ROSLAUNCH_NOTE = "Nothing was started. The error of roslaunch that follows only says that this check failed."
 
 
 def value_faults(values: Mapping[str, str]) -> list[str]:
@@ -42,12 +48,16 @@ def value_faults(values: Mapping[str, str]) -> list[str]:
     Args:
         values: By name. The files of packages are looked up for launch files with the argument robot_package only.
     """
-    return [*file_faults(values), *(_number_faults(values) if "robot_package" in values else ())]
+    return [
+        *_truth_faults(values),
+        *file_faults(values),
+        *(_number_faults(values) if "robot_package" in values else ()),
+    ]
 
 
 def file_faults(values: Mapping[str, str]) -> list[str]:
     """Returns the packages and files that are not there or cannot be read; as `value_faults`."""
-    faults = [*_method_faults(values.get(METHOD, "")), *_folder_faults(values)]
+    faults = [*_method_faults(values.get(METHOD, "")), *_folder_faults(values), *_task_faults(values)]
     return [*faults, *(_package_faults(values) if "robot_package" in values else ())]
 
 
@@ -56,7 +66,16 @@ def main(arguments: list[str]) -> int:
     faults = value_faults(dict(argument.split(":=", 1) for argument in arguments))
     for fault in faults:
         print(fault, file=sys.stderr)
+    if faults:
+        print(ROSLAUNCH_NOTE, file=sys.stderr)
     return 1 if faults else 0
+
+
+def _truth_faults(values: Mapping[str, str]) -> Iterator[str]:
+    """Yields what roslaunch cannot read as true or false."""
+    value = values.get("simulation", "true")
+    if value.lower() not in ("true", "false", "1", "0"):
+        yield f"argument 'simulation' is '{value}', allowed are true and false; correct it"
 
 
 def _number_faults(values: Mapping[str, str]) -> Iterator[str]:
@@ -153,6 +172,27 @@ def _folder_faults(values: Mapping[str, str]) -> Iterator[str]:
             located_yaml.load(folder / name, FaultList())
         except TaskFault as error:
             yield f"argument '{CONFIGURATION}' is '{value}': {error.faults[0]}"
+    for name in NAMES_FILES if "robot_package" in values else ():
+        try:
+            shallow_yaml.load(read_text(folder / name))
+        except FileNotFoundError:
+            continue
+        except yaml.MarkedYAMLError as error:
+            line = error.problem_mark.line + 1 if error.problem_mark else 1
+            yield f"argument '{CONFIGURATION}' is '{value}': {folder / name}:{line}: not valid YAML: {error.problem}"
+        except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+            yield f"argument '{CONFIGURATION}' is '{value}': {folder / name}: {error}"
+
+
+def _task_faults(values: Mapping[str, str]) -> Iterator[str]:
+    """Yields why the file of the task cannot be read; what it says is checked when the task starts."""
+    value = values.get(SCRIPT, "")
+    if not value or values.get(MACHINE, "").strip():
+        return
+    try:
+        located_yaml.load(default_folders.task_script(Path(value)), FaultList())
+    except TaskFault as error:
+        yield f"argument '{SCRIPT}' is '{value}': {error.faults[0]}"
 
 
 def _path_hint(path: Path) -> str:
