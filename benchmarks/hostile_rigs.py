@@ -69,6 +69,7 @@ class Rig:
         running: name of the controller that runs.
         positions, velocities: measured in the last cycle, shape (joints,).
         fastest, braking: limits of the joints, shape (joints,).
+        overpowered: joints that move against the largest effort of their motor, shape (joints,).
         longest_gap_s: how late the latest cycle began, because of what else the computer did [s]; 0 in simulated time.
     """
 
@@ -87,6 +88,7 @@ class Rig:
         self.braking = np.array([limit.max_acceleration for limit in limits])
         self.lowest = np.array([limit.min_position for limit in limits])
         self.highest = np.array([limit.max_position for limit in limits])
+        self._efforts = np.array([limit.max_effort for limit in limits])
         self.running = "hold"
         self.longest_gap_s = 0.0
         self._measure()
@@ -132,6 +134,8 @@ class Rig:
     def _measure(self) -> None:
         self.positions = np.array([handle.position for handle in self._handles])
         self.velocities = np.array([handle.velocity for handle in self._handles])
+        efforts = np.array([handle.effort for handle in self._handles])
+        self.overpowered = (np.abs(efforts) >= self._efforts) & (efforts * self.velocities < 0.0)
 
     def submit(self, goal: TrajectoryGoal, by_topic: bool = False) -> TrajectoryGoalHandle:
         """Send a goal; one that is refused at once ends as rejected. A command has an unused goal handle."""
