@@ -336,7 +336,7 @@ CASES = [
     in_script(OWN_TASK.format(name="own", option="lambda: 3, "), "key 'lambda' is unknown", OWN_STATE),
     in_script(OWN_TASK.format(name="own", option="class: 3, "), "key 'class' is unknown", OWN_STATE),
     in_script(OWN_TASK.format(name="own", option="self: 3, "), "key 'self' is unknown", OWN_STATE),
-    in_script(OWN_TASK.format(name="n" * 300, option=""), "has 300 characters; allowed are 100", OWN_STATE),
+    in_script(OWN_TASK.format(name="n" * 300, option=""), "has 300 characters; a file name may have 100", OWN_STATE),
     in_script(OWN_TASK.format(name="rospy", option=""), "is the Python module .*choose another name", OWN_STATE),
 ]
 

@@ -102,7 +102,10 @@ def test_states_of_ones_own_are_found_beside_the_frameworks_and_a_folder_without
             "'nowhere' is unknown",
         ),
         ("source: select, message_type: grasp", "'grasp' writes the userdata key 'selected_grasp'"),
-        ("source: move, plan_name: to_nowhere", "the plan 'to_nowhere' is unknown; there is none; let a state make it"),
+        (
+            "source: move, plan_name: to_nowhere",
+            "the plan 'to_nowhere' is unknown; there is none; store it with a state",
+        ),
         (
             "source: plan, target_state_type: grasp, target_state_name: userdata",
             "takes the userdata key 'selected_grasp'",
@@ -145,7 +148,7 @@ def test_a_plan_that_another_state_makes_under_another_name_is_found(
     assert main(["--check", str(script)]) == 0, capsys.readouterr().err
     script.write_text(text + moves % "to_stabilty")
     assert main(["--check", str(script)]) == 1
-    assert "'to_stabilty' is unknown; allowed: to_stability; let a state make it" in capsys.readouterr().err
+    assert "'to_stabilty' is unknown; allowed: to_stability; store it with a state" in capsys.readouterr().err
 
 
 def test_names_that_another_node_adds_are_named_in_the_task_and_other_configurations_are_chosen(

@@ -37,7 +37,7 @@ def faults(folder: Path, imports: str) -> list[str]:
     return []
 
 
-INSTALL = "install it, or add the folder that has it to PYTHONPATH"
+INSTALL = "install it, or add its folder to PYTHONPATH"
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ INSTALL = "install it, or add the folder that has it to PYTHONPATH"
         ),
         (
             "from . import doors",
-            "1 imports '.', but /states is no package, or not so deep in one; import it by its whole name",
+            "1 imports '.', but /states is not nested deeply enough in a package; import it by its full name",
         ),
     ],
 )
@@ -97,7 +97,7 @@ def test_imports_relative_to_a_package_are_looked_for_there(folder: Path, monkey
     monkeypatch.syspath_prepend(str(folder.parent))
     assert faults(folder, "from .doors import x\nfrom . import doors") == []
     assert "finds no 'states.dors'; " in faults(folder, "from .dors import x")[0]
-    assert "not so deep" in faults(folder, "from ..doors import x")[0]
+    assert "not nested deeply enough" in faults(folder, "from ..doors import x")[0]
 
 
 @pytest.mark.parametrize(

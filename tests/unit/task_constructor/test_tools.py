@@ -51,7 +51,9 @@ def test_a_shipped_task_is_drawn_with_all_its_states_and_machines(script: Path, 
 
 
 def test_a_drawing_that_cannot_be_written_is_reported_with_its_path(world: World, tmp_path: Path) -> None:
-    with pytest.raises(task_graph.GraphError, match=r"absent/out\.svg cannot be written.*name a file in a folder"):
+    with pytest.raises(
+        task_graph.GraphError, match=r"absent/out\.svg cannot be written.*name a file in an existing folder"
+    ):
         task_graph.write(world.build(GOOD_TASK), tmp_path / "absent" / "out.svg")
 
 
@@ -132,7 +134,7 @@ def test_an_unknown_name_is_answered_by_all_names_and_the_nearest(
 ) -> None:
     assert main(["--explain", name, "", str(STATES), str(TEMPLATES)]) == 1
     message = capsys.readouterr().err
-    assert f"'{name}' is no state and no template; states: allow_manipulator_collisions, " in message
+    assert f"'{name}' is neither a state nor a template; states: allow_manipulator_collisions, " in message
     assert "templates: concurrent_state_machine, framework_state_machine, " in message
     assert message.endswith(f"state_machine; did you mean '{meant}'?\n")
 
@@ -144,8 +146,8 @@ def test_a_template_is_explained_by_its_keys_and_userdata(capsys: pytest.Capture
     assert "  outcomes: a list of names, required in a task, optional in a nested machine\n" in page
     assert "  userdata: self.userdata, optional, in a nested machine only\n" in page
     assert "  states: a list of '- Label: {source: ...}', required\n" in page
-    assert "Userdata it provides: arm_commander, " in page and "default_outcome" not in page
-    assert "Userdata it provides: none" in explanation(capsys, "state_machine")
+    assert "Userdata provided: arm_commander, " in page and "default_outcome" not in page
+    assert "Userdata provided: none" in explanation(capsys, "state_machine")
     page = explanation(capsys, "concurrent_state_machine")
     assert "  outcome_map: a mapping {outcome: {label: outcome of that state}}, optional\n" in page
 
@@ -160,8 +162,8 @@ def test_a_template_of_ones_own_is_explained_with_the_keys_it_reads(
     (tmp_path / "bare.template").write_text("class {{ state_machine.type }}(smach.StateMachine): pass\n")
     page = explanation(capsys, "timed", f"{tmp_path}:{TEMPLATES}")
     assert f"timed: template, {tmp_path}/timed.template\n\nEnds\nin time.\n\n" in page
-    assert "  time_limit: any value, optional\n      Of this template, which reads it as options.time_limit." in page
-    assert "input_keys" not in page and "Userdata it provides: the template does not say" in page
+    assert "  time_limit: any value, optional\n      Option of this template, available in the template as " in page
+    assert "input_keys" not in page and "Userdata provided: unknown" in page
     assert "(its class has no docstring)" in explanation(capsys, "bare", str(tmp_path))
 
 

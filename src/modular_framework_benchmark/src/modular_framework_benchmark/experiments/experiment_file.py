@@ -32,7 +32,7 @@ from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
 from modular_framework_core.files.located_yaml import Mapping, Scalar, loads
-from modular_framework_core.task_constructor.key_spelling import spelt_as_meant, value_of
+from modular_framework_core.task_constructor.key_spelling import corrected_keys, value_of
 
 REQUIRED = ("experiment", "mode", "factors", "compare")
 OPTIONAL = (
@@ -115,7 +115,7 @@ class _Reader:
         mode = value_of(root, "mode")
         self._mode = str(mode.value) if isinstance(mode, Scalar) and mode.value in MODES else None
         mode_keys = tuple(MODES[str(self._mode)].keys) if self._mode is not None else _keys_of_all_modes()
-        self._root = spelt_as_meant(root, (*KEYS, *mode_keys), "the key", reading.faults)
+        self._root = corrected_keys(root, (*KEYS, *mode_keys), "the key", reading.faults)
         self._mode_keys = mode_keys
         self._refers_to_factors = True
         self._base = Mapping(
@@ -274,7 +274,7 @@ class _Reader:
         record = dict(FILES)
         if mapping is None:
             return record
-        known = spelt_as_meant(mapping, tuple(FILES), "the key of record", self._reading.faults)
+        known = corrected_keys(mapping, tuple(FILES), "the key of record", self._reading.faults)
         for key, value in known.entries.items():
             record[key] = bool(self._reading.truth(value, key))
         return record
@@ -313,7 +313,7 @@ def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueRead
         reading: Where faults are noted.
     """
     keys = ("rule", "metric", "smallest_difference")
-    known = spelt_as_meant(node, keys, "the key of stopping", reading.faults)
+    known = corrected_keys(node, keys, "the key of stopping", reading.faults)
     kinds = [kind.value for kind in StoppingKind]
     if "rule" not in known.entries:
         reading.faults.add(node.location, f"stopping has no rule; allowed: {', '.join(kinds)}")

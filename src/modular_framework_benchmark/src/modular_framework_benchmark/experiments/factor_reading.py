@@ -17,7 +17,7 @@ from modular_framework_benchmark.experiments.setting_trees import (
     substituted,
 )
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
-from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
+from modular_framework_core.task_constructor.key_spelling import corrected_keys
 
 EXAMPLE = "{grasp_method: {above: {arguments: {...}}, aside: {...}}, object: [cube, can]}"
 
@@ -56,7 +56,7 @@ def _read_levels(factor: str, node: Node, mode_keys: Collection[str], reading: R
         for label, value in node.entries.items():
             settings = reading.mapping(value, f"the level '{label}'", "{arguments: {...}}")
             if settings is not None:
-                known = spelt_as_meant(settings, mode_keys, f"what level '{label}' sets,", reading.faults)
+                known = corrected_keys(settings, mode_keys, f"what level '{label}' sets,", reading.faults)
                 levels[label] = Level(Scalar(label, node.keys[label]), known)
     elif isinstance(node, Sequence):
         for item in node.items:
@@ -163,7 +163,7 @@ def _listed(item: Node, factors: Levels, reading: Reading) -> dict[str, str] | N
     mapping = reading.mapping(item, "each combination of design", "{grasp_method: above, object: can}")
     if mapping is None:
         return None
-    node = spelt_as_meant(mapping, tuple(factors), "the factor", reading.faults)
+    node = corrected_keys(mapping, tuple(factors), "the factor", reading.faults)
     configuration: dict[str, str] = {}
     for name, levels in factors.items():
         value = node.entries.get(name)

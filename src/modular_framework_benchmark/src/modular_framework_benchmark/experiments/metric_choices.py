@@ -13,7 +13,7 @@ from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
-from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
+from modular_framework_core.task_constructor.key_spelling import corrected_keys
 from modular_framework_ros.reported_figures import Clock
 
 OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description", "lowest", "highest")
@@ -81,7 +81,7 @@ def _read_metric(item: Node, known: Map[str, Metric], reading: Reading) -> tuple
 
 
 def _known_with_limit(item: Mapping, known: Map[str, Metric], reading: Reading) -> tuple[Metric, Measure] | None:
-    node = spelt_as_meant(item, KNOWN_KEYS, "the key of a metric", reading.faults)
+    node = corrected_keys(item, KNOWN_KEYS, "the key of a metric", reading.faults)
     if "metric" not in node.entries:
         reading.faults.add(item.location, f"a metric needs the key metric or function, such as {EXAMPLE}")
         return None
@@ -93,7 +93,7 @@ def _known_with_limit(item: Mapping, known: Map[str, Metric], reading: Reading) 
 
 
 def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, Measure] | None:
-    node = spelt_as_meant(item, OWN_KEYS, "the key of a metric", reading.faults)
+    node = corrected_keys(item, OWN_KEYS, "the key of a metric", reading.faults)
     target = reading.text(node.entries["function"], "function")
     located = None if target is None else _located_function(target, node.entries["function"], reading)
     if located is None:

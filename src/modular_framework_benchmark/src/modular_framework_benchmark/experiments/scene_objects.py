@@ -16,7 +16,7 @@ from modular_framework_benchmark.experiments.distributions import (
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.resting_height import lowest_point, resting_height
 from modular_framework_core.files.located_yaml import Mapping, Node, Sequence, kind_of
-from modular_framework_core.task_constructor.key_spelling import spelt_as_meant
+from modular_framework_core.task_constructor.key_spelling import corrected_keys
 from modular_framework_simulation.errors import DescriptionError
 
 POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -92,7 +92,7 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
     mapping = reading.mapping(item, "each of objects", EXAMPLE)
     if mapping is None:
         return None
-    node = spelt_as_meant(_renamed(mapping), KEYS, "the key of an object", reading.faults)
+    node = corrected_keys(_renamed(mapping), KEYS, "the key of an object", reading.faults)
     if "model" not in node.entries:
         reading.faults.add(node.location, f"an object needs a model; add one, such as {EXAMPLE}")
         return None

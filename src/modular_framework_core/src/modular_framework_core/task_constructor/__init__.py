@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The task constructor: reads a task written in YAML, checks all of it, and writes the state machine that runs it."""
+"""The task constructor: checks a task written in YAML and generates the state machine that runs the task."""

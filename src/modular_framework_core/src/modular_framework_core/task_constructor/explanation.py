@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Explains what a state does and takes, from its signature and docstring, and what a machine with a template takes."""
+"""Describes states and templates for ``--explain``, from their signatures, docstrings and header keys."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STATE_KEYS_ENTRY = "**keys"
 
 
 def explain(source: StateSource) -> str:
-    """Returns a page about a state: what it does, its options with types and defaults, its outcomes and userdata."""
+    """Returns the description of a state: purpose, options with types and defaults, outcomes and userdata."""
     doc = inspect.cleandoc(source.doc)
     section = _SECTION.search(doc)
     summary = (doc[: section.start()] if section else doc).strip() or "(its class has no docstring)"
@@ -30,14 +30,14 @@ def explain(source: StateSource) -> str:
         if option.name not in STATE_KEYS:
             lines += _option(option, meanings.get(option.name, ""))
     if source.takes_any_option:
-        lines.append("  and any other option: its constructor takes further keyword arguments")
+        lines.append("  and any other option; its constructor takes further keyword arguments")
     lines += ["", f"Outcomes: {_names(source, 'outcomes')}"]
     lines += [f"{key.replace('_', ' ').capitalize()}: {_names(source, key)}" for key in STATE_KEYS[1:]]
     return "\n".join(lines)
 
 
 def explain_template(template: TemplateSource) -> str:
-    """Returns a page about a template: what its machines do, the keys of their header, the userdata they provide."""
+    """Returns the description of a template: purpose, header keys and provided userdata."""
     lines = [
         f"{template.name}: template, {template.file}",
         "",
@@ -47,15 +47,15 @@ def explain_template(template: TemplateSource) -> str:
     ]
     for key in machine_keys(template):
         lines += [f"  {key.name}: {key.form}, {_use(key)}", *_indented(key.meaning)]
-    userdata = "the template does not say" if template.userdata is None else ", ".join(sorted(template.userdata))
-    lines += ["", *textwrap.wrap(f"Userdata it provides: {userdata or 'none'}", _WIDTH, subsequent_indent="  ")]
+    userdata = "unknown" if template.userdata is None else ", ".join(sorted(template.userdata))
+    lines += ["", *textwrap.wrap(f"Userdata provided: {userdata or 'none'}", _WIDTH, subsequent_indent="  ")]
     return "\n".join(lines)
 
 
 def option_meanings(doc: str) -> dict[str, str]:
-    """Returns the text of the section ``Args`` of a docstring about each option, on one line each.
+    """Returns the entry of each option in a docstring's Args section, on one line.
 
-    An entry ``**keys`` stands for the outcomes and userdata keys that every state has.
+    An entry ``**keys`` expands to the outcomes and userdata keys of every state.
     """
     parts = _SECTION.split(inspect.cleandoc(doc))
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the Python module of a checked task: one class for each machine, out of its template, and a main block."""
+"""Generates the Python module of a checked task, with one class per machine rendered from the machine's template."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ if __name__ == "__main__":
 
 
 class GenerationError(Exception):
-    """A template could not be filled, or what came out is not Python; names the template."""
+    """A template cannot be rendered, or the generated module is not valid Python."""
 
 
 def literal(value: Any) -> str:
-    """Writes a value as a Python literal. The one way values get into generated code.
+    """Returns a value as a Python literal. All values enter generated code through this function.
 
     Raises:
-        GenerationError: The value is no text, number, bool, None, list, tuple or dict of these.
+        GenerationError: The value is not a text, number, bool, None, or a list, tuple or dict of these.
     """
     if isinstance(value, jinja2.Undefined):
-        str(value)  # raises jinja2.UndefinedError, which names what the template asked for
+        str(value)  # raises jinja2.UndefinedError, which names the undefined variable
     if isinstance(value, float) and not math.isfinite(value):
         return f"float({str(value)!r})"
     if value is None or isinstance(value, (str, bool, int, float)):
@@ -71,12 +71,12 @@ def literal(value: Any) -> str:
 
 
 def default_output_directory() -> Path:
-    """Returns where generated modules go: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework/state_machines``."""
+    """Returns ``$ROS_HOME/modular_framework/state_machines``, where ROS_HOME defaults to ``~/.ros``."""
     return default_folders.framework_home() / "state_machines"
 
 
 def digest_line(task: TaskSpec, templates: Iterable[Path]) -> str:
-    """Returns one line that changes whenever the module of a task would: with its script, a template or a state."""
+    """Returns a line with a digest of the task script, its states, the templates and the generator."""
     files = [Path(task.script), *sorted({state.source.file for state in task.root.leaf_states()}), Path(__file__)]
     files += sorted(file for folder in templates for file in folder.iterdir() if file.is_file())
     digest = hashlib.sha256()
@@ -86,7 +86,7 @@ def digest_line(task: TaskSpec, templates: Iterable[Path]) -> str:
 
 
 def is_up_to_date(module: Path, digest: str) -> bool:
-    """Returns whether a generated module is there and was made from files with this digest."""
+    """Returns whether a generated module exists and has this digest line."""
     try:
         with module.open(encoding="utf-8") as stream:
             return f"# {digest}\n" in [next(stream, "") for _ in range(3)]
@@ -95,15 +95,15 @@ def is_up_to_date(module: Path, digest: str) -> bool:
 
 
 def generate(task: TaskSpec, templates: Iterable[Path], digest: str = "not kept") -> str:
-    """Returns the source of the module of a task.
+    """Returns the source of a task's module.
 
     Args:
-        task: The checked task.
-        templates: Directories templates may include other files from, in order.
-        digest: What ``digest_line`` gave, for the header.
+        task: Checked task.
+        templates: Search path for files that templates include.
+        digest: Digest line for the header, see ``digest_line``.
 
     Raises:
-        GenerationError: A template cannot be filled, or the result does not compile.
+        GenerationError: A template cannot be rendered, or the generated module does not compile.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader([str(directory) for directory in templates]),
@@ -123,21 +123,21 @@ def generate(task: TaskSpec, templates: Iterable[Path], digest: str = "not kept"
         names = sorted({machine.template.name for machine in machines})
         raise GenerationError(
             f"the module generated for '{task.name}' is not valid Python: {error}; "
-            f"look at the templates it was made with: {', '.join(names)}"
+            f"check its templates: {', '.join(names)}"
         ) from error
     return text
 
 
 def module_path(task: TaskSpec, directory: Path, file_name: str = "") -> Path:
-    """Returns where the module of a task belongs in a directory.
+    """Returns the path of a task's module in a directory.
 
     Args:
-        task: The task.
-        directory: The directory.
-        file_name: Name of the file, with or without .py; "" for the task's name.
+        task: Checked task.
+        directory: Directory of the module.
+        file_name: File name with or without .py; "" for the task's name.
 
     Raises:
-        ValueError: The name cannot be that of a Python module.
+        ValueError: The name is not a valid module name.
     """
     stem = file_name.removesuffix(".py") or task.name
     fault = module_name_fault(stem)
@@ -147,10 +147,16 @@ def module_path(task: TaskSpec, directory: Path, file_name: str = "") -> Path:
 
 
 def write(task: TaskSpec, text: str, directory: Path, file_name: str = "") -> Path:
-    """Writes a generated module, executable, in one step; arguments and errors as for ``module_path``.
+    """Writes a generated module atomically, as an executable file, and returns its path.
 
-    Returns:
-        The path of the file.
+    Args:
+        task: Checked task.
+        text: Source of the module.
+        directory: Directory of the module; created if missing.
+        file_name: File name with or without .py; "" for the task's name.
+
+    Raises:
+        ValueError: The name is not a valid module name.
     """
     directory.mkdir(parents=True, exist_ok=True)
     target = module_path(task, directory, file_name)
@@ -177,7 +183,7 @@ def _section(template: jinja2.Template, machine: MachineSpec, task: TaskSpec) ->
     except jinja2.TemplateSyntaxError as error:
         raise GenerationError(f"{error.filename or file}:{error.lineno}: {error.message}") from error
     except (jinja2.TemplateError, GenerationError, TypeError, ValueError) as error:
-        raise GenerationError(f"{file}: the template cannot be filled for '{machine.label}': {error}") from error
+        raise GenerationError(f"{file}: the template cannot be rendered for '{machine.label}': {error}") from error
 
 
 def _header(task: TaskSpec, digest: str) -> str:
@@ -201,7 +207,7 @@ def _import_line(source: StateSource) -> str:
 
 
 def _module_name(source: StateSource) -> str:
-    """Returns the dotted name a state file can be imported by; "" when it is in no package on the Python path."""
+    """Returns the dotted module name of a state file, or "" if the file is in no package on the Python path."""
     parts = [source.file.stem]
     folder = source.file.parent
     while (folder / "__init__.py").is_file():
@@ -211,9 +217,9 @@ def _module_name(source: StateSource) -> str:
         return ""
     name = ".".join(parts)
     try:
-        found = importlib.util.find_spec(name)
+        spec = importlib.util.find_spec(name)
     except (ImportError, ValueError, AttributeError):
         return ""
-    if found is None or not found.origin or Path(found.origin).resolve() != source.file:
+    if spec is None or not spec.origin or Path(spec.origin).resolve() != source.file:
         return ""
     return name

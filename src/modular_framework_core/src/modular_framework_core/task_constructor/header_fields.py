@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads single fields of a machine or state: each function returns the value, or notes a fault and returns None."""
+"""Reads single fields of a machine or state.
+
+Each function returns the value, or adds a fault and returns None. ``what`` names the field in messages.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ _NODE_NAME = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
 
 
 def text(node: Node, what: str, faults: FaultList) -> str | None:
-    """Returns a text that is not empty."""
+    """Returns a nonempty text."""
     if isinstance(node, Scalar) and isinstance(node.value, str) and node.value:
         return node.value
     faults.add(node.location, f"{what} must be a text, found {kind_of(node)}")
@@ -24,7 +27,7 @@ def text(node: Node, what: str, faults: FaultList) -> str | None:
 
 
 def identifier(node: Node, what: str, faults: FaultList) -> str | None:
-    """Returns a text that can be the name of a Python module and class."""
+    """Returns a text that is a valid name of a Python module and class."""
     name = text(node, what, faults)
     if name is None:
         return None
@@ -35,25 +38,24 @@ def identifier(node: Node, what: str, faults: FaultList) -> str | None:
 
 
 def module_name_fault(name: str) -> str:
-    """Returns why a text cannot be the name of a generated module; "" if it can."""
+    """Returns why a text is not a valid name of a generated module; "" if valid."""
     if not name.isidentifier() or not name.isascii() or keyword.iskeyword(name):
         return "must be letters, digits and underscores, and start with a letter"
     if len(name) > MAX_NAME_LENGTH:
-        return f"has {len(name)} characters; allowed are {MAX_NAME_LENGTH}: it is the name of a file"
+        return f"has {len(name)} characters; a file name may have {MAX_NAME_LENGTH}; shorten it"
     try:
-        found = importlib.util.find_spec(name)
+        spec = importlib.util.find_spec(name)
     except (ImportError, ValueError):
-        found = None
-    if found is not None and found.origin:
+        spec = None
+    if spec is not None and spec.origin:
         return (
-            f"is the Python module {found.origin}, which a file of that name would hide from the state machines "
-            "beside it; choose another name"
+            f"is the Python module {spec.origin}, which a generated file of that name would hide; choose another name"
         )
     return ""
 
 
 def node_name(node: Node, faults: FaultList) -> str | None:
-    """Returns a text that can be the name of a ROS node."""
+    """Returns a text that is a valid name of a ROS node."""
     name = text(node, "node_name", faults)
     if name is None or _NODE_NAME.fullmatch(name):
         return name
@@ -70,29 +72,44 @@ def label(name: str, location: SourceLocation, faults: FaultList) -> None:
 def names(
     node: Node, what: str, faults: FaultList, *, may_be_empty: bool = False, example: str = "[success, fail]"
 ) -> tuple[str, ...] | None:
-    """Returns a list of different names."""
+    """Returns a list of distinct names.
+
+    Args:
+        node: Value of the field.
+        what: Name of the field, for messages.
+        faults: Receives the faults.
+        may_be_empty: Whether the list may be empty.
+        example: Valid value, for messages.
+    """
     if not isinstance(node, Sequence):
         faults.add(node.location, f"{what} must be a list such as {example}, found {kind_of(node)}")
         return None
     if not node.items and not may_be_empty:
         faults.add(node.location, f"{what} is an empty list; it needs at least one name")
         return None
-    found: list[str] = []
+    result: list[str] = []
     for item in node.items:
         name = text(item, f"each of {what}", faults)
         if name is None:
             return None
-        if name in found:
+        if name in result:
             faults.add(item.location, f"{what} has '{name}' twice")
             return None
-        found.append(name)
-    return tuple(found)
+        result.append(name)
+    return tuple(result)
 
 
 def name_map(
     node: Node, what: str, faults: FaultList, *, example: str = "{success: NextState}"
 ) -> dict[str, Scalar] | None:
-    """Returns a mapping from name to name, with the location of each value."""
+    """Returns a mapping from names to names, with the location of each value.
+
+    Args:
+        node: Value of the field.
+        what: Name of the field, for messages.
+        faults: Receives the faults.
+        example: Valid value, for messages.
+    """
     if not isinstance(node, Mapping):
         faults.add(node.location, f"{what} must be a mapping such as {example}, found {kind_of(node)}")
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Describes the language of tasks as a JSON Schema, so that editors complete and check task scripts while typing."""
+"""Describes the task language as a JSON Schema, so that editors can complete and check task scripts."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[str, Any]:
-    """Returns the JSON Schema (draft 7) of tasks that use these states and templates.
+    """Returns the JSON Schema (draft 7) of tasks with these states and templates.
 
-    States whose file cannot be read as a state are left out. What a schema cannot say (that a transition leads to a
-    label that exists, for example) is left to ``state_machine_generator --check``.
+    Unreadable states are omitted. A schema cannot express links between labels, such as the target of a transition;
+    ``state_machine_generator --check`` covers them.
     """
     usable = [source for name in states.names() if (source := _readable(states, name)) is not None]
     found = [template for name in templates.names() if (template := templates.get(name)) is not None]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Notes unknown keys, and reads a misspelt one as the key that was meant.
+"""Reports unknown keys and corrects misspelt keys.
 
-One mistake is one fault: once ``sorce`` is noted, its value is read as that of ``source``, so that no missing key is
-reported as well, and all other faults are found too.
+After ``sorce`` is reported, its value is read as ``source``. The mistake then counts as one fault without a second
+report of a missing key, and the checks of the value still run.
 """
 
 from __future__ import annotations
@@ -13,35 +13,31 @@ from collections.abc import Collection, Iterable
 from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, Node
 
-SIMILAR = 0.75
-"""A key stands for one that is not given when it is this similar to it (0 to 1)."""
+MIN_SIMILARITY = 0.75
+"""Minimum similarity of a misspelt key to the intended key, 0 to 1."""
 
 
-def meant_key(found: str, missing: Iterable[str]) -> str | None:
-    """Returns which of the keys that are not given a misspelt key stands for; None when it is like none of them."""
-    matches = difflib.get_close_matches(found, list(missing), n=1, cutoff=SIMILAR)
+def intended_key(misspelt: str, missing: Iterable[str]) -> str | None:
+    """Returns the missing key most similar to a misspelt key, or None if no key is similar."""
+    matches = difflib.get_close_matches(misspelt, list(missing), n=1, cutoff=MIN_SIMILARITY)
     return matches[0] if matches else None
 
 
 def value_of(node: Mapping, key: str) -> Node | None:
-    """Returns the value of a key, or, where that is not given, of the key that is spelt nearly like it."""
+    """Returns the value of a key or, if the key is missing, of a misspelling of the key."""
     if key in node.entries:
         return node.entries[key]
-    return next((value for found, value in node.entries.items() if meant_key(found, [key])), None)
+    return next((value for written, value in node.entries.items() if intended_key(written, [key])), None)
 
 
-def spelt_as_meant(node: Mapping, known: Collection[str], what: str, faults: FaultList) -> Mapping:
-    """Returns a mapping that has known keys only.
+def corrected_keys(node: Mapping, known: Collection[str], what: str, faults: FaultList) -> Mapping:
+    """Returns a mapping with known keys only: misspelt keys are corrected, other unknown keys are dropped.
 
     Args:
-        node: The mapping as written.
-        known: The keys it may have.
-        what: What its keys are, for messages.
-        faults: Where each unknown key is noted.
-
-    Returns:
-        The mapping; a key that is spelt nearly like one that is not given has become that one, others that are unknown
-        are left out.
+        node: Mapping as written.
+        known: Allowed keys.
+        what: Noun phrase for a key, for messages.
+        faults: Receives a fault for each unknown key.
     """
     entries = {key: value for key, value in node.entries.items() if key in known}
     keys = {key: node.keys[key] for key in entries}
@@ -49,8 +45,8 @@ def spelt_as_meant(node: Mapping, known: Collection[str], what: str, faults: Fau
         if key in known:
             continue
         faults.add_unknown(node.keys[key], what, key, known, given=entries)
-        meant = meant_key(key, [name for name in known if name not in entries])
-        if meant is not None:
-            entries[meant], keys[meant] = value, node.keys[key]
+        intended = intended_key(key, [name for name in known if name not in entries])
+        if intended is not None:
+            entries[intended], keys[intended] = value, node.keys[key]
             faults.harmless += 1
     return Mapping(entries, keys, node.location)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which messages, postures and planning groups a task may name: those of configuration files and of the robot."""
+"""Collects the names that a task may use for messages, postures, planning groups and planners."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _GROUP_KEY = "manipulator_group_name"
 
 @dataclass(frozen=True, slots=True)
 class KnownNames:
-    """Names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, planner.
+    """Known names by kind: joint_state, trajectory, pose, robot_pose, plan, grasp, posture, group, planner.
 
     Attributes:
-        names: Kind -> the names there are; a kind that is left out is not known, and any name of it may be right.
-        origins: Kind -> where its names come from, for messages.
-        manipulator_group: Planning group whose named states are the postures; "" when it is not known.
+        names: Kind -> known names. Names of an absent kind are not checked.
+        origins: Kind -> source of its names, for messages.
+        manipulator_group: Planning group whose named states are the postures; "" if unknown.
     """
 
     names: Mapping[str, frozenset[str]] = field(default_factory=dict)
@@ -34,7 +34,7 @@ class KnownNames:
     manipulator_group: str = ""
 
     def with_names(self, more: Mapping[str, frozenset[str]]) -> KnownNames:
-        """Returns these names with more of them; kinds that are not known stay so."""
+        """Returns a copy with further names. Absent kinds stay absent, except for ``plan``."""
         merged = {kind: names | more.get(kind, frozenset()) for kind, names in self.names.items()}
         return KnownNames(
             merged | {"plan": merged.get("plan", frozenset()) | more.get("plan", frozenset())},
@@ -43,18 +43,18 @@ class KnownNames:
         )
 
     def with_planners(self, planners: frozenset[str]) -> KnownNames:
-        """Returns these names with the planners there are."""
+        """Returns a copy with the available planners."""
         return KnownNames({**self.names, "planner": planners}, self.origins, self.manipulator_group)
 
     def with_robot(self, srdf: str, origin: str) -> KnownNames:
-        """Returns these names with the planning groups and postures of a robot.
+        """Returns a copy with the planning groups and postures of a robot.
 
         Args:
-            srdf: Text of the robot's SRDF.
-            origin: Where it comes from, for messages.
+            srdf: SRDF text.
+            origin: Source of the SRDF, for messages.
 
         Raises:
-            ValueError: The text cannot be read as SRDF.
+            ValueError: The text is not a valid SRDF.
         """
         robot = read_srdf(srdf, origin)
         groups = frozenset(robot.groups)
@@ -66,13 +66,15 @@ class KnownNames:
 
 
 def names_of_config(folder: Path) -> KnownNames:
-    """Returns the names in the YAML files of a configuration folder; a file that is not there leaves its kind unknown.
+    """Returns the names in the YAML files of a configuration folder. A missing file leaves its kind absent.
 
     Raises:
-        ValueError: The folder is not there, or a file cannot be read; names it.
+        ValueError: The folder does not exist, or a file cannot be read.
     """
     if not folder.is_dir():
-        raise ValueError(f"configuration folder {folder} is not a directory; name the one with named_joint_states.yaml")
+        raise ValueError(
+            f"configuration folder {folder} is not a directory; name the folder with named_joint_states.yaml"
+        )
     names: dict[str, frozenset[str]] = {}
     origins: dict[str, str] = {}
     for kind, file in _FILES.items():
@@ -89,34 +91,34 @@ def names_of_config(folder: Path) -> KnownNames:
 
 
 def names_of_installation(config: Path | None, moveit_package: str = "") -> KnownNames:
-    """Returns the names of a configuration folder and of a MoveIt configuration package's robot.
+    """Returns the names of a configuration folder and of the robot in a MoveIt configuration package.
 
     Args:
-        config: The folder; None for that of the API package, where that is installed.
-        moveit_package: Name of the package; "" for that of the API package's launch file.
+        config: Configuration folder; None for the API package's folder, if installed.
+        moveit_package: MoveIt configuration package; "" for the package in the API package's launch file.
 
     Raises:
-        ValueError: A file cannot be read, or what was named is not there.
+        ValueError: A file cannot be read, or a given folder or package does not exist.
     """
     folder = config or default_folders.config_folder()
     names = KnownNames() if folder is None else names_of_config(folder)
     srdf = default_folders.srdf_file(moveit_package)
     if srdf is None and moveit_package:
         raise ValueError(
-            f"package '{moveit_package}' is not found, or has not exactly one SRDF in config/; name the "
-            "robot's MoveIt configuration package, one that is on ROS_PACKAGE_PATH"
+            f"package '{moveit_package}' is not found, or does not have exactly one SRDF in config/; name the "
+            "robot's MoveIt configuration package and add it to ROS_PACKAGE_PATH"
         )
     return names if srdf is None else names.with_robot(srdf.read_text(encoding="utf-8"), str(srdf))
 
 
 def _mapping_in(file: Path) -> dict[Any, Any] | None:
-    """Returns the mapping in a YAML file; None when the file is not there."""
+    """Returns the mapping in a YAML file, or None if the file does not exist."""
     try:
         content = shallow_yaml.load(read_text(file))
     except FileNotFoundError:
         return None
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
-        raise ValueError(f"{file} cannot be read: {error}; names of it cannot be checked before it can") from error
+        raise ValueError(f"{file} cannot be read: {error}; correct it so that its names can be checked") from error
     if content is not None and not isinstance(content, dict):
         raise ValueError(f"{file} must be a mapping of names, found {type(content).__name__}")
     return content or {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads Python files by path: states that are in no importable package, and state machine modules."""
+"""Loads Python files by path: states outside of importable packages, and state machine modules."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ import smach
 
 
 class LoadingError(Exception):
-    """A file cannot be loaded, or does not define what is looked for in it."""
+    """A file cannot be loaded or lacks the requested definition."""
 
 
 def load_module(file: str | Path) -> ModuleType:
-    """Imports a Python file by its path, once: a second call returns the same module.
+    """Imports a Python file by path. A second call returns the same module.
 
-    No bytecode is kept: generated files are written again and again, and a cache decides by size and second.
+    No bytecode is cached, because Python's cache misses a regenerated file of equal size within the same second.
 
     Raises:
-        LoadingError: The file is not there, or raises while it is imported.
+        LoadingError: The file does not exist or raises an exception during import.
     """
     path = Path(file).resolve()
     name = f"modular_framework_loaded_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
     if name in sys.modules:
         return sys.modules[name]
-    found = importlib.util.spec_from_file_location(name, path)
-    if found is None or found.loader is None or not path.is_file():
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None or not path.is_file():
         raise LoadingError(f"{path} is not a Python file that can be loaded")
-    module = importlib.util.module_from_spec(found)
+    module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
         exec(compile(path.read_bytes(), str(path), "exec"), module.__dict__)
@@ -44,7 +44,7 @@ def load_module(file: str | Path) -> ModuleType:
 
 
 def load_state_class(file: str, class_name: str) -> Any:
-    """Returns a state class out of a file."""
+    """Returns a state class defined in a file."""
     module = load_module(file)
     if not hasattr(module, class_name):
         raise LoadingError(f"{file} does not define the class {class_name}")
@@ -52,9 +52,9 @@ def load_state_class(file: str, class_name: str) -> Any:
 
 
 def machine_factory(module: ModuleType) -> Callable[[], smach.Container]:
-    """Returns the function that makes the state machine a module is about.
+    """Returns the function that creates a module's state machine.
 
-    That is ``create_state_machine``; in a module without it, the last container class the module defines.
+    This is ``create_state_machine``, or else the last container class that the module defines.
 
     Raises:
         LoadingError: The module has neither.

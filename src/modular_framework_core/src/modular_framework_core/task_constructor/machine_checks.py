@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks how the states of a machine are linked: transitions, outcome maps, reachability, userdata."""
+"""Checks the links between the states of a machine: transitions, outcome maps and reachability."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kin
 
 @dataclass(frozen=True, slots=True)
 class ChildLinks:
-    """Links of a child as they are written in the task.
+    """Links of a child as written in the task.
 
     Attributes:
-        label: The child's name.
-        outcomes: What it may end with; None when that could not be found out.
-        transitions: Outcome -> target; None when they could not be read.
+        label: Name of the child.
+        outcomes: Outcomes of the child; None if unknown.
+        transitions: Outcome -> target; None if unreadable.
         keys: Location of each key of ``transitions``.
-        location: Where the child is defined.
+        location: Position of the child's definition.
     """
 
     label: str
@@ -38,15 +38,15 @@ def check_sequential(
     location: SourceLocation,
     faults: FaultList,
 ) -> None:
-    """Checks the transitions of the children of a state machine.
+    """Checks the transitions between the children of a sequential machine.
 
     Args:
-        children: The children that could be read.
-        labels: The labels of all children as written, those that could not be read or that repeat one included.
-        first: The label the machine begins with, in a list; empty when there is none.
-        outcomes: Outcomes of the machine; None when they could not be read, which leaves targets unchecked.
-        location: Where the outcomes are declared.
-        faults: Where faults are noted.
+        children: Readable children.
+        labels: Labels of all children as written, including unreadable children and repeated labels.
+        first: List with the label of the initial state, or an empty list.
+        outcomes: Outcomes of the machine. If None (unreadable), targets are not checked.
+        location: Position of the outcomes.
+        faults: Receives the faults.
     """
     targets = list(dict.fromkeys([*labels, *(outcomes or ())]))
     for child in children:
@@ -80,98 +80,112 @@ def _check_reachability(
     location: SourceLocation,
     faults: FaultList,
 ) -> None:
-    """Notes states no transition leads to, states that lead to no outcome, and outcomes nothing leads to.
+    """Adds faults for unreachable states, states without a path to an outcome, and unreachable outcomes.
 
-    What is wrong with a transition is noted by others: here a misspelt target counts as the nearest one, and what
-    cannot be known may lead anywhere, so that nothing is noted that is right once that other fault is corrected.
+    Other checks report faulty transitions. To avoid follow-up faults, a misspelt target counts as the closest name
+    here, and a child with unknown links may lead to any state or outcome.
     """
     anywhere = {*labels, *outcomes}
     leads_to = {label: anywhere for label in labels}
     for child in children:
         if labels.count(child.label) == 1:
             leads_to[child.label] = _targets(child, outcomes, anywhere)
-    reached = _closure(leads_to, first)
-    backwards: dict[str, set[str]] = {}
+    reachable = _closure(leads_to, first)
+    predecessors: dict[str, set[str]] = {}
     for label, targets in leads_to.items():
         for target in targets:
-            backwards.setdefault(target, set()).add(label)
-    can_end = _closure(backwards, outcomes)
+            predecessors.setdefault(target, set()).add(label)
+    can_end = _closure(predecessors, outcomes)
     for child in children:
-        if child.label not in reached:
+        if child.label not in reachable:
             faults.add(
                 child.location,
-                f"state '{child.label}' is never reached: no transition leads to it; lead one to it, or remove it",
+                f"state '{child.label}' is never reached; add a transition that leads to it, or remove the state",
             )
         elif child.label not in can_end:
-            circle = ", ".join(sorted(_closure(leads_to, [child.label])))
+            cycle = ", ".join(sorted(_closure(leads_to, [child.label])))
             faults.add(
                 child.location,
-                f"state '{child.label}' has no way out: from it the machine only gets to "
-                f"{circle}, never to an outcome; lead one of them to: {', '.join(outcomes)}",
+                f"state '{child.label}' never leads to an outcome: its transitions only lead to {cycle}; "
+                f"add a transition to one of: {', '.join(outcomes)}",
             )
     check_outcomes_produced(outcomes, set().union(*leads_to.values()), location, faults)
 
 
 def _targets(child: ChildLinks, outcomes: tuple[str, ...], anywhere: set[str]) -> set[str]:
-    """Returns what a child leads to; an outcome of the machine's own that has no transition leads there by its name."""
+    """Returns the targets of a child. An outcome without transition leads to the machine's outcome of the same name."""
     if child.transitions is None or child.outcomes is None:
         return anywhere
     unlinked = {name for name in child.outcomes if name not in child.transitions}
     if not unlinked <= set(outcomes):
         return anywhere
-    meant = unlinked
+    targets = unlinked
     for target in child.transitions.values():
         name = str(target.value)
         likely = name if name in anywhere else closest(name, sorted(anywhere))
         if likely is None:
             return anywhere
-        meant.add(likely)
-    return meant
+        targets.add(likely)
+    return targets
 
 
 def _closure(leads_to: MappingABC[str, set[str]], start: Iterable[str]) -> set[str]:
-    """Returns all names that can be reached from some names, themselves included."""
-    reached: set[str] = set()
-    waiting = list(start)
-    while waiting:
-        label = waiting.pop()
-        if label not in reached:
-            reached.add(label)
-            waiting.extend(leads_to.get(label, ()))
-    return reached
+    """Returns the start names and all names reachable from them."""
+    reachable: set[str] = set()
+    pending = list(start)
+    while pending:
+        label = pending.pop()
+        if label not in reachable:
+            reachable.add(label)
+            pending.extend(leads_to.get(label, ()))
+    return reachable
 
 
 def check_outcomes_produced(
     outcomes: tuple[str, ...], produced: Container[str | None], location: SourceLocation, faults: FaultList
 ) -> None:
-    """Notes outcomes nothing leads to; ``preempted`` is what a machine ends with when it is stopped."""
+    """Adds a fault for each outcome that nothing leads to, except for ``preempted``, the outcome of a stopped machine.
+
+    Args:
+        outcomes: Outcomes of the machine.
+        produced: Labels and outcomes with a link to them.
+        location: Position of the outcomes.
+        faults: Receives the faults.
+    """
     for outcome in outcomes:
         if outcome not in produced and outcome != "preempted":
             faults.add(
                 location,
-                f"the outcome '{outcome}' is never produced: nothing leads to it; remove it, or let a "
-                "transition (in a concurrent machine: an entry of outcome_map) lead to it",
+                f"the outcome '{outcome}' is never produced; remove it, or add a transition that leads to it "
+                "(in a concurrent machine, an entry of outcome_map)",
             )
 
 
 def check_concurrent(children: list[ChildLinks], faults: FaultList) -> None:
-    """Checks that the children of a concurrent machine have no transitions, which would have no effect."""
+    """Checks that the children of a concurrence have no transitions, which would have no effect."""
     for child in children:
         if child.transitions:
             location = next(iter(child.keys.values()))
             faults.add(
                 location,
-                f"state '{child.label}' has transitions, but it runs in a concurrent machine, where states end "
-                "together; remove them and use outcome_map of the machine",
+                f"state '{child.label}' has transitions, but runs in a concurrent machine, whose states all run at "
+                "once; remove the transitions and use outcome_map of the machine",
             )
 
 
 def check_outcome_map(
     node: Node, outcomes: tuple[str, ...], children: list[ChildLinks], faults: FaultList
 ) -> dict[str, dict[str, str]]:
-    """Returns the outcome map of a concurrent machine; notes what it names that is not there."""
+    """Returns the outcome map of a concurrence. Unknown states and outcomes add faults.
+
+    Args:
+        node: Value of ``outcome_map``.
+        outcomes: Outcomes of the machine.
+        children: Labels and outcomes of the children.
+        faults: Receives the faults.
+    """
     if not isinstance(node, Mapping):
-        faults.add(node.location, f"outcome_map must be {{outcome: {{State: outcome of it}}}}, found {kind_of(node)}")
+        faults.add(node.location, f"outcome_map must be {{outcome: {{State: its outcome}}}}, found {kind_of(node)}")
         return {}
     by_label = {child.label: child for child in children}
     result: dict[str, dict[str, str]] = {}
@@ -181,12 +195,12 @@ def check_outcome_map(
         if not isinstance(conditions, Mapping):
             faults.add(
                 conditions.location,
-                f"outcome_map: '{outcome}' must be {{State: outcome of it}}, found {kind_of(conditions)}",
+                f"outcome_map: '{outcome}' must be {{State: its outcome}}, found {kind_of(conditions)}",
             )
             continue
         result[outcome] = {}
-        for label, wanted in conditions.entries.items():
-            value = wanted.plain()
+        for label, outcome_node in conditions.entries.items():
+            value = outcome_node.plain()
             child = by_label.get(label)
             if child is None:
                 faults.add_unknown(
@@ -194,9 +208,10 @@ def check_outcome_map(
                 )
             elif not isinstance(value, str):
                 faults.add(
-                    wanted.location, f"outcome_map: outcome of '{label}' must be a name, found {kind_of(wanted)}"
+                    outcome_node.location,
+                    f"outcome_map: outcome of '{label}' must be a name, found {kind_of(outcome_node)}",
                 )
             elif child.outcomes is not None and value not in child.outcomes:
-                faults.add_unknown(wanted.location, f"outcome_map: outcome of '{label}'", value, child.outcomes)
+                faults.add_unknown(outcome_node.location, f"outcome_map: outcome of '{label}'", value, child.outcomes)
             result[outcome][label] = str(value)
     return result

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the fields of a machine's header; notes what is wrong with them."""
+"""Reads and checks the fields of a machine's header."""
 
 from __future__ import annotations
 
 from modular_framework_core.files.faults import FaultList, SourceLocation, listing
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks
-from modular_framework_core.task_constructor.key_spelling import spelt_as_meant, value_of
+from modular_framework_core.task_constructor.key_spelling import corrected_keys, value_of
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.machine_keys import SHARED_USERDATA, machine_keys, required_keys
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
@@ -17,16 +17,28 @@ MANAGER_KINDS = ("joint_state", "trajectory", "pose", "robot_pose", "plan", "gra
 
 
 class HeaderReader:
-    """Reads headers of the machines of one task."""
+    """Reads the headers of the machines of one task."""
 
     def __init__(self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList) -> None:
-        """Uses these templates; the states serve to distinguish a state from a misspelt template."""
+        """Stores the catalogues.
+
+        Args:
+            states: Available states, to distinguish a state from a misspelt template.
+            templates: Available templates.
+            faults: Receives all faults.
+        """
         self._states = states
         self._templates = templates
         self._faults = faults
 
-    def spelt(self, header: Mapping, label: str, *, is_root: bool) -> Mapping:
-        """Returns a header with known keys only; notes the unknown ones, and those that are missing."""
+    def with_known_keys(self, header: Mapping, label: str, *, is_root: bool) -> Mapping:
+        """Returns a header with known keys only. Unknown keys and missing required keys add faults.
+
+        Args:
+            header: Header as written.
+            label: Name of the machine, for messages.
+            is_root: Whether the header is the task's.
+        """
         template = self.template_named(value_of(header, "source"))
         templates = self._all_templates() if template is None else [template]
         known = list(
@@ -35,15 +47,15 @@ class HeaderReader:
             )
         )
         who = f"'{label}' (template {template.name})" if template else f"'{label}'"
-        spelt = spelt_as_meant(header, known, f"{who}: key", self._faults)
+        corrected = corrected_keys(header, known, f"{who}: key", self._faults)
         for key in required_keys(is_root=is_root):
-            if key.name not in spelt.entries:
+            if key.name not in corrected.entries:
                 owner = "the task" if is_root else f"machine {who}"
                 self._faults.add(header.location, f"{owner} has no '{key.name}'; add it: {key.form}")
-        return spelt
+        return corrected
 
     def template_named(self, node: Node | None) -> TemplateSource | None:
-        """Returns the template a source names; None, without a fault, when there is none."""
+        """Returns the template that ``source`` names, or None, without a fault."""
         return self._templates.get(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
 
     def template(self, header: Mapping, label: str) -> TemplateSource | None:
@@ -65,13 +77,13 @@ class HeaderReader:
         return template
 
     def outcomes(self, header: Mapping) -> tuple[str, ...] | None:
-        """Returns the outcomes of a machine; None when they are there and wrong."""
+        """Returns the outcomes of a machine, by default ``DEFAULT_OUTCOMES``; None if invalid."""
         if "outcomes" not in header.entries:
             return DEFAULT_OUTCOMES
         return header_fields.names(header.entries["outcomes"], "outcomes", self._faults)
 
     def shares_userdata(self, header: Mapping) -> bool:
-        """Returns whether a machine works on the userdata of the machine around it."""
+        """Returns whether a machine uses its parent's userdata."""
         node = header.entries.get("userdata")
         if node is None:
             return False
@@ -81,7 +93,13 @@ class HeaderReader:
         return False
 
     def default_outcome(self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...]) -> str | None:
-        """Returns the outcome of a concurrent machine when no entry of its outcome map is met; None for others."""
+        """Returns the default outcome of a concurrence, or None for a sequential machine.
+
+        Args:
+            header: Header of the machine.
+            template: Template of the machine.
+            outcomes: Outcomes of the machine.
+        """
         node = header.entries.get("default_outcome")
         if not template.concurrent or not outcomes:
             return None
@@ -95,20 +113,27 @@ class HeaderReader:
     def outcome_map(
         self, header: Mapping, template: TemplateSource, outcomes: tuple[str, ...], links: list[ChildLinks]
     ) -> dict[str, dict[str, str]]:
-        """Returns the outcome map of a concurrent machine; an empty one for others."""
+        """Returns the outcome map of a concurrence, or an empty map for a sequential machine.
+
+        Args:
+            header: Header of the machine.
+            template: Template of the machine.
+            outcomes: Outcomes of the machine.
+            links: Labels and outcomes of the children.
+        """
         node = header.entries.get("outcome_map")
         if not template.concurrent or node is None or not outcomes:
             return {}
         return machine_checks.check_outcome_map(node, outcomes, links, self._faults)
 
     def key_names(self, header: Mapping, key: str) -> tuple[str, ...]:
-        """Returns a list of userdata keys."""
+        """Returns the userdata keys listed under a header key."""
         if key not in header.entries:
             return ()
         return header_fields.names(header.entries[key], key, self._faults, may_be_empty=True) or ()
 
     def initial_state(self, header: Mapping, labels: list[str]) -> str:
-        """Returns the label of the state a machine begins with; "" for the first one."""
+        """Returns the label of the initial state; "" for the first child."""
         node = header.entries.get("initial_state")
         name = None if node is None else header_fields.text(node, "initial_state", self._faults)
         if node is None or name is None:
@@ -119,7 +144,7 @@ class HeaderReader:
         return name
 
     def external_names(self, header: Mapping) -> dict[str, frozenset[str]]:
-        """Returns the names that other nodes put into the managers: kind of message -> names."""
+        """Returns the names that other nodes store in the managers, kind of message -> names."""
         node = header.entries.get("external_names")
         if node is None:
             return {}
@@ -128,17 +153,17 @@ class HeaderReader:
                 node.location, f"external_names must be a mapping such as {{plan: [homing]}}, found {kind_of(node)}"
             )
             return {}
-        spelt = spelt_as_meant(node, MANAGER_KINDS, "external_names: kind", self._faults)
-        found = {
+        corrected = corrected_keys(node, MANAGER_KINDS, "external_names: kind", self._faults)
+        names_by_kind = {
             kind: header_fields.names(
                 value, f"external_names: {kind}", self._faults, may_be_empty=True, example="[homing]"
             )
-            for kind, value in spelt.entries.items()
+            for kind, value in corrected.entries.items()
         }
-        return {kind: frozenset(names or ()) for kind, names in found.items()}
+        return {kind: frozenset(names or ()) for kind, names in names_by_kind.items()}
 
     def location_of(self, header: Mapping, key: str) -> SourceLocation:
-        """Returns where the value of a key is; where the header is when the key is left out."""
+        """Returns the location of a key's value, or of the header if the key is missing."""
         return header.entries[key].location if key in header.entries else header.location
 
     def _all_templates(self) -> list[TemplateSource]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The keys of a machine's header, defined once: for the check of a task, for ``--explain`` and for the JSON Schema."""
+"""Header keys of a machine, defined once for the checks, ``--explain`` and the JSON Schema."""
 
 from __future__ import annotations
 
@@ -12,23 +12,22 @@ from modular_framework_core.task_constructor.template_catalogue import TemplateS
 SHARED_USERDATA = "self.userdata"
 NAMES = {"type": "array", "items": {"type": "string"}, "uniqueItems": True}
 UNREAD = ("params", "states", "anchors")
-"""Keys whose references are not resolved with the header's: they are read later, or not at all."""
+"""Keys whose references are resolved later than the header's, or not at all."""
 OUTCOMES = {**NAMES, "minItems": 1}
 NAME_MAP = {"type": "object", "additionalProperties": {"type": "string"}}
 
 
 @dataclass(frozen=True, slots=True)
 class MachineKey:
-    """A key of the header of a machine.
+    """A key of a machine's header.
 
     Attributes:
         name: Spelling.
-        form: What its value looks like, in words.
-        meaning: What it is for.
-        schema: JSON Schema of its value.
-        at_root: Whether the task itself has it; ``nested`` whether a nested machine has it: "required", "optional" or
-            "" for not at all.
-        nested: See ``at_root``.
+        form: Form of the value, in words.
+        meaning: Purpose of the key.
+        schema: JSON Schema of the value.
+        at_root: Use in the task's own header: "required", "optional" or "" (not allowed).
+        nested: Use in the header of a nested machine, with the same values.
     """
 
     name: str
@@ -43,22 +42,22 @@ _KEYS = (
     MachineKey(
         "name",
         "a name",
-        "Name of the task and its file; of a nested machine, the name of its class, which is "
-        "made of the label if left out.",
+        "Name of the task and of the generated file; in a nested machine, the class name, by default "
+        "derived from the label.",
         {"type": "string"},
         at_root="required",
     ),
     MachineKey(
         "node_name",
         "a name",
-        "Name of the ROS node that runs the task; the task's if left out.",
+        "Name of the ROS node that runs the task; by default the task's name.",
         {"type": "string"},
         nested="",
     ),
     MachineKey(
         "source",
         "a name",
-        "The template the machine is written with: this one.",
+        "Template of the machine.",
         {"type": "string"},
         "required",
         "required",
@@ -66,74 +65,74 @@ _KEYS = (
     MachineKey(
         "outcomes",
         "a list of names",
-        "What the machine may end with, first = success; success and fail if left out.",
+        "Outcomes of the machine; the first is positive. Default: success and fail.",
         or_reference(OUTCOMES),
         at_root="required",
     ),
     MachineKey(
         "transitions",
-        "a mapping {outcome: label, or outcome of the machine around}",
-        "Where to go on after each outcome; none is needed for an outcome that the machine around has too.",
+        "a mapping {outcome: label, or outcome of the parent machine}",
+        "Next state after each outcome. An outcome that the parent machine has too needs no entry.",
         or_reference(NAME_MAP),
         at_root="",
     ),
     MachineKey(
         "initial_state",
         "a label",
-        "State that the machine begins with; the first one if left out.",
+        "Initial state of the machine; by default the first state.",
         or_reference({"type": "string"}),
     ),
     MachineKey(
         "default_outcome",
         "a name",
-        "Outcome when no entry of the outcome map is met; the last one if left out.",
+        "Outcome if no entry of the outcome map matches; by default the last outcome.",
         {"type": "string"},
     ),
     MachineKey(
         "outcome_map",
         "a mapping {outcome: {label: outcome of that state}}",
-        "Which outcomes of the states, together, give which outcome of the machine.",
+        "Outcome of the machine for each combination of the states' outcomes.",
         or_reference({"type": "object", "additionalProperties": NAME_MAP}),
     ),
     MachineKey(
         "userdata",
         SHARED_USERDATA,
-        "Shares the userdata of the machine around; it has its own if left out.",
+        "Shares the parent machine's userdata; by default the machine has its own.",
         {"const": SHARED_USERDATA},
         at_root="",
     ),
     MachineKey(
         "input_keys",
         "a list of names",
-        "Userdata copied from the machine around when this one begins.",
+        "Userdata copied from the parent machine at the start.",
         or_reference(NAMES),
         at_root="",
     ),
     MachineKey(
         "output_keys",
         "a list of names",
-        "Userdata copied to the machine around when this one ends.",
+        "Userdata copied to the parent machine at the end.",
         or_reference(NAMES),
         at_root="",
     ),
     MachineKey(
         "remapping",
-        "a mapping {key in this machine: key in the machine around}",
-        "Other names for its input and output keys in the machine around.",
+        "a mapping {key in this machine: key in the parent machine}",
+        "Names of the input and output keys in the parent machine.",
         or_reference(NAME_MAP),
         at_root="",
     ),
     MachineKey(
         "anchors",
         "any value",
-        "Values to refer to by YAML anchors (&name, *name, <<: *name); not read otherwise.",
+        "Place for YAML anchors (&name, *name, <<: *name); ignored otherwise.",
         {},
         nested="",
     ),
     MachineKey(
         "external_names",
         "a mapping {kind of message: list of names}",
-        "Messages that other nodes put into the "
+        "Messages that other nodes store in the "
         "managers while the task runs: joint_state, trajectory, pose, robot_pose, plan, grasp.",
         {"type": "object", "additionalProperties": NAMES},
         nested="",
@@ -141,13 +140,13 @@ _KEYS = (
     MachineKey(
         "params",
         "a mapping {key: any value}",
-        "Values that everything below may use as params.<key>.",
+        "Values for use as params.<key> anywhere inside the machine.",
         {"type": "object"},
     ),
     MachineKey(
         "states",
         "a list of '- Label: {source: ...}'",
-        "The states and nested machines; the first one begins, in a concurrent machine all at once.",
+        "States and nested machines. The first runs first; in a concurrent machine all run at once.",
         {"$ref": "#/definitions/states"},
         "required",
         "required",
@@ -156,21 +155,21 @@ _KEYS = (
 
 
 def machine_keys(template: TemplateSource) -> list[MachineKey]:
-    """Returns the keys of machines with a template, in the order they are usually written."""
+    """Returns the header keys of machines with a template, in their usual order."""
     absent = {"initial_state"} if template.concurrent else {"default_outcome", "outcome_map"}
     absent |= set() if template.takes_keys else {"input_keys", "output_keys"}
     own = [
-        MachineKey(name, "any value", f"Of this template, which reads it as options.{name}.", {})
+        MachineKey(name, "any value", f"Option of this template, available in the template as options.{name}.", {})
         for name in sorted(template.options)
     ]
     return [*(key for key in _KEYS if key.name not in absent), *own]
 
 
 def required_keys(*, is_root: bool) -> list[MachineKey]:
-    """Returns the keys that no machine can do without."""
+    """Returns the required keys."""
     return [key for key in _KEYS if (key.at_root if is_root else key.nested) == "required"]
 
 
 def root_keys() -> list[str]:
-    """Returns the names of the keys a task may have, whatever its template."""
+    """Returns the names of all keys that a task's header may have with any template."""
     return [key.name for key in _KEYS if key.at_root]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks what the options of states stand for: names that must exist, and userdata the states must declare."""
+"""Checks the names and userdata keys that the options of states refer to."""
 
 from __future__ import annotations
 
@@ -24,48 +24,54 @@ from modular_framework_core.task_constructor.task_spec import MachineSpec, State
 from modular_framework_core.task_constructor.userdata_checks import declared_keys
 
 _PLURALS = {"trajectory": "trajectories"}
-_WORDS = {"posture": "posture", "group": "planning group", "planner": "planner"}
+_NON_MESSAGE_KINDS = {"posture": "posture", "group": "planning group", "planner": "planner"}
 
 
 def check_uses(root: MachineSpec, known: KnownNames, faults: FaultList, *, complete: bool) -> None:
     """Checks the options of all states of a task.
 
     Args:
-        root: The outermost machine.
-        known: The names there are beside those that states of the task make.
-        faults: Where faults are noted.
-        complete: Whether all states of the task could be read, so that no other makes a plan.
+        root: Outermost machine.
+        known: Known names, without the names that the task's states store.
+        faults: Receives the faults.
+        complete: Whether all states were readable. Otherwise unknown plan names are not reported, because an unreadable
+            state may store them.
     """
     states = list(root.leaf_states())
-    maybe_made = frozenset(_unexplained(states))
-    names = known.with_names(_made(states))
-    open_kinds = {kind for kind in names.names if any(_may_make(state, kind) for state in states)}
-    open_kinds |= set() if complete else {"plan"}
+    possibly_stored = frozenset(_undeclared_texts(states))
+    names = known.with_names(_stored_names(states))
+    unchecked_kinds = {kind for kind in names.names if any(_may_store(state, kind) for state in states)}
+    unchecked_kinds |= set() if complete else {"plan"}
     for state in states:
-        _Checker(state, names, open_kinds, maybe_made, faults).check()
+        _Checker(state, names, unchecked_kinds, possibly_stored, faults).check()
 
 
 class _Checker:
     """Checks the options of one state."""
 
     def __init__(
-        self, state: StateSpec, known: KnownNames, open_kinds: set[str], maybe_made: frozenset[str], faults: FaultList
+        self,
+        state: StateSpec,
+        known: KnownNames,
+        unchecked_kinds: set[str],
+        possibly_stored: frozenset[str],
+        faults: FaultList,
     ) -> None:
         self._state = state
         self._known = known
-        self._open = open_kinds
-        self._maybe_made = maybe_made
+        self._unchecked_kinds = unchecked_kinds
+        self._possibly_stored = possibly_stored
         self._faults = faults
         self._inputs = _declared(state, ("input_keys", "io_keys"))
         self._outputs = _declared(state, ("output_keys", "io_keys"))
 
     def check(self) -> None:
-        """Notes everything that is wrong."""
+        """Adds all faults of the state."""
         source = self._state.source
         for option in source.options.values():
             node = self._state.nodes.get(option.name)
             if node is not None and complaint(option.type, node):
-                continue  # noted already: other faults would only follow from it
+                continue  # already reported; further faults would only be consequences
             value = option.default if node is None else node.plain()
             for use in option.uses:
                 self._check_use(use, option.name, value, node)
@@ -106,48 +112,48 @@ class _Checker:
                     self._need("input", keys[-1], f"option '{option}' 'userdata'", item.location)
                 continue
             names = self._known.names.get(kind)
-            made = name in self._maybe_made and kind not in _WORDS
-            if names is not None and kind not in self._open and name not in names and not made:
+            may_be_stored = name in self._possibly_stored and kind not in _NON_MESSAGE_KINDS
+            if names is not None and kind not in self._unchecked_kinds and name not in names and not may_be_stored:
                 self._faults.add(item.location, self._unknown(option, kind, name, names))
 
     def _unknown(self, option: str, kind: str, name: str, names: frozenset[str]) -> str:
-        word = _WORDS.get(kind, kind.replace("_", " "))
+        word = _NON_MESSAGE_KINDS.get(kind, kind.replace("_", " "))
         text = (
             f"state '{self._state.label}' ({self._state.source.name}): option '{option}': the {word} '{name}' is "
             f"unknown; {listing(sorted(names), 'there is none')}"
         )
         origin = self._known.origins.get(kind, "" if kind == "planner" else "the manager's file")
-        meant = nearest(name, sorted(names))
-        if kind in _WORDS:
+        hint = nearest(name, sorted(names))
+        if kind in _NON_MESSAGE_KINDS:
             return (
-                f"{text}; name one of these{meant}"
+                f"{text}; name one of these{hint}"
                 if not origin
-                else f"{text}; name one of these, or add it to {origin}{meant}"
+                else f"{text}; name one of these, or add it to {origin}{hint}"
             )
-        maker = "let a state make it (plan_name)" if kind == "plan" else f"add it to {origin}"
-        return f"{text}; {maker}, or name it in external_names of the task where another node adds it{meant}"
+        remedy = "store it with a state (plan_name)" if kind == "plan" else f"add it to {origin}"
+        return f"{text}; {remedy}, or name it in external_names of the task if another node adds it{hint}"
 
     def _kind_word(self, kind: str) -> str:
         if not kind.startswith("option:"):
             return kind
         return str(self._state.options.get(kind.removeprefix("option:"), ""))
 
-    def _need(self, direction: str, key: str, what: str, location: SourceLocation, listed: str = "") -> None:
+    def _need(self, direction: str, key: str, what: str, location: SourceLocation, key_list: str = "") -> None:
         declared = self._inputs if direction == "input" else self._outputs
         if declared is None or key in declared:
             return
-        does, listed = "takes" if direction == "input" else "writes", listed or f"{direction}_keys"
+        verb, key_list = "takes" if direction == "input" else "writes", key_list or f"{direction}_keys"
         source = self._state.source
-        where = f"{listed} in {source.file.name}" if listed in source.own_keys else listed
+        place = f"{key_list} in {source.file.name}" if key_list in source.own_keys else key_list
         self._faults.add(
             location,
-            f"state '{self._state.label}' ({source.name}): {what} {does} the userdata key "
+            f"state '{self._state.label}' ({source.name}): {what} {verb} the userdata key "
             f"'{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
-            f"add it to {where}",
+            f"add it to {place}",
         )
 
     def _check_reads(self) -> None:
-        """Notes keys that the source reads and the task's own lists of keys leave out."""
+        """Adds a fault for each key that the source reads but the task's key lists omit."""
         source, inputs = self._state.source, self._inputs
         if inputs is None:
             return
@@ -160,38 +166,38 @@ class _Checker:
         for key in sorted((by_default & source.userdata.anywhere) | source.userdata.always):
             if key in inputs:
                 continue
-            listed = "io_keys" if key in (source.default_names("io_keys") or ()) else "input_keys"
-            location = self._state.nodes[listed].location if listed in self._state.nodes else self._state.location
-            self._need("input", key, source.file.name, location, listed)
+            key_list = "io_keys" if key in (source.default_names("io_keys") or ()) else "input_keys"
+            location = self._state.nodes[key_list].location if key_list in self._state.nodes else self._state.location
+            self._need("input", key, source.file.name, location, key_list)
 
 
 def _declared(state: StateSpec, lists: tuple[str, ...]) -> frozenset[str] | None:
-    """Returns the keys of some lists together; None where one of them is not known."""
-    found = [declared_keys(state, name) for name in lists]
-    return None if None in found else frozenset(key for keys in found for key in keys or ())
+    """Returns the union of some key lists of a state; None if one of them is unknown."""
+    declared = [declared_keys(state, name) for name in lists]
+    return None if None in declared else frozenset(key for keys in declared for key in keys or ())
 
 
 def _references(node: Node) -> Iterator[tuple[SourceLocation, str]]:
-    """Yields the references to userdata in the fields of a message, with their locations."""
+    """Yields location and text of each userdata reference in the fields of a message."""
     return ((location, text) for location, text in _texts(node) if text.startswith(USERDATA_PREFIX))
 
 
-def _made(states: list[StateSpec]) -> dict[str, frozenset[str]]:
-    """Returns the names that states of the task store messages under: kind -> names."""
-    found: dict[str, set[str]] = {}
+def _stored_names(states: list[StateSpec]) -> dict[str, frozenset[str]]:
+    """Returns the names under which the task's states store messages, kind -> names."""
+    stored: dict[str, set[str]] = {}
     for state in states:
         for option in state.source.options.values():
             for use in option.uses:
                 if isinstance(use, Named) and use.made:
                     name = state.options.get(option.name, option.default)
-                    found.setdefault(use.kind, set()).update([name] if isinstance(name, str) else [])
-    return {kind: frozenset(names - {""}) for kind, names in found.items()}
+                    stored.setdefault(use.kind, set()).update([name] if isinstance(name, str) else [])
+    return {kind: frozenset(names - {""}) for kind, names in stored.items()}
 
 
-def _unexplained(states: list[StateSpec]) -> Iterator[str]:
-    """Yields the texts in options whose annotations do not declare the name of a message to be read.
+def _undeclared_texts(states: list[StateSpec]) -> Iterator[str]:
+    """Yields the texts in options whose annotations declare no name.
 
-    A state with such an option may store a message under that name: a state of the user's, or a service called with it.
+    A state may store a message under such a text: a user's own state, or a state that calls a service with the text.
     """
     for state in states:
         for name, node in state.nodes.items():
@@ -201,7 +207,7 @@ def _unexplained(states: list[StateSpec]) -> Iterator[str]:
 
 
 def _texts(node: Node) -> Iterator[tuple[SourceLocation, str]]:
-    """Yields all texts in a value, with their locations."""
+    """Yields location and text of all texts in a value."""
     match node:
         case Scalar(value=str(text)):
             yield node.location, text
@@ -213,21 +219,21 @@ def _texts(node: Node) -> Iterator[tuple[SourceLocation, str]]:
                 yield from _texts(item)
 
 
-def _may_make(state: StateSpec, kind: str) -> bool:
-    """Returns whether a state may store messages of a kind under names that the task does not show.
+def _may_store(state: StateSpec, kind: str) -> bool:
+    """Returns whether a state may store messages of a kind under names that the task does not contain.
 
-    It may if it loads files of messages, if it calls a service of the kind's manager by its name, or if its source
-    names such a service and it has no option for the name.
+    This holds if the state loads message files, if an option names a storing service of the kind's manager, or if the
+    source names such a service and no option declares the stored name.
     """
     plural = _PLURALS.get(kind, f"{kind}s")
     if state.source.name == "load" and state.options.get("kind") == kind:
         return True
     services = (f"add_{kind}", f"load_{plural}", f"reload_{plural}", f"store_{kind}(")
-    words = [str(value) for value in state.options.values() if isinstance(value, str)]
+    option_texts = [str(value) for value in state.options.values() if isinstance(value, str)]
     declares_names = any(
         isinstance(use, Named) and use.made and use.kind == kind
         for option in state.source.options.values()
         for use in option.uses
     )
-    texts = words if declares_names else [*words, state.source.text]
+    texts = option_texts if declares_names else [*option_texts, state.source.text]
     return any(service in text for service in services for text in texts)

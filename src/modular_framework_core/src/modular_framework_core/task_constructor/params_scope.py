@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``params``: values written once in the header of a machine (or in a state) and used as ``params.<key>`` below it.
+"""Resolves ``params``: values defined once in a machine's header or a state and referenced as ``params.<key>``.
 
-The params of a machine are seen by everything inside it, at any depth. A ``params`` further inside hides the outer
-one key by key. A reference is a text that is exactly ``params.<key>``; it may stand wherever a value may: as an
-option, in a list, in a mapping, in the header of a nested machine.
+The params of a machine are visible at any depth inside the machine; an inner ``params`` overrides outer keys one by
+one. A reference is a text that is exactly ``params.<key>``. A reference may replace any value: an option, an item of a
+list or mapping, or a header field of a nested machine.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from modular_framework_core.files.faults import FaultList, SourceLocation, listi
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
 PREFIX = "params."
-MISSPELT = 0.75
-"""A text counts as a misspelt reference when what is before its point is this similar to ``params`` (0 to 1)."""
+MIN_SIMILARITY = 0.75
+"""Minimum similarity of a misspelt prefix to ``params``, 0 to 1."""
 
 
 class ParamsScope:
-    """The params that are visible at one location of a task."""
+    """Params visible at one location of a task."""
 
     def __init__(self, visible: dict[str, Node] | None = None) -> None:
         self._visible = dict(visible or {})
         self.used: set[str] = set()
 
     def inner(self, params: Mapping | None, faults: FaultList) -> ParamsScope:
-        """Returns the scope inside a machine or state that declares ``params``; its values may refer to outer ones."""
+        """Returns the scope inside a machine or state. The values of its ``params`` may refer to outer params."""
         own = {} if params is None else {key: self.resolve(value, faults) for key, value in params.entries.items()}
         return ParamsScope({**self._visible, **own})
 
     def resolve(self, node: Node, faults: FaultList) -> Node:
-        """Replaces every reference in a value; a reference to nothing is noted as a fault and left as it is."""
+        """Replaces every reference in a value. An unknown key adds a fault, and its reference stays unchanged."""
         match node:
             case Mapping():
                 entries = {key: self.resolve(value, faults) for key, value in node.entries.items()}
@@ -46,13 +46,13 @@ class ParamsScope:
 
     def _note_misspelt(self, location: SourceLocation, text: str, faults: FaultList) -> None:
         word, _, key = text.partition(".")
-        if key in self._visible and difflib.SequenceMatcher(None, f"{word.lower()}.", PREFIX).ratio() > MISSPELT:
+        if key in self._visible and difflib.SequenceMatcher(None, f"{word.lower()}.", PREFIX).ratio() > MIN_SIMILARITY:
             faults.add_cause(location, f"'{text}' would be taken as text; did you mean '{PREFIX}{key}'?")
             self.used.add(key)
 
     def _look_up(self, node: Scalar, key: str, faults: FaultList) -> Node:
-        found = self._visible.get(key)
-        if found is None:
+        value = self._visible.get(key)
+        if value is None:
             faults.add_cause(
                 node.location,
                 f"'{PREFIX}{key}' refers to nothing: no params around it has the key '{key}'; "
@@ -60,22 +60,22 @@ class ParamsScope:
             )
             return node
         self.used.add(key)
-        return _moved(found, node)
+        return _moved(value, node)
 
 
-def _moved(found: Node, reference: Node) -> Node:
-    """Returns a value with the location of the reference to it, where a user looks for a mistake."""
-    match found:
+def _moved(value: Node, reference: Node) -> Node:
+    """Returns a value relocated to its reference, where users look for a mistake."""
+    match value:
         case Scalar():
-            return Scalar(found.value, reference.location)
+            return Scalar(value.value, reference.location)
         case Sequence():
-            return Sequence(found.items, reference.location)
+            return Sequence(value.items, reference.location)
         case Mapping():
-            return Mapping(found.entries, found.keys, reference.location)
+            return Mapping(value.entries, value.keys, reference.location)
 
 
 def params_of(node: Node | None, faults: FaultList) -> Mapping | None:
-    """Returns a ``params`` value when it is a mapping; notes a fault when it is something else."""
+    """Returns the ``params`` mapping, or None. A value of another type adds a fault."""
     if node is None or isinstance(node, Mapping):
         return node
     faults.add(node.location, f"params must be a mapping such as {{outcomes: [success, fail]}}, found {kind_of(node)}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The task constructor as one function, and its command line."""
+"""The task constructor as a function and as the command ``state_machine_generator``."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ def check_task(
     templates_directories: Sequence[Path],
     known: KnownNames | None = None,
 ) -> TaskSpec:
-    """Reads and checks a task; nothing is run or written.
+    """Reads and checks a task without running or writing anything.
 
     Args:
-        script: The task.
-        states_directories: Where its states are, in order.
-        templates_directories: Where its templates are, in order.
-        known: Names of messages and postures there are, as far as that is known.
+        script: Path of the task's YAML file.
+        states_directories: Directories with states, in search order.
+        templates_directories: Directories with templates, in search order.
+        known: Known names of messages, postures and planning groups.
 
     Raises:
-        TaskFault: Something is wrong with the task; carries all faults.
-        FileNotFoundError: One of the directories is not there.
+        TaskFault: The task has faults; the exception carries all of them.
+        FileNotFoundError: A directory does not exist.
     """
     return load_task(script, StateCatalogue(states_directories), TemplateCatalogue(templates_directories), known)
 
@@ -52,14 +52,23 @@ def construct_task(
     known: KnownNames | None = None,
     file_name: str = "",
 ) -> tuple[TaskSpec, Path]:
-    """Checks a task and writes its module into the directory ``output``; returns the task and the path of the module.
+    """Checks a task and generates its module, unless the existing module is up to date.
 
-    A module that is there already is kept when nothing it was made from has changed. The file has the task's name, or
-    ``file_name``.
+    Args:
+        script: Path of the task's YAML file.
+        states_directories: Directories with states, in search order.
+        templates_directories: Directories with templates, in search order.
+        output: Directory of the module.
+        known: Known names of messages, postures and planning groups.
+        file_name: File name with or without .py; "" for the task's name.
+
+    Returns:
+        The checked task and the path of the module.
 
     Raises:
-        TaskFault, FileNotFoundError: As ``check_task``.
-        GenerationError: A template is at fault.
+        TaskFault: The task has faults; the exception carries all of them.
+        FileNotFoundError: A directory does not exist.
+        GenerationError: A template cannot be rendered, or the generated module does not compile.
     """
     task = check_task(script, states_directories, templates_directories, known)
     digest = generator.digest_line(task, templates_directories)
@@ -70,7 +79,7 @@ def construct_task(
 
 
 def directories_from(text: str) -> list[Path]:
-    """Splits a setting that names one or several directories, separated by ``:`` as in PATH."""
+    """Returns the directories in a text that separates them by ``:`` as in PATH."""
     return [Path(part).expanduser() for part in text.split(":") if part.strip()]
 
 
@@ -78,12 +87,15 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the command ``state_machine_generator``.
 
     Returns:
-        0 when what was asked for was done; 1 when the task (or what it needs) is at fault; 2 for a wrong command.
+        Exit code: 0 for success, 1 for a fault in the task or its inputs, 2 for a wrong command line.
     """
     parser = _parser()
     given = parser.parse_args([argument for argument in arguments if ":=" not in argument])
     if (given.explain or given.schema) and given.script is not None and str(given.script) != ".":
-        given.states, given.templates = directories_from(str(given.script)), given.states  # there is no script
+        given.states, given.templates = (
+            directories_from(str(given.script)),
+            given.states,
+        )  # without a script, the positional arguments move up
     if given.script is None and not given.explain and not given.schema:
         parser.error("the script is missing; only --explain and --schema work without one")
     try:
@@ -109,15 +121,15 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def no_states_in(folder: Path) -> str:
-    """Says that a folder of states has none."""
+    """Returns the warning for a states directory without states."""
     return (
-        f"states directory {folder} has no state: no .py file but those that begin with '_'; name the folder that "
-        "has your states, or leave it out (the framework's own states are found without it)"
+        f"states directory {folder} has no state: no .py file except those that begin with '_'; name the folder with "
+        "your states, or omit it (the framework's own states are always available)"
     )
 
 
 class UnknownNameError(Exception):
-    """There is no state or template of that name; says which there are."""
+    """No state or template has the requested name."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -126,9 +138,9 @@ def _parser() -> argparse.ArgumentParser:
         description="Checks a task constructor script and writes the state machine it describes.",
     )
     parser.add_argument("script", type=Path, nargs="?", help="the task, a YAML file")
-    several = "several are separated by ':'; the framework's own are found after them"
-    parser.add_argument("states", type=directories_from, nargs="?", help=f"directory of the states; {several}")
-    parser.add_argument("templates", type=directories_from, nargs="?", help=f"directory of the templates; {several}")
+    search_path = "separate several directories by ':'; the framework's own directory is searched last"
+    parser.add_argument("states", type=directories_from, nargs="?", help=f"states directory; {search_path}")
+    parser.add_argument("templates", type=directories_from, nargs="?", help=f"templates directory; {search_path}")
     parser.add_argument("output", type=Path, nargs="?", help="directory to write to (default: in $ROS_HOME)")
     parser.add_argument("--check", action="store_true", help="only check; write nothing")
     formats = ", ".join(f".{name}" for name in FORMATS)
@@ -137,21 +149,21 @@ def _parser() -> argparse.ArgumentParser:
         "--config",
         type=Path,
         metavar="FOLDER",
-        help="folder whose named_*.yaml have the names a task may use (default: the API package's)",
+        help="folder with the named_*.yaml files of the task's messages (default: the API package's folder)",
     )
     parser.add_argument(
         "--moveit-config",
         metavar="PACKAGE",
         default="",
-        help="MoveIt configuration package of the robot (default: the API package's launch file's)",
+        help="MoveIt configuration package of the robot (default: from the API package's launch file)",
     )
-    parser.add_argument("--explain", metavar="NAME", help="say what a state or template does and takes")
+    parser.add_argument("--explain", metavar="NAME", help="describe a state or template and its options")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of tasks, for editors")
     return parser
 
 
 def _checked(given: argparse.Namespace, task: TaskSpec) -> str:
-    """Draws a checked task where asked to; returns the message."""
+    """Draws a checked task if requested, and returns the message to print."""
     if given.graph:
         task_graph.write(task, given.graph)
         return str(given.graph)
@@ -165,7 +177,7 @@ def _about_language(given: argparse.Namespace, states: StateCatalogue, templates
     state, template = states.resolve(given.explain), templates.get(given.explain)
     if state is None and template is None:
         raise UnknownNameError(
-            f"'{given.explain}' is no state and no template; states: {', '.join(states.names())}; templates: "
+            f"'{given.explain}' is neither a state nor a template; states: {', '.join(states.names())}; templates: "
             f"{', '.join(templates.names())}{nearest(given.explain, [*states.names(), *templates.names()])}"
         )
     pages = [] if state is None else [explain(states.get(state))]

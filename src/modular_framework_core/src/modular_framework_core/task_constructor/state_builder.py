@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks one state of a task: its source, its options, its outcomes."""
+"""Builds the states of a task and checks their sources, options and outcomes."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
 from modular_framework_core.state_api.option_types import complaint
 from modular_framework_core.task_constructor import header_fields
-from modular_framework_core.task_constructor.key_spelling import meant_key, spelt_as_meant, value_of
+from modular_framework_core.task_constructor.key_spelling import corrected_keys, intended_key, value_of
 from modular_framework_core.task_constructor.params_scope import ParamsScope
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue, StateSource, StateSourceError
 from modular_framework_core.task_constructor.task_spec import StateSpec
 
 _RESERVED = ("source", "transitions", "remapping", "params")
-"""Keys of a state that are not options of it."""
+"""Keys of a state that are not options."""
 
 
 def _is_argument(key: str) -> bool:
-    """Returns whether the generated module can pass an option to the constructor of a state."""
+    """Returns whether a key can be passed to a constructor as a keyword argument."""
     return key.isidentifier() and not keyword.iskeyword(key) and key != "self"
 
 
 class StateBuilder:
-    """Builds the states of one task; notes what is wrong with them in the list of faults of the task."""
+    """Builds the states of one task and collects their faults."""
 
     def __init__(self, states: StateCatalogue, faults: FaultList) -> None:
-        """Uses these states."""
+        """Stores the catalogue and the fault list."""
         self._states = states
         self._faults = faults
         self._imports_checked: set[str] = set()
 
-    def spelt(self, label: str, body: Mapping) -> Mapping:
-        """Returns the fields of a state with known keys only; notes the unknown ones, and a source that is missing."""
+    def with_known_keys(self, label: str, body: Mapping) -> Mapping:
+        """Returns the fields of a state with known keys only. Unknown keys and a missing source add faults."""
         source = self._source_without_faults(value_of(body, "source"))
-        if source is None:  # its options are not known
-            given = [key for key in body.entries if key == "source" or meant_key(key, ["source"]) is None]
-            body = spelt_as_meant(body, [*_RESERVED, *given], f"state '{label}': key", self._faults)
+        if source is None:  # unknown options
+            given = [key for key in body.entries if key == "source" or intended_key(key, ["source"]) is None]
+            body = corrected_keys(body, [*_RESERVED, *given], f"state '{label}': key", self._faults)
         else:
             free = [key for key in body.entries if source.takes_any_option and _is_argument(key)]
             what = f"state '{label}' ({source.name}): key"
-            body = spelt_as_meant(body, [*_RESERVED, *source.options, *free], what, self._faults)
+            body = corrected_keys(body, [*_RESERVED, *source.options, *free], what, self._faults)
         if "source" not in body.entries:
             self._faults.add(
                 body.location, f"state '{label}' has no 'source'; add it: the name of a state's file, or of a template"
@@ -51,7 +51,7 @@ class StateBuilder:
         return body
 
     def _source_without_faults(self, node: Node | None) -> StateSource | None:
-        """Returns the state a source names; None, without a fault, when it cannot be used."""
+        """Returns the state that ``source`` names, or None, without a fault, if the state is unusable."""
         name = self._states.resolve(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
         try:
             return None if name is None else self._states.get(name)
@@ -61,16 +61,16 @@ class StateBuilder:
     def build(
         self, label: str, location: SourceLocation, body: Mapping, scope: ParamsScope
     ) -> tuple[StateSpec | None, tuple[str, ...] | None]:
-        """Checks a state.
+        """Builds and checks a state.
 
         Args:
-            label: Its name.
-            location: Where it is defined.
-            body: Its fields, references resolved.
-            scope: The params it sees, its own included.
+            label: Name of the state.
+            location: Position of the definition.
+            body: Fields with references resolved.
+            scope: Visible params, including the state's own.
 
         Returns:
-            The state, None when its source cannot be used; and its outcomes, None when they are not known.
+            The state, or None if its source is unusable, and its outcomes, or None if unknown.
         """
         source = self._state_source(body, label)
         if source is None:
@@ -78,7 +78,7 @@ class StateBuilder:
         given = {key: value for key, value in body.entries.items() if key not in _RESERVED}
         options = {**self._options_from_params(label, body, scope, source), **given}
         what = f"state '{label}' ({source.name}): option"
-        before = len(self._faults)
+        faults_before = len(self._faults)
         self._check_imports(label, body, source)
         for option in source.options.values():
             if option.required and option.name not in options:
@@ -87,7 +87,7 @@ class StateBuilder:
                 wrong = complaint(option.type, options[option.name])
                 if wrong is not None:
                     self._faults.add(wrong[0].location, f"{what} '{option.name}' {wrong[1]}")
-        self._faults.harmless += len(self._faults) - before
+        self._faults.harmless += len(self._faults) - faults_before
         for key in STATE_KEYS:
             if key in options:
                 may_be_empty = key != "outcomes"
@@ -116,7 +116,7 @@ class StateBuilder:
         )
 
     def _check_imports(self, label: str, body: Mapping, source: StateSource) -> None:
-        """Notes imports of a state that Python does not find, at the first state that is made of it."""
+        """Adds a fault for each unresolved import of a source, once per source."""
         if source.name not in self._imports_checked:
             self._imports_checked.add(source.name)
             for missing in source.missing_imports:
@@ -127,12 +127,12 @@ class StateBuilder:
         name = None if node is None else header_fields.text(node, f"state '{label}': source", self._faults)
         if node is None or name is None:
             return None
-        found = self._states.resolve(name)
-        if found is None:
+        catalogue_name = self._states.resolve(name)
+        if catalogue_name is None:
             self._faults.add_unknown(node.location, f"state '{label}': source", name, self._states.names())
             return None
         try:
-            return self._states.get(found)
+            return self._states.get(catalogue_name)
         except StateSourceError as error:
             self._faults.add(node.location, f"state '{label}': {error}")
             return None
@@ -140,7 +140,7 @@ class StateBuilder:
     def _options_from_params(
         self, label: str, body: Mapping, scope: ParamsScope, source: StateSource
     ) -> dict[str, Node]:
-        """Returns the values of a state's own params that are options of it; notes those that are of no use."""
+        """Returns the options given in a state's own params. Params that nothing uses add faults."""
         params = body.entries.get("params")
         if not isinstance(params, Mapping):
             return {}
@@ -160,12 +160,12 @@ class StateBuilder:
 
 
 def plain_remapping(body: Mapping) -> dict[str, str]:
-    """Returns the remapping of a state or nested machine: its key -> key around it; none when it cannot be read."""
+    """Returns the remapping of a child, own key -> key of the parent machine; empty if unreadable."""
     return _plain_names(body.entries.get("remapping"))
 
 
 def plain_transitions(body: Mapping) -> dict[str, str]:
-    """Returns the transitions of a state or nested machine as outcome -> target; none when they cannot be read."""
+    """Returns the transitions of a child, outcome -> target; empty if unreadable."""
     return _plain_names(body.entries.get("transitions"))
 
 

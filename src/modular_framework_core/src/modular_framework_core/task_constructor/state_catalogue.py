@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the states a task may use and reads their options from their source, without running any of it."""
+"""Finds the available states and reads their options from the source, without running the source."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class StateOption:
     """An option of a state: a keyword argument of its constructor.
 
     Attributes:
-        name: Spelling, the same in the task script.
-        required: Whether it has no default.
-        default: The default when it is written as a literal, else None.
+        name: Name of the argument and of the option in the task script.
+        required: Whether the option has no default.
+        default: Default written as a literal, else None.
         default_known: Whether ``default`` is the real default.
-        type: What values it takes, as far as its annotation says.
-        uses: What it names, and what userdata it needs, as far as its annotation says.
+        type: Allowed values according to the annotation.
+        uses: Names and userdata keys that the option refers to, according to the annotation.
     """
 
     name: str
@@ -44,20 +44,20 @@ class StateOption:
 
 @dataclass(frozen=True, slots=True)
 class StateSource:
-    """A state class that was found in a file.
+    """A state class and its source file.
 
     Attributes:
-        name: Name of the file without ``.py``: what ``source`` says in a task.
+        name: File name without ``.py``, the ``source`` of the state in a task.
         file: Absolute path.
         class_name: Name of the class.
-        options: What its constructor takes, by name.
-        takes_any_option: Whether its constructor takes further keyword arguments (or is not known).
-        is_framework_state: Whether it is derived from ``FrameworkState``, which needs two outcomes at least.
+        options: Constructor arguments by name.
+        takes_any_option: Whether the constructor takes further keyword arguments or is unknown.
+        is_framework_state: Whether the class derives from ``FrameworkState``, which needs at least two outcomes.
         doc: Docstring of the class.
-        missing_imports: What the file imports that Python does not find, a message each.
-        userdata: What the class reads of userdata.
-        text: The source, for checks that search it for a word.
-        own_keys: Outcomes and userdata keys that the constructor declares itself; None where they cannot be known.
+        missing_imports: One message per import that Python cannot resolve.
+        userdata: Userdata keys that the class reads.
+        text: Source text, for checks that search for a word.
+        own_keys: Outcomes and userdata keys that the constructor declares itself; None for unknown values.
     """
 
     name: str
@@ -73,7 +73,7 @@ class StateSource:
     own_keys: dict[str, tuple[str, ...] | None] = field(default_factory=dict)
 
     def default_names(self, key: str) -> tuple[str, ...] | None:
-        """Returns the default of ``outcomes`` or of a list of userdata keys; None when it cannot be known."""
+        """Returns the default of ``outcomes`` or of a list of userdata keys; None if unknown."""
         if key in self.own_keys:
             return self.own_keys[key]
         option = self.options.get(key)
@@ -87,24 +87,24 @@ class StateSource:
 
 
 def class_name_of(source_name: str) -> str:
-    """Returns the class name that belongs to a file name: ``wait_for_signal`` -> ``WaitForSignal``."""
+    """Returns the class name for a file name: ``wait_for_signal`` -> ``WaitForSignal``."""
     return "".join(word.capitalize() for word in source_name.split("_"))
 
 
 class StateCatalogue:
-    """The states in one or several directories; a name found twice is taken from the first directory that has it."""
+    """The states in one or more directories. If a name occurs twice, the first directory takes precedence."""
 
     def __init__(self, directories: Iterable[Path]) -> None:
         """Lists the directories.
 
         Args:
-            directories: Where to look, in order.
+            directories: Directories in search order.
 
         Raises:
-            FileNotFoundError: A directory is not there.
+            FileNotFoundError: A directory does not exist.
         """
         self.empty_directories: list[Path] = []
-        """Directories in which there is no state."""
+        """Directories without states."""
         self._files: dict[str, Path] = {}
         self._read: dict[str, StateSource | StateSourceError] = {}
         for directory in directories:
@@ -117,21 +117,21 @@ class StateCatalogue:
                 self._files.setdefault(file.stem, file.resolve())
 
     def names(self) -> list[str]:
-        """Returns the names ``source`` may have, sorted."""
+        """Returns the names of all states, sorted."""
         return sorted(self._files)
 
     def resolve(self, name: str) -> str | None:
-        """Returns the catalogue's spelling of a name: itself, or without the prefix ``state_``; None if unknown."""
+        """Returns a state's name without the optional prefix ``state_``, or None if the state is unknown."""
         if name in self._files:
             return name
-        short = name.removeprefix("state_")
-        return short if short in self._files else None
+        base_name = name.removeprefix("state_")
+        return base_name if base_name in self._files else None
 
     def get(self, name: str) -> StateSource:
-        """Reads a state.
+        """Returns a state, which is read on first use.
 
         Args:
-            name: A name out of ``names()``.
+            name: Name from ``names()``.
 
         Raises:
             StateSourceError: The file does not define a usable state class.
@@ -141,32 +141,37 @@ class StateCatalogue:
                 self._read[name] = _read_state(name, self._files[name])
             except StateSourceError as error:
                 self._read[name] = error
-        found = self._read[name]
-        if isinstance(found, StateSourceError):
-            raise found
-        return found
+        result = self._read[name]
+        if isinstance(result, StateSourceError):
+            raise result
+        return result
 
 
 def _read_state(name: str, file: Path) -> StateSource:
     module = SourceModule(file)
-    wanted = class_name_of(name)
-    if wanted not in module.classes:
+    class_name = class_name_of(name)
+    if class_name not in module.classes:
         raise StateSourceError(
-            f"{file} must define the class {wanted} (the file name in camel case); it defines: "
+            f"{file} must define the class {class_name} (the file name in camel case); it defines: "
             f"{', '.join(module.classes) or 'no class'}"
         )
-    state = SourceClass(module.classes[wanted], module)
+    state = SourceClass(module.classes[class_name], module)
     options, takes_any = _constructor_options(state)
-    is_ours = state.is_framework_state
-    if is_ours and "io_keys" in options and options["io_keys"].default_known and options["io_keys"].default is None:
+    is_framework_state = state.is_framework_state
+    if (
+        is_framework_state
+        and "io_keys" in options
+        and options["io_keys"].default_known
+        and options["io_keys"].default is None
+    ):
         options["io_keys"] = _default_io_keys(state)
     return StateSource(
         name,
         file,
-        wanted,
+        class_name,
         options,
         takes_any,
-        is_ours,
+        is_framework_state,
         state.doc,
         missing_imports(module.tree, file),
         reads_of(state.node),
@@ -176,7 +181,7 @@ def _read_state(name: str, file: Path) -> StateSource:
 
 
 def _constructor_options(state: SourceClass) -> tuple[dict[str, StateOption], bool]:
-    """Returns the options of a class and whether it takes others: its own constructor's, or that of its base."""
+    """Returns the options of a class's own or inherited constructor, and whether it takes further options."""
     if state.constructor is None:
         return _base_options(state)
     options, takes_any = _arguments(state.constructor.args, state.module.aliases)
@@ -187,7 +192,7 @@ def _constructor_options(state: SourceClass) -> tuple[dict[str, StateOption], bo
 
 
 def _base_options(state: SourceClass) -> tuple[dict[str, StateOption], bool]:
-    """Returns the options of the constructor of a class's base, and whether it takes others."""
+    """Returns the options of the base class's constructor, and whether it takes further options."""
     for name in state.base_names:
         base = state.base(name)
         if base is not None:
@@ -199,7 +204,7 @@ def _base_options(state: SourceClass) -> tuple[dict[str, StateOption], bool]:
 
 
 def _default_io_keys(state: SourceClass) -> StateOption:
-    """Returns the option ``io_keys`` with the ``DEFAULT_IO_KEYS`` of a class, or those of its base, as its default."""
+    """Returns the option ``io_keys`` with the class's own or inherited ``DEFAULT_IO_KEYS`` as the default."""
     for item in state.node.body:
         match item:
             case ast.Assign(targets=[ast.Name("DEFAULT_IO_KEYS")], value=value):
@@ -208,11 +213,11 @@ def _default_io_keys(state: SourceClass) -> StateOption:
 
 
 def _own_keys(state: SourceClass) -> dict[str, tuple[str, ...] | None]:
-    """Returns what the constructor of a class, or that of its base, declares by itself."""
+    """Returns the outcomes and userdata keys that a class's own or inherited constructor declares."""
     if state.constructor is None:
         return _own_keys(state.bases[0]) if state.bases else {}
-    of_smach = bool(state.base_names) and state.base_names[0] in BASE_DEFAULTS
-    return own_keys(state.constructor, of_smach, state.module.aliases)
+    has_smach_base = bool(state.base_names) and state.base_names[0] in BASE_DEFAULTS
+    return own_keys(state.constructor, has_smach_base, state.module.aliases)
 
 
 def _arguments(arguments: ast.arguments, aliases: dict[str, ast.expr]) -> tuple[dict[str, StateOption], bool]:

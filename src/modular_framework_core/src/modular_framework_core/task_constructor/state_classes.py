@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Classes of states and the bases they are derived from, read from their source without running any of it.
+"""Reads state classes and their base classes from the source, without running the source.
 
-A base may be in the file of the state, or in a module of the state's own package or of the framework that the file
-imports it from by name; other bases are not known.
+Known base classes are defined in the state's file, or imported by name from the state's own package or the framework.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ BASE_DEFAULTS: dict[str, tuple[str, ...]] = {
     "FrameworkState": ("success", "fail"),
     "State": (),
 }
-"""Default outcomes of the base classes a state may leave its constructor to."""
+"""Default outcomes of base classes whose constructor a state may inherit."""
 _ARGS = "\n\nArgs:\n"
 
 
@@ -27,18 +26,18 @@ class StateSourceError(Exception):
 
 
 class SourceModule:
-    """A Python file.
+    """A parsed Python file.
 
     Args:
-        file: The file.
+        file: Path of the file.
 
     Raises:
-        StateSourceError: It cannot be read as Python.
+        StateSourceError: The file cannot be read or is not valid Python.
 
     Attributes:
-        tree: What it says.
-        classes: The classes it defines, by name.
-        assignments: What its plain assignments assign, by name.
+        tree: Syntax tree.
+        classes: Classes defined in the file, by name.
+        assignments: Values of plain assignments, by name.
     """
 
     def __init__(self, file: Path) -> None:
@@ -56,78 +55,78 @@ class SourceModule:
 
     @functools.cached_property
     def aliases(self) -> dict[str, ast.expr]:
-        """Its plain assignments, and those that it imports by name: the names a type may have been given."""
+        """Plain assignments of the file and those imported by name, which may be type aliases."""
         imported = {
-            name: _module(source).assignments[there]
-            for name, (source, there) in self._imports.items()
-            if there in _module(source).assignments
+            name: _module(source).assignments[original_name]
+            for name, (source, original_name) in self._imports.items()
+            if original_name in _module(source).assignments
         }
         return imported | self.assignments
 
     def find(self, name: str) -> SourceClass | None:
-        """Returns a class that the file defines, or imports from where it is defined; None when it is not known."""
+        """Returns a class that the file defines or imports from its defining module; None if unknown."""
         if name in self.classes:
             return SourceClass(self.classes[name], self)
         if name not in self._imports or name in BASE_DEFAULTS:
             return None
-        source, there = self._imports[name]
+        source, original_name = self._imports[name]
         module = _module(source)
-        return SourceClass(module.classes[there], module) if there in module.classes else None
+        return SourceClass(module.classes[original_name], module) if original_name in module.classes else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SourceClass:
-    """A class and the module that defines it."""
+    """A class and its module."""
 
     node: ast.ClassDef
     module: SourceModule
 
     @property
     def base_names(self) -> list[str]:
-        """Names of its bases, without their modules."""
+        """Names of the base classes without their modules."""
         return [base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "") for base in self.node.bases]
 
     @property
     def bases(self) -> list[SourceClass]:
-        """Those of its bases that are known."""
+        """Known base classes."""
         return [base for base in map(self.base, self.base_names) if base is not None]
 
     def base(self, name: str) -> SourceClass | None:
-        """Returns its base of a name; None when that is not known."""
+        """Returns the base class of a name, or None if unknown."""
         return None if name == self.node.name else self.module.find(name)
 
     @property
     def constructor(self) -> ast.FunctionDef | None:
-        """Its own constructor."""
-        functions = (each for each in self.node.body if isinstance(each, ast.FunctionDef))
-        return next((each for each in functions if each.name == "__init__"), None)
+        """The class's own constructor, or None if inherited."""
+        functions = (item for item in self.node.body if isinstance(item, ast.FunctionDef))
+        return next((item for item in functions if item.name == "__init__"), None)
 
     @property
     def is_framework_state(self) -> bool:
-        """Whether it is derived from ``FrameworkState``."""
+        """Whether the class derives from ``FrameworkState``."""
         return "FrameworkState" in self.base_names or any(base.is_framework_state for base in self.bases)
 
     @property
     def doc(self) -> str:
-        """Its docstring; without a constructor of its own, with the arguments of its base's."""
-        own = ast.get_docstring(self.node) or ""
-        if self.constructor is not None or not self.bases or _ARGS in own:
-            return own
-        return own + "".join(self.bases[0].doc.partition(_ARGS)[1:])
+        """Docstring of the class. If the constructor is inherited, the base's Args section is appended."""
+        own_root = ast.get_docstring(self.node) or ""
+        if self.constructor is not None or not self.bases or _ARGS in own_root:
+            return own_root
+        return own_root + "".join(self.bases[0].doc.partition(_ARGS)[1:])
 
 
 def _imports(tree: ast.Module, file: Path) -> dict[str, tuple[Path, str]]:
-    """Returns, by name, the files of the own package or the framework that names are imported from, and those there."""
-    own = next(folder for folder in file.parents if not (folder / "__init__.py").is_file())
-    found: dict[str, tuple[Path, str]] = {}
+    """Returns the names imported from the file's own package or the framework, as name -> (file, original name)."""
+    own_root = next(folder for folder in file.parents if not (folder / "__init__.py").is_file())
+    imports: dict[str, tuple[Path, str]] = {}
     for node in tree.body:
         if not isinstance(node, ast.ImportFrom) or node.level or not node.module:
             continue
-        sources = [root.joinpath(*node.module.split(".")).with_suffix(".py") for root in (own, _FRAMEWORK)]
+        sources = [root.joinpath(*node.module.split(".")).with_suffix(".py") for root in (own_root, _FRAMEWORK)]
         source = next((source for source in sources if source.is_file()), None)
         if source is not None:
-            found |= {item.asname or item.name: (source, item.name) for item in node.names}
-    return found
+            imports |= {item.asname or item.name: (source, item.name) for item in node.names}
+    return imports
 
 
 def _module(file: Path) -> SourceModule:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that Python finds the modules that a state's file imports, without importing or running any of them."""
+"""Checks that Python finds the modules that a state file imports, without importing them."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from pathlib import Path
 from modular_framework_core.files.faults import nearest
 
 _PATH_CHANGES = ("sys.path", "sys.modules", "sys.meta_path", "addsitedir", "__path__")
-"""Words of a file that may change what is found, which only running it would show."""
+"""Words in a file that suggest a changed import path at run time."""
 
 
 def missing_imports(tree: ast.Module, file: Path) -> tuple[str, ...]:
-    """Says what a file imports that is not found; nothing where only running it would show.
+    """Returns a message for each module that a file imports and Python does not find.
 
-    Only the imports at the top of the file count, which are run when it is loaded: not those in ``try``, ``if`` or
-    functions, and no names within modules.
+    Only unconditional imports at the top level are checked, and only modules, not names within modules. A file that
+    changes the import path is not checked.
 
     Args:
-        tree: The file as parsed.
-        file: Its absolute path.
+        tree: Syntax tree of the file.
+        file: Absolute path of the file.
 
     Returns:
-        One message for each import that would fail, beginning with file and line.
+        One message per failing import, beginning with file and line.
     """
     if _changes_import_path(file):
         return ()
-    found: list[str] = []
+    messages: list[str] = []
     for line, name in _top_imports(tree, file):
-        wrong = _complaint(name, file)
-        if wrong:
-            found.append(f"{file}:{line} imports '{name}', but {wrong}")
-    return tuple(found)
+        fault = _import_fault(name, file)
+        if fault:
+            messages.append(f"{file}:{line} imports '{name}', but {fault}")
+    return tuple(messages)
 
 
 def _top_imports(tree: ast.Module, file: Path) -> Iterator[tuple[int, str]]:
-    """Yields line and module of each import; a relative one by its full name, or as it is written outside packages."""
+    """Yields line and module of each import. Relative names are resolved if the file is in a package."""
     package = _package_of(file)
     for node in tree.body:
         if isinstance(node, ast.Import):
@@ -65,34 +65,34 @@ def _package_of(file: Path) -> str:
     return ".".join(folders)
 
 
-def _complaint(name: str, file: Path) -> str:
-    """Says which part of a module's name is not found, and what to do; nothing when all of it may be there."""
+def _import_fault(name: str, file: Path) -> str:
+    """Returns the missing part of a module's name and a remedy, or "" if the module may exist."""
     if name.startswith("."):
-        return f"{file.parent} is no package, or not so deep in one; import it by its whole name"
+        return f"{file.parent} is not nested deeply enough in a package; import it by its full name"
     parts = name.split(".")
     spec = _top_level_spec(parts[0])
     folders: Sequence[str] | None = None
-    for number, last in enumerate(parts, start=1):
-        full_name = ".".join(parts[:number])
-        if number > 1:
+    for depth, last in enumerate(parts, start=1):
+        full_name = ".".join(parts[:depth])
+        if depth > 1:
             folders = _folders_of(full_name.rpartition(".")[0], spec)
             if folders is None:
                 return ""
             spec = None if full_name in sys.modules else PathFinder.find_spec(full_name, folders)
         if spec is None and full_name not in sys.modules:
-            return f"Python finds no '{full_name}'; {_what_to_do(last, folders, file)}"
+            return f"Python finds no '{full_name}'; {_remedy(last, folders, file)}"
     return ""
 
 
 def _top_level_spec(name: str) -> ModuleSpec | None:
     try:
         return importlib.util.find_spec(name)
-    except ValueError:  # it is loaded, but its origin is not known
+    except ValueError:  # loaded, but of unknown origin
         return ModuleSpec(name, None)
 
 
 def _folders_of(package: str, spec: ModuleSpec | None) -> Sequence[str] | None:
-    """Returns where the modules of a package are; None where only the package itself knows."""
+    """Returns the folders of a package's modules, or None if only running the package would tell."""
     if package in sys.modules:
         return getattr(sys.modules[package], "__path__", None)
     if spec is None or spec.submodule_search_locations is None:
@@ -110,10 +110,16 @@ def _changes_import_path(file: Path) -> bool:
     return any(word in text for word in _PATH_CHANGES)
 
 
-def _what_to_do(name: str, folders: Sequence[str] | None, file: Path) -> str:
-    """Says how a module may be found; ``folders`` are those of its package, None for a module of its own."""
-    beside = file.parent / name
-    if folders is None and (beside.with_suffix(".py").is_file() or beside.is_dir()):
+def _remedy(name: str, folders: Sequence[str] | None, file: Path) -> str:
+    """Returns advice for a missing module.
+
+    Args:
+        name: Last part of the module's name.
+        folders: Folders of the module's package; None for a top-level module.
+        file: State file that imports the module.
+    """
+    sibling = file.parent / name
+    if folders is None and (sibling.with_suffix(".py").is_file() or sibling.is_dir()):
         return f"it is beside the state, where Python does not look; add {file.parent} to PYTHONPATH"
     known = sorted({item.name for item in pkgutil.iter_modules(folders)})
-    return f"install it, or add the folder that has it to PYTHONPATH{nearest(name, known)}"
+    return f"install it, or add its folder to PYTHONPATH{nearest(name, known)}"

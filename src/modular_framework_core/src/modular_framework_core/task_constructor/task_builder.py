@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the YAML of a task into a ``TaskSpec``; finds everything that is wrong with it before anything is generated."""
+"""Builds a ``TaskSpec`` from the YAML of a task and collects all faults before any code is generated."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from modular_framework_core.files import located_yaml
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks, userdata_checks
-from modular_framework_core.task_constructor.key_spelling import meant_key, value_of
+from modular_framework_core.task_constructor.key_spelling import intended_key, value_of
 from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.machine_header import HeaderReader
@@ -29,13 +29,13 @@ def load_task(
     """Reads and checks a task.
 
     Args:
-        script: The YAML file.
-        states: The states it may use.
-        templates: The templates its machines may be written with.
-        known: The names of messages and postures there are, as far as that is known.
+        script: Path of the task's YAML file.
+        states: Available states.
+        templates: Available templates.
+        known: Known names of messages, postures and planning groups.
 
     Raises:
-        TaskFault: Something is wrong with it; carries all faults.
+        TaskFault: The task has faults; the exception carries all of them.
     """
     faults = FaultList()
     document = located_yaml.load(script, faults)
@@ -43,21 +43,28 @@ def load_task(
 
 
 class TaskBuilder:
-    """Walks through the YAML of one task, outermost machine first."""
+    """Builds one task from its YAML, outermost machine first."""
 
     def __init__(
         self, states: StateCatalogue, templates: TemplateCatalogue, faults: FaultList, known: KnownNames | None = None
     ) -> None:
-        """Uses these states, templates and names; notes what is wrong in ``faults``."""
+        """Stores the catalogues.
+
+        Args:
+            states: Available states.
+            templates: Available templates.
+            faults: Receives all faults.
+            known: Known names of messages, postures and planning groups.
+        """
         self._templates = templates
         self._faults = faults
         self._known = known or KnownNames()
         self._headers = HeaderReader(states, templates, faults)
         self._state_builder = StateBuilder(states, faults)
-        self._taken = {class_name_of(name) for name in states.names()} | set(dir(builtins))
+        self._used_type_names = {class_name_of(name) for name in states.names()} | set(dir(builtins))
 
     def build(self, document: Node, script: str) -> TaskSpec:
-        """Returns the task; raises ``TaskFault`` with everything that is wrong."""
+        """Returns the task, or raises ``TaskFault`` with all faults."""
         if not isinstance(document, Mapping):
             self._faults.add(
                 document.location,
@@ -68,14 +75,14 @@ class TaskBuilder:
         self._faults.harmless = len(self._faults)
         scope = ParamsScope().inner(params_of(value_of(document, "params"), self._faults), self._faults)
         name = "task"
-        given = value_of(document, "name")
-        label = str(given.value) if isinstance(given, Scalar) else name
-        header = self._headers.spelt(self._resolved(document, scope, is_machine=True), label, is_root=True)
+        name_node = value_of(document, "name")
+        label = str(name_node.value) if isinstance(name_node, Scalar) else name
+        header = self._headers.with_known_keys(self._resolved(document, scope, is_machine=True), label, is_root=True)
         if "name" in header.entries:
             name = header_fields.identifier(header.entries["name"], "name", self._faults) or name
-        node = name
+        node_name = name
         if "node_name" in header.entries:
-            node = header_fields.node_name(header.entries["node_name"], self._faults) or name
+            node_name = header_fields.node_name(header.entries["node_name"], self._faults) or name
         root = self._machine(name, header, scope, None)
         external = self._headers.external_names(header)
         if root is not None:
@@ -84,37 +91,44 @@ class TaskBuilder:
             if complete:
                 userdata_checks.check_userdata(root, self._provided_by(), self._faults)
         self._faults.raise_if_any()
-        assert root is not None, "a machine that could not be built has left a fault"
-        return TaskSpec(name, node, script, root)
+        assert root is not None, "a machine that cannot be built adds a fault"
+        return TaskSpec(name, node_name, script, root)
 
     # ---- machines ------------------------------------------------------------------------------------------
     def _machine(self, label: str, header: Mapping, scope: ParamsScope, parent: str | None) -> MachineSpec | None:
-        """Builds a machine from its header, whose references are resolved; ``parent`` is the class name around it."""
-        read = self._headers
-        template = read.template(header, label)
-        known_outcomes = read.outcomes(header)
+        """Builds a machine from its header.
+
+        Args:
+            label: Name in the parent machine.
+            header: Header fields with references resolved.
+            scope: Params visible inside the machine.
+            parent: Class name of the parent machine; None for the root.
+        """
+        headers = self._headers
+        template = headers.template(header, label)
+        known_outcomes = headers.outcomes(header)
         outcomes = known_outcomes or ()
         type_name = self._unique_type(header, label, parent)
         entries, labels = self._child_entries(header)
         children, links = self._children(entries, scope, type_name, outcomes)
-        initial_state = read.initial_state(header, labels)
+        initial_state = headers.initial_state(header, labels)
         if template is None:
             return None
-        outcomes_location = read.location_of(header, "outcomes")
-        before = len(self._faults)
+        outcomes_location = headers.location_of(header, "outcomes")
+        faults_before = len(self._faults)
         if template.concurrent:
             machine_checks.check_concurrent(links, self._faults)
         else:
             first = [initial_state] if initial_state else labels[:1]
             machine_checks.check_sequential(links, labels, first, known_outcomes, outcomes_location, self._faults)
-        before_map = len(self._faults)
-        default_outcome = read.default_outcome(header, template, outcomes)
-        outcome_map = read.outcome_map(header, template, outcomes, links)
-        if template.concurrent and known_outcomes and links and len(self._faults) == before_map:
+        faults_before_map = len(self._faults)
+        default_outcome = headers.default_outcome(header, template, outcomes)
+        outcome_map = headers.outcome_map(header, template, outcomes, links)
+        if template.concurrent and known_outcomes and links and len(self._faults) == faults_before_map:
             machine_checks.check_outcomes_produced(
                 outcomes, {*outcome_map, default_outcome}, outcomes_location, self._faults
             )
-        self._faults.harmless += len(self._faults) - before
+        self._faults.harmless += len(self._faults) - faults_before
         return MachineSpec(
             label=label,
             template=template,
@@ -123,38 +137,38 @@ class TaskBuilder:
             states=tuple(children),
             transitions=plain_transitions(header),
             remapping=plain_remapping(header),
-            shares_userdata=read.shares_userdata(header),
+            shares_userdata=headers.shares_userdata(header),
             default_outcome=default_outcome,
             outcome_map=outcome_map,
-            input_keys=read.key_names(header, "input_keys"),
-            output_keys=read.key_names(header, "output_keys"),
+            input_keys=headers.key_names(header, "input_keys"),
+            output_keys=headers.key_names(header, "output_keys"),
             initial_state=initial_state,
             options={key: header.entries[key].plain() for key in template.options if key in header.entries},
             location=header.location,
         )
 
     def _resolved(self, node: Mapping, scope: ParamsScope, *, is_machine: bool) -> Mapping:
-        """Resolves the references of a header or state, except those that are read later or not at all."""
-        unread = {key for key in node.entries if key in UNREAD or (is_machine and meant_key(key, UNREAD))}
+        """Resolves the references of a header or state, except in ``UNREAD`` keys."""
+        unread = {key for key in node.entries if key in UNREAD or (is_machine and intended_key(key, UNREAD))}
         entries = {
             key: value if key in unread else scope.resolve(value, self._faults) for key, value in node.entries.items()
         }
         return Mapping(entries, node.keys, node.location)
 
     def _unique_type(self, header: Mapping, label: str, parent_type: str | None) -> str:
-        """Returns a class name no other machine and no state of the task has."""
+        """Returns a class name that no state and no other machine of the task uses."""
         base = label
         if parent_type is not None and "name" in header.entries:
             base = header_fields.identifier(header.entries["name"], "name", self._faults) or label
         words = base.replace("-", "_").split("_")
-        wanted = "".join(word[:1].upper() + word[1:] for word in words) or "Machine"
-        candidate = wanted
-        if candidate in self._taken and parent_type is not None:
-            candidate = parent_type + wanted
-        number = 2
-        while candidate in self._taken:
-            candidate, number = f"{wanted}{number}", number + 1
-        self._taken.add(candidate)
+        camel_case = "".join(word[:1].upper() + word[1:] for word in words) or "Machine"
+        candidate = camel_case
+        if candidate in self._used_type_names and parent_type is not None:
+            candidate = parent_type + camel_case
+        suffix = 2
+        while candidate in self._used_type_names:
+            candidate, suffix = f"{camel_case}{suffix}", suffix + 1
+        self._used_type_names.add(candidate)
         return candidate
 
     # ---- children ------------------------------------------------------------------------------------------
@@ -183,7 +197,7 @@ class TaskBuilder:
         return specs, links
 
     def _child_entries(self, header: Mapping) -> tuple[list[tuple[str, SourceLocation, Mapping]], list[str]]:
-        """Returns label, location and content of each entry of ``states`` that can be read, and the labels of all."""
+        """Returns (label, location, fields) of each readable entry of ``states``, and the labels of all entries."""
         node = header.entries.get("states")
         if node is None:
             return [], []
@@ -222,11 +236,11 @@ class TaskBuilder:
         spec: ChildSpec | None
         outcomes: tuple[str, ...] | None
         if is_machine or self._headers.template_named(value_of(body, "source")):
-            body = self._headers.spelt(body, label, is_root=False)
+            body = self._headers.with_known_keys(body, label, is_root=False)
             spec = self._machine(label, body, scope, parent_type)
             outcomes = None if spec is None else spec.outcomes
         else:
-            body = self._state_builder.spelt(label, body)
+            body = self._state_builder.with_known_keys(label, body)
             spec, outcomes = self._state_builder.build(label, location, body, scope)
         if spec is not None:
             userdata_checks.check_remapping(spec, body.entries.get("remapping"), self._faults)
@@ -239,10 +253,10 @@ class TaskBuilder:
         return spec, ChildLinks(label, outcomes, transitions, keys, location)
 
     def _provided_by(self) -> dict[str, str]:
-        """Returns userdata key -> template that provides it."""
-        found: dict[str, str] = {}
+        """Returns userdata key -> name of the template that provides the key."""
+        providers: dict[str, str] = {}
         for name in self._templates.names():
             template = self._templates.get(name)
             for key in (template.userdata or ()) if template else ():
-                found.setdefault(key, name)
-        return found
+                providers.setdefault(key, name)
+        return providers

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws a checked task with Graphviz: machines as frames inside each other, states, transitions and outcomes."""
+"""Draws the states, transitions and outcomes of a checked task with Graphviz; nested machines are nested frames."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _FIRST_COLOUR, _LAST_COLOUR, _OTHER_COLOUR = "#2e7d32", "#c62828", "#455a64"
 
 
 class GraphError(Exception):
-    """The drawing cannot be made; says what is missing or which formats there are."""
+    """The task cannot be drawn."""
 
 
 def draw(task: TaskSpec) -> graphviz.Digraph:
-    """Returns the drawing of a task.
+    """Returns the graph of a task.
 
-    A machine is a frame: solid for one state after the other, dashed for states that run at the same time. Its
-    outcomes are the ovals in it, green for the first one and red for the last one.
+    State machines have a solid frame, concurrences a dashed frame. Outcomes are ovals; the first outcome is green, the
+    last red.
     """
     graph = graphviz.Digraph(
         task.name,
@@ -36,21 +36,26 @@ def draw(task: TaskSpec) -> graphviz.Digraph:
 
 
 def write(task: TaskSpec, file: Path) -> None:
-    """Writes the drawing of a task; the suffix of the file chooses the format.
+    """Draws a task into a file in the format of the file's suffix.
 
     Raises:
-        GraphError: The suffix is none of ``FORMATS``, or Graphviz is not installed or fails.
+        GraphError: The suffix is not in ``FORMATS``, or Graphviz is not installed or fails.
     """
-    kind = file.suffix.removeprefix(".").lower()
-    if kind not in FORMATS:
+    file_format = file.suffix.removeprefix(".").lower()
+    if file_format not in FORMATS:
         raise GraphError(
-            f"{file}: the format '{kind}' is unknown; allowed suffixes: " + ", ".join(f".{name}" for name in FORMATS)
+            f"{file}: the format '{file_format}' is unknown; allowed suffixes: "
+            + ", ".join(f".{name}" for name in FORMATS)
         )
     source = draw(task).source
-    if kind != "dot":
+    if file_format != "dot":
         try:
-            done = subprocess.run(
-                ["dot", f"-T{kind}"], input=source.encode(), capture_output=True, check=True, timeout=RENDER_TIMEOUT_S
+            result = subprocess.run(
+                ["dot", f"-T{file_format}"],
+                input=source.encode(),
+                capture_output=True,
+                check=True,
+                timeout=RENDER_TIMEOUT_S,
             )
         except FileNotFoundError as error:
             raise GraphError(
@@ -58,34 +63,34 @@ def write(task: TaskSpec, file: Path) -> None:
             ) from error
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             raise GraphError(f"{file}: Graphviz failed: {error}") from error
-        content = done.stdout
+        content = result.stdout
     else:
         content = source.encode()
     try:
         file.write_bytes(content)
     except OSError as error:
-        reason = f"{file} cannot be written: {error.strerror}; name a file in a folder that is there"
+        reason = f"{file} cannot be written: {error.strerror}; name a file in an existing folder"
         raise GraphError(reason) from error
 
 
 def _machine(graph: graphviz.Digraph, machine: MachineSpec, path: str, parent: str | None) -> None:
     style = "dashed,rounded" if machine.template.concurrent else "rounded"
-    together = " (at the same time)" if machine.template.concurrent else ""
+    timing = " (at the same time)" if machine.template.concurrent else ""
     with graph.subgraph(name=f"cluster_{path}") as frame:
-        frame.attr(label=_text(f"{machine.label}{together}"), style=style, tooltip=machine.template.name)
-        for number, outcome in enumerate(machine.outcomes):
-            last = number == len(machine.outcomes) - 1
-            colour = _FIRST_COLOUR if number == 0 else _LAST_COLOUR if last else _OTHER_COLOUR
+        frame.attr(label=_text(f"{machine.label}{timing}"), style=style, tooltip=machine.template.name)
+        for index, outcome in enumerate(machine.outcomes):
+            is_last = index == len(machine.outcomes) - 1
+            colour = _FIRST_COLOUR if index == 0 else _LAST_COLOUR if is_last else _OTHER_COLOUR
             frame.node(_outcome(path, outcome), _text(outcome), shape="oval", color=colour, fontcolor=colour)
         if machine.states and parent is None:
             frame.node(f"{path}|start", "", shape="point", width="0.15")
         for child in machine.states:
-            inner = f"{path}/{child.label}"
+            child_path = f"{path}/{child.label}"
             if isinstance(child, MachineSpec):
-                _machine(frame, child, inner, path)
+                _machine(frame, child, child_path, path)
             else:
                 frame.node(
-                    inner,
+                    child_path,
                     _text(child.label),
                     shape="box",
                     style="rounded,filled",
@@ -106,7 +111,7 @@ def _sequential_edges(graph: graphviz.Digraph, machine: MachineSpec, path: str) 
     for child in machine.states:
         implicit = {name: name for name in child.outcomes if name in machine.outcomes}
         for outcome, target in {**implicit, **child.transitions}.items():
-            start, label = _leaving(child, f"{path}/{child.label}", outcome)
+            start, label = _edge_source(child, f"{path}/{child.label}", outcome)
             if target in by_label:
                 _edge(graph, start, label, by_label[target], f"{path}/{target}")
             else:
@@ -116,21 +121,21 @@ def _sequential_edges(graph: graphviz.Digraph, machine: MachineSpec, path: str) 
 def _concurrent_edges(graph: graphviz.Digraph, machine: MachineSpec, path: str) -> None:
     by_label = {child.label: child for child in machine.states}
     for outcome, conditions in machine.outcome_map.items():
-        for label, wanted in conditions.items():
-            start, text = _leaving(by_label[label], f"{path}/{label}", wanted)
+        for label, child_outcome in conditions.items():
+            start, text = _edge_source(by_label[label], f"{path}/{label}", child_outcome)
             graph.edge(start, _outcome(path, outcome), label=_text(text), style="dashed")
     if machine.default_outcome is not None and machine.states:
         graph.node(f"{path}|else", "otherwise", shape="plaintext", fontsize="9")
         graph.edge(f"{path}|else", _outcome(path, machine.default_outcome), style="dashed")
 
 
-def _leaving(child: ChildSpec, path: str, outcome: str) -> tuple[str, str]:
-    """Returns the node an outcome of a child leaves from, and what its arrow says."""
+def _edge_source(child: ChildSpec, path: str, outcome: str) -> tuple[str, str]:
+    """Returns the graph node where the edge of a child's outcome starts, and the edge label."""
     return (_outcome(path, outcome), "") if isinstance(child, MachineSpec) else (path, outcome)
 
 
 def _edge(graph: graphviz.Digraph, start: str, label: str, target: ChildSpec, path: str) -> None:
-    """Draws an arrow to a child; an arrow to a machine ends at its frame."""
+    """Draws an edge to a child. An edge to a machine ends at the machine's frame."""
     first, frame = path, {"lhead": f"cluster_{path}"} if isinstance(target, MachineSpec) else {}
     while isinstance(target, MachineSpec):
         target = target.first_states()[0]

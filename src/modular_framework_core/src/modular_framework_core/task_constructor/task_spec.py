@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parts of a checked task. Templates are filled from these objects and from nothing else."""
+"""Specification of a checked task. Templates are rendered from these objects alone."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class StateSpec:
     """A state of a task.
 
     Attributes:
-        label: Its name in its machine.
-        source: The file and class it is made of.
-        type: Name of the class in the generated module.
-        options: Keyword arguments of the class, as written in the task (outcomes and userdata keys included).
-        outcomes: What it may end with, first = positive, last = negative.
-        transitions: Outcome -> label or outcome of the machine; empty inside a concurrent machine.
-        location: Where it is defined.
-        remapping: Userdata key of the state -> key of the machine it is in; keys not named are called the same.
-        nodes: The options as read, with the location of every value.
+        label: Name in the parent machine.
+        source: File and class of the state.
+        type: Class name in the generated module.
+        options: Keyword arguments of the class, including outcomes and userdata keys, as written in the task.
+        outcomes: Possible outcomes; the first is positive, the last negative.
+        transitions: Outcome -> label or outcome of the parent machine; empty inside a concurrence.
+        location: Position of the definition.
+        remapping: Userdata key of the state -> key of the parent machine. Other keys keep their names.
+        nodes: YAML nodes of the options, with the location of every value.
     """
 
     label: str
@@ -42,24 +42,24 @@ class StateSpec:
 
 @dataclass(frozen=True, slots=True)
 class MachineSpec:
-    """A state machine of a task: the root, or one nested in another.
+    """A state machine of a task: the root machine or a nested machine.
 
     Attributes:
-        label: Its name in the machine around it; for the root the name of the task.
-        template: The template it is written with.
-        type: Name of its class in the generated module, unique there.
-        outcomes: What it may end with, first = positive, last = negative.
-        states: Its children, in order.
-        transitions: Outcome -> label or outcome of the machine around it; empty for the root and in a concurrence.
-        shares_userdata: Whether it uses the userdata of the machine around it.
-        default_outcome: Outcome of a concurrent machine when no entry of the outcome map is met; else None.
-        outcome_map: For a concurrent machine, outcome -> {label: outcome of that child}.
-        input_keys: Userdata keys copied from the machine around it.
-        output_keys: Userdata keys copied to the machine around it.
-        initial_state: Label of the state it begins with; "" for the first one.
-        remapping: Userdata key of the machine -> key of the machine around it; keys not named are called the same.
-        options: Further header keys, for templates that use them.
-        location: Where it is defined.
+        label: Name in the parent machine; the task name for the root.
+        template: Template that generates the machine.
+        type: Class name, unique in the generated module.
+        outcomes: Possible outcomes; the first is positive, the last negative.
+        states: Child states and machines, in order.
+        transitions: Outcome -> label or outcome of the parent machine; empty for the root and in a concurrence.
+        shares_userdata: Whether the machine uses its parent's userdata.
+        default_outcome: Outcome of a concurrence if no entry of the outcome map matches; else None.
+        outcome_map: For a concurrence, outcome -> {label: outcome of that child}.
+        input_keys: Userdata keys copied from the parent machine.
+        output_keys: Userdata keys copied to the parent machine.
+        initial_state: Label of the initial state; "" for the first child.
+        remapping: Userdata key of the machine -> key of the parent machine. Other keys keep their names.
+        options: Header keys that only the template uses.
+        location: Position of the definition.
     """
 
     label: str
@@ -80,20 +80,20 @@ class MachineSpec:
     is_machine: bool = field(default=True, init=False)
 
     def first_states(self) -> tuple[ChildSpec, ...]:
-        """Returns the children it begins with: one, or all of a concurrent machine."""
+        """Returns the initial state in a tuple, or all children of a concurrence."""
         if self.template.concurrent:
             return self.states
         return tuple(child for child in self.states if child.label == self.initial_state) or self.states[:1]
 
     def machines(self) -> Iterator[MachineSpec]:
-        """Yields the machines nested in this one, innermost first, and this one last."""
+        """Yields the nested machines, innermost first, and then this machine."""
         for child in self.states:
             if isinstance(child, MachineSpec):
                 yield from child.machines()
         yield self
 
     def leaf_states(self) -> Iterator[StateSpec]:
-        """Yields the states of this machine and of all machines nested in it, in order."""
+        """Yields the states of this machine and of all nested machines, in order."""
         for child in self.states:
             if isinstance(child, MachineSpec):
                 yield from child.leaf_states()
@@ -106,13 +106,13 @@ ChildSpec = Union[StateSpec, MachineSpec]  # noqa: UP007 - the class above refer
 
 @dataclass(frozen=True, slots=True)
 class TaskSpec:
-    """A whole task.
+    """A checked task.
 
     Attributes:
         name: Name of the task and of the generated file, without ``.py``.
-        node_name: Name of the ROS node that runs it on its own.
-        script: Path of the YAML file it was read from.
-        root: The outermost machine.
+        node_name: Name of the ROS node if the generated file is run directly.
+        script: Path of the YAML file.
+        root: Outermost machine.
     """
 
     name: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the templates state machines are written with, and what each of them expects of a machine."""
+"""Finds the templates of state machines and the header keys that each template uses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _RENAMED = {
     "parameters": "fields of state_machine (outcomes, default_outcome, outcome_map, shares_userdata), and "
     "options.<key>",
 }
-"""Attributes of ``state_machine`` in templates of the original framework, and their replacements here."""
+"""Attributes of ``state_machine`` in templates of the original framework, and their replacements."""
 _OLD_NAME = re.compile(rf"\bstate_machine\.({'|'.join(_RENAMED)})\b")
 _PROVIDES = re.compile(r"\{#\s*userdata:\s*([\w\s,]*?)\s*#\}")
 
@@ -29,15 +29,15 @@ class TemplateSource:
     """A template file.
 
     Attributes:
-        name: File name without ``.template``: what ``source`` says in a task.
+        name: File name without ``.template``, the ``source`` of a machine in a task.
         file: Absolute path.
-        concurrent: Whether it makes a ``smach.Concurrence``.
-        options: Header keys of its own that it uses as ``options.<key>``.
-        takes_keys: Whether its machines can have ``input_keys`` and ``output_keys``.
-        userdata: Keys it puts in the userdata of its machine (declared by a comment ``{# userdata: a, b #}``);
-            None when it does not say.
-        doc: Docstring of its class.
-        fault: Why no machine can be written with it; "" for one that is in order.
+        concurrent: Whether the template generates a ``smach.Concurrence``.
+        options: Header keys that only this template uses, as ``options.<key>``.
+        takes_keys: Whether machines may have ``input_keys`` and ``output_keys``.
+        userdata: Userdata keys that the machine provides, as declared by a comment ``{# userdata: a, b #}``; None
+            without a declaration.
+        doc: Docstring of the generated class.
+        fault: Reason why the template is unusable; "" if valid.
     """
 
     name: str
@@ -51,13 +51,13 @@ class TemplateSource:
 
 
 class TemplateCatalogue:
-    """The templates in one or several directories; the first directory that has a name wins."""
+    """The templates in one or more directories. If a name occurs twice, the first directory takes precedence."""
 
     def __init__(self, directories: Iterable[Path]) -> None:
         """Lists and reads the templates.
 
         Raises:
-            FileNotFoundError: A directory is not there.
+            FileNotFoundError: A directory does not exist.
         """
         self.directories = tuple(directories)
         self._templates: dict[str, TemplateSource] = {}
@@ -70,11 +70,11 @@ class TemplateCatalogue:
                     self._templates[name] = _read_template(name, file.resolve())
 
     def names(self) -> list[str]:
-        """Returns the names ``source`` may have, sorted."""
+        """Returns the names of all templates, sorted."""
         return sorted(self._templates)
 
     def get(self, name: str) -> TemplateSource | None:
-        """Returns a template, or None when there is none of this name."""
+        """Returns the template of a name, or None if unknown."""
         return self._templates.get(name)
 
 
@@ -98,15 +98,15 @@ def _read_template(name: str, file: Path) -> TemplateSource:
 
 
 def _original_names(text: str, file: Path) -> str:
-    """Says which names of the original framework a template reads, and what is written for them here."""
-    lines: dict[str, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
+    """Returns the original framework's names in a template and their replacements as a fault; "" without such names."""
+    first_lines: dict[str, int] = {}
+    for line_number, line in enumerate(text.splitlines(), start=1):
         for name in _OLD_NAME.findall(line):
-            lines.setdefault(name, number)
-    if not lines:
+            first_lines.setdefault(name, line_number)
+    if not first_lines:
         return ""
     renamed = "; ".join(
-        f"{file}:{number}: state_machine.{name} is now {_RENAMED[name]}" for name, number in lines.items()
+        f"{file}:{line}: state_machine.{name} is now {_RENAMED[name]}" for name, line in first_lines.items()
     )
     return (
         f"it is written for the original framework: {renamed}; 'Templates' in modular_framework_core's README shows one"

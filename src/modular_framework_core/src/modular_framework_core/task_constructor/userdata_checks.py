@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of a task's userdata: every key that a state needs is there, and every remapping names a key."""
+"""Checks a task's userdata: every key that a state reads is provided, and every remapped key exists."""
 
 from __future__ import annotations
 
@@ -12,17 +12,23 @@ from modular_framework_core.files.located_yaml import Mapping, Node
 from modular_framework_core.task_constructor import header_fields
 from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, StateSpec
 
-MISSPELT = 0.75
-"""An io key that only one state uses counts as misspelt when it is this similar to a key of a template (0 to 1)."""
+MIN_SIMILARITY = 0.75
+"""An io key of only one state counts as misspelt above this similarity to a template's key, 0 to 1."""
 
 
 def check_remapping(child: ChildSpec, node: Node | None, faults: FaultList) -> None:
-    """Checks that a remapping gives names to keys that the state or machine has."""
+    """Checks that a child's remapping contains only userdata keys of the child.
+
+    Args:
+        child: State or machine.
+        node: Value of ``remapping``; None if absent.
+        faults: Receives the faults.
+    """
     if node is None:
         return
     what = f"state '{child.label}': remapping"
     names = header_fields.name_map(node, what, faults, example="{key_here: key_around}")
-    known = _interface(child)
+    known = _interface_keys(child)
     if names is None or known is None or not isinstance(node, Mapping):
         return
     for key in names:
@@ -30,21 +36,21 @@ def check_remapping(child: ChildSpec, node: Node | None, faults: FaultList) -> N
             faults.add_unknown(node.keys[key], f"{what}: key", key, sorted(known), given=names)
 
 
-def _interface(child: ChildSpec) -> set[str] | None:
-    """Returns the userdata keys that a state or machine exchanges; None when they are not known."""
+def _interface_keys(child: ChildSpec) -> set[str] | None:
+    """Returns the input, output and io keys of a state or machine; None if unknown."""
     if isinstance(child, MachineSpec):
         return {*child.input_keys, *child.output_keys}
-    found = [declared_keys(child, key) for key in ("input_keys", "output_keys", "io_keys")]
-    return None if None in found else {name for names in found for name in names or ()}
+    declared = [declared_keys(child, key) for key in ("input_keys", "output_keys", "io_keys")]
+    return None if None in declared else {name for names in declared for name in names or ()}
 
 
 def check_userdata(root: MachineSpec, provided_by: dict[str, str], faults: FaultList) -> None:
-    """Checks that every userdata key a state needs is provided in its machine.
+    """Checks that every userdata key that a state needs is provided in its machine.
 
     Args:
-        root: The outermost machine.
-        provided_by: Key -> name of the template that provides it, over all templates known.
-        faults: Where faults are noted.
+        root: Outermost machine.
+        provided_by: Userdata key -> template that provides the key, over all available templates.
+        faults: Receives the faults.
     """
     for machine in root.machines():
         if machine is root or not machine.shares_userdata:
@@ -54,31 +60,31 @@ def check_userdata(root: MachineSpec, provided_by: dict[str, str], faults: Fault
 def _check_scope(machine: MachineSpec, is_root: bool, provided_by: dict[str, str], faults: FaultList) -> None:
     if machine.template.userdata is None:
         return
-    children = list(_children(machine))
-    members = [child for child in children if isinstance(child, StateSpec)]
+    children = list(_userdata_users(machine))
+    states = [child for child in children if isinstance(child, StateSpec)]
     nested = [child for child in children if isinstance(child, MachineSpec)]
     available = {*machine.template.userdata, *machine.input_keys}
-    exchanged: Counter[str] = Counter()
-    for state in members:
+    io_key_counts: Counter[str] = Counter()
+    for state in states:
         for key in ("output_keys", "io_keys"):
-            known = _keys_around(state, key)
+            known = _remapped_keys(state, key)
             if known is None:
                 return
-            (available if key == "output_keys" else exchanged).update(known)
-    for inner in nested:
-        available.update(inner.remapping.get(key, key) for key in inner.output_keys)
-    for key, users in exchanged.items():
-        misspelt = users == 1 and difflib.get_close_matches(key, list(provided_by), n=1, cutoff=MISSPELT)
+            (available if key == "output_keys" else io_key_counts).update(known)
+    for machine_inside in nested:
+        available.update(machine_inside.remapping.get(key, key) for key in machine_inside.output_keys)
+    for key, users in io_key_counts.items():
+        misspelt = users == 1 and difflib.get_close_matches(key, list(provided_by), n=1, cutoff=MIN_SIMILARITY)
         if key not in provided_by and not misspelt:
             available.add(key)
     needed: list[tuple[ChildSpec, list[str]]] = [
-        (state, [*(_keys_around(state, "input_keys") or ()), *(_keys_around(state, "io_keys") or ())])
-        for state in members
+        (state, [*(_remapped_keys(state, "input_keys") or ()), *(_remapped_keys(state, "io_keys") or ())])
+        for state in states
     ]
     needed += [
-        (inner, [inner.remapping.get(key, key) for key in inner.input_keys])
-        for inner in nested
-        if not inner.shares_userdata
+        (machine_inside, [machine_inside.remapping.get(key, key) for key in machine_inside.input_keys])
+        for machine_inside in nested
+        if not machine_inside.shares_userdata
     ]
     for child, keys in needed:
         for key in dict.fromkeys(keys):
@@ -99,32 +105,27 @@ def _missing_key(
         f"{listing(sorted(available), 'it has none')}{nearest(key, sorted(available))}"
     )
     if not is_root:
-        return f"{text}; 'userdata: self.userdata' in the header of '{machine.label}' shares the keys around it"
+        return f"{text}; 'userdata: self.userdata' in the header of '{machine.label}' shares the parent machine's keys"
     if key in provided_by:
         return f"{text}; the template {provided_by[key]} provides it"
     return f"{text}; name it in the output_keys of the state that writes it"
 
 
-def _children(machine: MachineSpec) -> Iterable[ChildSpec]:
-    """Yields the states and machines that work on the userdata of a machine."""
+def _userdata_users(machine: MachineSpec) -> Iterable[ChildSpec]:
+    """Yields the states and machines that use a machine's userdata."""
     for child in machine.states:
         yield child
         if isinstance(child, MachineSpec) and child.shares_userdata:
-            yield from _children(child)
+            yield from _userdata_users(child)
 
 
-def _keys_around(state: StateSpec, key: str) -> tuple[str, ...] | None:
-    """Returns the keys a state declares as the machine around it calls them; None when they are not known."""
+def _remapped_keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
+    """Returns a state's declared keys under their names in the parent machine; None if unknown."""
     names = declared_keys(state, key)
     return None if names is None else tuple(state.remapping.get(name, name) for name in names)
 
 
 def declared_keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
-    """Returns the userdata keys a state declares, as written or by default; None when they are not known.
-
-    Args:
-        state: The state.
-        key: input_keys, output_keys or io_keys.
-    """
+    """Returns the userdata keys under one of input_keys, output_keys and io_keys of a state; None if unknown."""
     given = None if key in state.source.own_keys else state.options.get(key)
     return tuple(given) if isinstance(given, (list, tuple)) else state.source.default_names(key)

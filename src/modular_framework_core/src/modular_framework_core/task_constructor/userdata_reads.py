@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds which userdata keys a state's class reads, from its source, without running it."""
+"""Finds the userdata keys that a state class reads, from its source, without running the source."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 _METHODS = ("keys", "update", "extract", "merge")
-_ASKS_FIRST = ("get_registered_input_keys", "_input_keys")
+_REGISTERED_KEYS = ("get_registered_input_keys", "_input_keys")
 
 
 @dataclass(frozen=True, slots=True)
 class UserdataReads:
-    """Keys that a class reads of what its methods call ``userdata``.
+    """Userdata keys that the methods of a class read.
 
     Attributes:
-        anywhere: Keys that are read somewhere, but for those that the class asks for by name (``"key" in userdata``).
-        always: Keys that are read whenever ``execute`` runs from its start on: not below an ``if``, ``try``, loop or
-            function, and in no class that asks first which keys there are.
+        anywhere: Keys read in any method, except keys tested by name (``"key" in userdata``).
+        always: Keys that every run of ``execute`` reads: outside of any ``if``, ``try``, loop or inner function. Empty
+            for classes that test which keys exist.
     """
 
     anywhere: frozenset[str] = frozenset()
@@ -26,10 +26,10 @@ class UserdataReads:
 
 
 def reads_of(node: ast.ClassDef) -> UserdataReads:
-    """Returns what a class reads of userdata."""
-    anywhere = frozenset(_keys(node)) - frozenset(_asked_for(node))
+    """Returns the userdata keys that a class reads."""
+    anywhere = frozenset(_keys(node)) - frozenset(_tested_keys(node))
     execute = next((item for item in node.body if isinstance(item, ast.FunctionDef) and item.name == "execute"), None)
-    if execute is None or any(_asks(item) for item in ast.walk(node)):
+    if execute is None or any(_tests_keys(item) for item in ast.walk(node)):
         return UserdataReads(anywhere)
     always: set[str] = set()
     for statement in execute.body:
@@ -53,7 +53,7 @@ def _keys(node: ast.AST) -> Iterator[str]:
 
 
 def _written(node: ast.AST) -> set[str]:
-    """Returns the keys a function writes: what it reads of them may be its own."""
+    """Returns the keys that a function writes; the function may read its own values of these keys."""
     return {
         item.attr
         for item in ast.walk(node)
@@ -64,17 +64,17 @@ def _written(node: ast.AST) -> set[str]:
     }
 
 
-def _asked_for(node: ast.AST) -> Iterator[str]:
-    """Yields the keys of which a class asks by name whether they are there."""
+def _tested_keys(node: ast.AST) -> Iterator[str]:
+    """Yields the keys whose presence a class tests by name."""
     for item in ast.walk(node):
         match item:
-            case ast.Compare(left=ast.Constant(value=str(key))) if any(_asks(part) for part in ast.walk(item)):
+            case ast.Compare(left=ast.Constant(value=str(key))) if any(_tests_keys(part) for part in ast.walk(item)):
                 yield key
 
 
-def _asks(node: ast.AST) -> bool:
+def _tests_keys(node: ast.AST) -> bool:
     match node:
-        case ast.Attribute(attr=name) if name in _ASKS_FIRST:
+        case ast.Attribute(attr=name) if name in _REGISTERED_KEYS:
             return True
         case ast.Compare(ops=[ast.In() | ast.NotIn()], comparators=[ast.Name(id="userdata")]):
             return True
