@@ -72,7 +72,7 @@ REFUSED = [
     (
         "speed",
         "'0.5'",
-        "a number above 0 and at most 1, found the text '0.5'; leave the quotes out to make it a number",
+        "a number above 0 and at most 1, found the text '0.5'; remove the quotes to make it a number",
     ),
     ("speed", "params.far", "a number above 0 and at most 1, found the number 7.0; lower it to 1 or less"),
     ("tries", "0", "a whole number of at least 1 and at most 5, found the number 0; raise it to 1 or more"),

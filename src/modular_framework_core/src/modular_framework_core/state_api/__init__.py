@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interface for authors of states: the base class, and the annotations that declare options."""
+"""Interface for authors of states: the base class and the annotations of options."""

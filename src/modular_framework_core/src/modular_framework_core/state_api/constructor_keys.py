@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads from a state's constructor the outcomes and userdata keys that it declares itself, apart from its options.
+"""Reads the outcomes and userdata keys that a state's constructor fixes, from the source.
 
-A state of the framework has options named ``outcomes``, ``input_keys``, ``output_keys`` and ``io_keys``, and passes
-them on as they are, most simply as ``**keys: Unpack[StateKeys]``. The usual smach state declares its own::
+A framework state takes ``outcomes``, ``input_keys``, ``output_keys`` and ``io_keys`` as options and passes them on
+unchanged, most simply as ``**keys: Unpack[StateKeys]``. A plain smach state fixes them::
 
     def __init__(self):
         smach.State.__init__(self, outcomes=["opened", "stuck"], input_keys=["door"])
@@ -16,7 +16,7 @@ from typing import TypedDict
 
 
 class StateKeys(TypedDict, total=False):
-    """Options every state of the framework has, in the order of smach's constructor."""
+    """Options of every framework state, in the order of smach's constructor."""
 
     outcomes: Sequence[str]
     input_keys: Sequence[str]
@@ -26,10 +26,10 @@ class StateKeys(TypedDict, total=False):
 
 STATE_KEYS = tuple(StateKeys.__annotations__)
 KEY_MEANINGS = {
-    "outcomes": "First positive, last negative.",
-    "input_keys": "Userdata that is read.",
-    "output_keys": "Userdata that is written.",
-    "io_keys": "Userdata that is read and written.",
+    "outcomes": "The first is positive, the last negative.",
+    "input_keys": "Userdata keys that the state reads.",
+    "output_keys": "Userdata keys that the state writes.",
+    "io_keys": "Userdata keys that the state reads and writes.",
 }
 
 _REGISTERS = {f"register_{key}": key for key in STATE_KEYS}
@@ -38,17 +38,16 @@ _COPIES = ("list", "tuple")
 Names = tuple[str, ...] | None
 
 
-def own_keys(constructor: ast.FunctionDef, of_smach: bool, aliases: Mapping[str, ast.expr]) -> dict[str, Names]:
-    """Returns what a constructor declares by itself.
+def own_keys(constructor: ast.FunctionDef, has_smach_base: bool, aliases: Mapping[str, ast.expr]) -> dict[str, Names]:
+    """Returns the outcomes and userdata keys that a constructor fixes.
 
     Args:
-        constructor: The constructor.
-        of_smach: Whether its base is ``smach.State`` or ``FrameworkState``, whose order of arguments is known.
+        constructor: Syntax tree of the constructor.
+        has_smach_base: Whether the base class is ``smach.State`` or ``FrameworkState``, with known argument order.
         aliases: Assignments of the module, name -> value.
 
     Returns:
-        By key of ``STATE_KEYS``: the names; None when they cannot be known. A key is left out when the option of that
-        name decides.
+        Fixed names for each key of ``STATE_KEYS``, None if unknown. Keys set by the option of the same name are absent.
     """
     calls = [
         item
@@ -56,41 +55,41 @@ def own_keys(constructor: ast.FunctionDef, of_smach: bool, aliases: Mapping[str,
         if isinstance(item, ast.Call) and isinstance(item.func, ast.Attribute) and item.func.attr == "__init__"
     ]
     options = {argument.arg for argument in (*constructor.args.args, *constructor.args.kwonlyargs)}
-    passed_on = keys_argument(constructor)
-    uses = sum(isinstance(item, ast.Name) and item.id == passed_on for item in ast.walk(constructor))
-    found: dict[str, Names] = {}
+    keys_name = keys_argument(constructor)
+    uses = sum(isinstance(item, ast.Name) and item.id == keys_name for item in ast.walk(constructor))
+    fixed: dict[str, Names] = {}
     if len(calls) > 1 or uses > 1:
-        found = dict.fromkeys(STATE_KEYS)
+        fixed = dict.fromkeys(STATE_KEYS)
     elif calls:
-        given, rest_unknown = _given(calls[0], of_smach, passed_on)
+        given, rest_unknown = _given(calls[0], has_smach_base, keys_name)
         for key in STATE_KEYS:
             if key in given and not _is_option(given[key], key):
-                found[key] = _names(given[key], aliases)
+                fixed[key] = _names(given[key], aliases)
             elif key not in given and (rest_unknown or key in options):
-                found[key] = None
-    return found | dict.fromkeys(_changed(constructor))
+                fixed[key] = None
+    return fixed | dict.fromkeys(_changed(constructor))
 
 
 def keys_argument(constructor: ast.FunctionDef) -> str | None:
-    """Returns the name of the argument ``**keys: Unpack[StateKeys]`` of a constructor, None when it has none."""
+    """Returns the name of a constructor's argument ``**keys: Unpack[StateKeys]``, or None."""
     match constructor.args.kwarg:
         case ast.arg(arg=name, annotation=ast.Subscript(value=ast.Name("Unpack"), slice=ast.Name("StateKeys"))):
             return name
     return None
 
 
-def _given(call: ast.Call, of_smach: bool, passed_on: str | None) -> tuple[dict[str, ast.expr], bool]:
-    """Returns the arguments of a call of the base's constructor, and whether it may be given others."""
+def _given(call: ast.Call, has_smach_base: bool, keys_name: str | None) -> tuple[dict[str, ast.expr], bool]:
+    """Returns the arguments of a call of the base constructor, and whether there may be unknown arguments."""
     is_super = isinstance(call.func, ast.Attribute) and isinstance(call.func.value, ast.Call)
     positional = call.args if is_super else call.args[1:]
     given = {str(item.arg): item.value for item in call.keywords if item.arg is not None}
     mappings = [item.value for item in call.keywords if not item.arg]
     starred = any(isinstance(item, ast.Starred) for item in positional) or any(
-        not (isinstance(value, ast.Name) and value.id == passed_on) for value in mappings
+        not (isinstance(value, ast.Name) and value.id == keys_name) for value in mappings
     )
-    if of_smach and not starred:
+    if has_smach_base and not starred:
         given.update(zip(STATE_KEYS, positional, strict=False))
-    return given, starred or not of_smach
+    return given, starred or not has_smach_base
 
 
 def _is_option(value: ast.expr, key: str) -> bool:
@@ -112,7 +111,7 @@ def _names(value: ast.expr, aliases: Mapping[str, ast.expr]) -> Names:
 
 
 def _changed(constructor: ast.FunctionDef) -> Iterator[str]:
-    """Yields the keys whose option is changed before it is passed on, or to which names are added afterwards."""
+    """Yields the keys whose option the constructor changes, or to which the constructor adds names."""
     for item in ast.walk(constructor):
         match item:
             case ast.Name(id=name, ctx=ast.Store()) if name in STATE_KEYS:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The base of the framework's states: one way to succeed, to fail with a reason, and to stop when asked.
+"""Base class of states with reasons for failures and with interruptible waits.
 
-A plain ``smach.State`` only returns an outcome, so nobody learns why a task failed, and a state that waits
-cannot be interrupted unless its author thought of it. ``FrameworkState`` settles both: its own waits, and calls of
-services and actions through ``modular_framework_ros.calls`` below it, end when the state is asked to stop. A state is
-written as::
+A plain ``smach.State`` returns only an outcome, without the reason of a failure, and its waits ignore preemption unless
+the author polls for it. A preempted ``FrameworkState`` ends its own waits and its calls of services and actions through
+``modular_framework_ros.calls``. Example::
 
     class OpenDoor(FrameworkState):
         DEFAULT_IO_KEYS = ("arm_commander",)
@@ -36,19 +35,19 @@ DEFAULT_OUTCOMES = ("success", "fail")
 
 
 class FrameworkState(smach.State):
-    """A state whose first outcome is the positive one and whose last outcome is the negative one.
+    """A state whose first outcome is positive and whose last outcome is negative.
 
     Attributes:
-        DEFAULT_IO_KEYS: Userdata keys that the state reads and writes unless it is given other ``io_keys``.
-        outcomes: The outcomes in the order they were declared.
-        reason: Why the last execution did not succeed; "" after a success or before the first execution.
-        feedback: What the state is doing now, in words, for whoever watches the task; a state may set it while it runs.
+        DEFAULT_IO_KEYS: Default of ``io_keys``.
+        outcomes: Outcomes in declared order.
+        reason: Reason why the last execution did not succeed; "" after a success or before the first execution.
+        feedback: Current activity in words, which a running state may set for viewers of the task.
     """
 
     DEFAULT_IO_KEYS: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Checks options against their annotations; lets a request to stop end the waits in ``execute``."""
+        """Adds the check of the options to ``__init__`` and the end of waits on preemption to ``execute``."""
         super().__init_subclass__(**options)
         if "__init__" in vars(cls):
             cls.__init__ = checks_options(cls.__init__, without=STATE_KEYS)  # type: ignore[method-assign]
@@ -65,19 +64,19 @@ class FrameworkState(smach.State):
         """Declares the interface of the state.
 
         Args:
-            outcomes: Names of the outcomes, at least two; first = positive, last = negative.
-            input_keys: Userdata keys that are only read (ordinary Python objects arrive read-only).
-            output_keys: Userdata keys that are only written.
-            io_keys: Userdata keys that are read and written; commanders and clients, whose methods the state
-                calls, must be declared here. None for ``DEFAULT_IO_KEYS``.
+            outcomes: At least two names; the first is positive, the last negative.
+            input_keys: Userdata keys that the state only reads; ordinary Python objects arrive read-only.
+            output_keys: Userdata keys that the state only writes.
+            io_keys: Userdata keys that the state reads and writes, including commanders and clients whose methods the
+                state calls. None for ``DEFAULT_IO_KEYS``.
 
         Raises:
-            ValueError: When fewer than two different outcomes are given.
+            ValueError: There are fewer than two outcomes, or an outcome occurs twice.
         """
         names = [outcomes] if isinstance(outcomes, str) else list(outcomes)
         if len(names) < 2 or len(set(names)) != len(names):
             raise ValueError(
-                f"{type(self).__name__}: outcomes are {names}; needed are at least two different names, "
+                f"{type(self).__name__}: outcomes are {names}; give at least two different names, "
                 "the first for success and the last for failure, for example [success, fail]"
             )
         super().__init__(
@@ -97,12 +96,12 @@ class FrameworkState(smach.State):
         return self.outcomes[0]
 
     def fail(self, reason: str) -> str:
-        """Records and logs why the state failed, and returns the negative outcome.
+        """Stores and logs the reason of a failure, and returns the negative outcome.
 
-        A state that has been asked to stop counts as stopped: whatever it waited for was given up for that.
+        If the state was preempted, ``stopped`` is called instead, because the preemption may have caused the failure.
 
         Args:
-            reason: One sentence: what was attempted, what was got, and what was expected.
+            reason: Sentence with the attempted step, the result and the expected result.
         """
         if self.stop_requested():
             return self.stopped()
@@ -111,11 +110,11 @@ class FrameworkState(smach.State):
         return self.outcomes[-1]
 
     def end(self, outcome: str, reason: str) -> str:
-        """Returns an outcome that is neither plain success nor plain failure; the last outcome counts as a failure.
+        """Logs the reason of an intermediate outcome and returns the outcome; the last outcome counts as a failure.
 
         Args:
             outcome: One of the state's outcomes.
-            reason: Why this one.
+            reason: Reason for this outcome.
         """
         if outcome == self.outcomes[-1]:
             return self.fail(reason)
@@ -124,25 +123,25 @@ class FrameworkState(smach.State):
         return outcome
 
     def stop_requested(self) -> bool:
-        """Returns whether this state, or the whole task, has been asked to stop."""
+        """Returns whether this state or the task was asked to stop."""
         return bool(self.preempt_requested()) or smach.is_shutdown()
 
     def stopped(self) -> str:
-        """Acknowledges a request to stop; returns ``preempted`` where declared, the negative outcome otherwise."""
+        """Acknowledges a preemption and returns ``preempted`` if declared, otherwise the negative outcome."""
         self.service_preempt()
         self.reason = "stopped on request"
         return "preempted" if "preempted" in self.outcomes else self.outcomes[-1]
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float | None, period_s: float = 0.02) -> bool:
-        """Waits for a condition, for a request to stop, or for the timeout, whichever comes first.
+        """Waits for a condition, a preemption or the timeout.
 
         Args:
-            condition: Evaluated every ``period_s`` seconds.
-            timeout_s: Longest wait [s, wall time]; None = no limit (a request to stop still ends it).
-            period_s: Time between two evaluations [s].
+            condition: Function evaluated every ``period_s`` seconds.
+            timeout_s: Timeout [s, wall time]; None for no timeout.
+            period_s: Polling period [s].
 
         Returns:
-            True when the condition held. When False, ``stop_requested()`` distinguishes a stop from a timeout.
+            Whether the condition held. If False, ``stop_requested()`` distinguishes preemption from a timeout.
         """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self.stop_requested():
@@ -154,17 +153,17 @@ class FrameworkState(smach.State):
         return False
 
     def request_preempt(self) -> None:
-        """Asks the state to stop. States that drive hardware extend this to cancel their motion at once."""
+        """Asks the state to stop. States that move hardware extend this method to cancel the motion at once."""
         super().request_preempt()
         self._preempt_event.set()
 
     def recall_preempt(self) -> None:
-        """Withdraws the request to stop."""
+        """Withdraws the preemption request."""
         super().recall_preempt()
         self._preempt_event.clear()
 
     def service_preempt(self) -> None:
-        """Marks the request to stop as handled."""
+        """Marks the preemption request as handled."""
         super().service_preempt()
         self._preempt_event.clear()
 

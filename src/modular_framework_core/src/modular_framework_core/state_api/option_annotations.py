@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the allowed values of an option from its annotation: from source that is not run, or from the type itself."""
+"""Reads the allowed values of an option from its annotation, given as source or as an evaluated type."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ _MAPPINGS = ("dict", "Dict", "Mapping")
 
 
 def from_annotation(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> OptionType:
-    """Returns the type an annotation stands for.
+    """Returns the option type of an annotation.
 
     Args:
-        annotation: The annotation of an argument, or None.
-        aliases: Assignments of the module, name -> value, for types that have a name of their own.
+        annotation: Syntax tree of the annotation, or None.
+        aliases: Assignments of the module, name -> value, to resolve type aliases.
     """
     return _Reader(aliases).read(annotation)
 
 
 def from_hint(hint: Any) -> OptionType:
-    """Returns the type an annotation stands for that Python has evaluated: read from how Python writes it."""
+    """Returns the option type of an evaluated annotation, which is read from its ``repr``."""
     text = hint.__name__ if inspect.isclass(hint) and not hasattr(hint, "__origin__") else repr(hint)
     return _Reader({}).read(ast.Constant(text))
 
 
 def uses_in(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> tuple[Use, ...]:
-    """Returns what an annotation says about the use of an option; arguments as ``from_annotation``."""
+    """Returns the declared uses in an annotation; the arguments are those of ``from_annotation``."""
     return tuple(dict.fromkeys(_uses(annotation, aliases, frozenset())))
 
 
@@ -71,16 +71,16 @@ def _uses(node: ast.expr | None, aliases: MappingABC[str, ast.expr], seen: froze
 
 
 def _value(node: ast.expr, aliases: MappingABC[str, ast.expr]) -> Any:
-    """Returns a plain value that is written out, or has a name in the module."""
+    """Returns a literal, or the literal assigned to a name in the module."""
     return ast.literal_eval(aliases.get(node.id, node) if isinstance(node, ast.Name) else node)
 
 
 class _Reader:
-    """Reads annotations; what it does not know it takes as any value."""
+    """Reads annotations. An unknown annotation allows any value."""
 
     def __init__(self, aliases: MappingABC[str, ast.expr]) -> None:
         self._aliases = aliases
-        self._open: set[str] = set()
+        self._aliases_in_progress: set[str] = set()
 
     def read(self, node: ast.expr | None) -> OptionType:
         match node:
@@ -94,7 +94,7 @@ class _Reader:
                 return ListOf(Anything())
             case ast.Name(id=name) | ast.Attribute(attr=name) if name in _MAPPINGS:
                 return MappingOf(Anything())
-            case ast.Name(id=name) if name in self._aliases and name not in self._open:
+            case ast.Name(id=name) if name in self._aliases and name not in self._aliases_in_progress:
                 return self._alias(name)
             case ast.BinOp(left=left, op=ast.BitOr(), right=right):
                 return self._any_of([left, right])
@@ -103,11 +103,11 @@ class _Reader:
         return Anything()
 
     def _alias(self, name: str) -> OptionType:
-        self._open.add(name)
+        self._aliases_in_progress.add(name)
         try:
             return self.read(self._aliases[name])
         finally:
-            self._open.discard(name)
+            self._aliases_in_progress.discard(name)
 
     def _text(self, text: str) -> OptionType:
         try:
@@ -134,20 +134,20 @@ class _Reader:
         return Anything()
 
     def _any_of(self, nodes: list[ast.expr]) -> OptionType:
-        found: list[OptionType] = []
+        types: list[OptionType] = []
         for node in nodes:
             item = self.read(node)
-            found += [inner for inner in (item.types if isinstance(item, AnyOf) else (item,)) if inner not in found]
-        if any(isinstance(item, Anything) for item in found):
+            types += [inner for inner in (item.types if isinstance(item, AnyOf) else (item,)) if inner not in types]
+        if any(isinstance(item, Anything) for item in types):
             return Anything()
-        choices = tuple(value for item in found if isinstance(item, Choice) for value in item.values)
+        choices = tuple(value for item in types if isinstance(item, Choice) for value in item.values)
         if choices:
-            others = [item for item in found if not isinstance(item, Choice)]
-            found = [Choice(tuple(dict.fromkeys(choices))), *others]
-        return found[0] if len(found) == 1 else AnyOf(tuple(found))
+            others = [item for item in types if not isinstance(item, Choice)]
+            types = [Choice(tuple(dict.fromkeys(choices))), *others]
+        return types[0] if len(types) == 1 else AnyOf(tuple(types))
 
     def _limit_in(self, node: ast.expr) -> Limits | Length | None:
-        """Returns the value of ``Limits(...)`` or ``Length(...)``; None for something else or no plain numbers."""
+        """Returns the value of ``Limits(...)`` or ``Length(...)``, or None for anything else or invalid arguments."""
         match node:
             case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=arguments, keywords=keywords):
                 kinds: dict[str, type[Limits | Length]] = {"Limits": Limits, "Length": Length}

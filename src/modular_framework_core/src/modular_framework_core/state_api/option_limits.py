@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Limits of the numbers and lengths of an option of a state, declared once in the annotation of its constructor.
+"""Limits of a state's numeric and list options, declared once in the annotations of its constructor.
 
-``--check`` reads it from the source before a task runs, ``--explain`` and ``--schema`` show it, and ``FrameworkState``
-holds to it where the state is made::
+``--check`` reads the limits from the source before a task runs, ``--explain`` and ``--schema`` show them, and
+``FrameworkState`` enforces them at construction::
 
     def __init__(self, offset: Vector, speed: Share = 1.0, steps: Annotated[int, Limits(at_least=1)] = 3): ...
 """
@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-# bound: what must hold, word of JSON Schema, what to do about a number for which it does not hold
+# bound: condition, JSON Schema keyword, remedy for a violation
 _BOUNDS: dict[str, tuple[Callable[[float, float], bool], str, str]] = {
     "above": (operator.gt, "exclusiveMinimum", "raise it above {:g}"),
     "at_least": (operator.ge, "minimum", "raise it to {:g} or more"),
@@ -27,16 +27,16 @@ _BOUNDS: dict[str, tuple[Callable[[float, float], bool], str, str]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """The numbers between some bounds, which are written as plain numbers; finite ones where there is no bound at all.
+    """Range of a number. Without any bound, all finite numbers are allowed.
 
-    Infinity counts as the greatest number: ``Limits(above=0.0)`` takes it, as a timeout without end or a tolerance of
-    everything; ``Limits(above=0.0, at_most=1.0)`` does not. NaN is never among them.
+    One-sided limits allow infinity on the open side: ``Limits(above=0.0)`` allows an infinite timeout or tolerance. NaN
+    is never allowed. Bounds must be literals in the source.
 
     Attributes:
-        above: Lower bound, itself not allowed.
-        at_least: Lower bound, itself allowed.
-        below: Upper bound, itself not allowed.
-        at_most: Upper bound, itself allowed.
+        above: Exclusive lower bound.
+        at_least: Inclusive lower bound.
+        below: Exclusive upper bound.
+        at_most: Inclusive upper bound.
     """
 
     above: float | None = None
@@ -45,43 +45,43 @@ class Limits:
     at_most: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuses a bound that is no number."""
+        """Checks that each bound is a number."""
         for name, bound in self.bounds().items():
             if isinstance(bound, bool) or not isinstance(bound, int | float):
                 raise TypeError(f"Limits: {name} is {bound!r}; write a number")
 
     def bounds(self) -> dict[str, float]:
-        """Returns the bounds that are set, by name."""
+        """Returns the given bounds by name."""
         return {name: bound for name in _BOUNDS if (bound := getattr(self, name)) is not None}
 
     def remedy(self, number: float) -> str:
-        """Returns what to do about a number that is not allowed; "" when it is allowed."""
+        """Returns the remedy for a number outside of the range; "" for an allowed number."""
         bounded_infinity = self.bounds() and abs(number) == math.inf
         if not bounded_infinity and not abs(number) <= sys.float_info.max:
             return "write a finite number"
-        broken = (name for name, bound in self.bounds().items() if not _BOUNDS[name][0](number, bound))
-        return next((_BOUNDS[name][2].format(self.bounds()[name]) for name in broken), "")
+        violated = (name for name, bound in self.bounds().items() if not _BOUNDS[name][0](number, bound))
+        return next((_BOUNDS[name][2].format(self.bounds()[name]) for name in violated), "")
 
     def describe(self, what: str) -> str:
-        """Describes the allowed numbers; ``what`` is "a number" or "a whole number"."""
+        """Returns the range in words; ``what`` is "a number" or "a whole number"."""
         parts = [f"{name.replace('_', ' ')} {bound:g}" for name, bound in self.bounds().items()]
         if not parts:
             return what.replace("a ", "a finite ", 1)
         return f"{what} {'of ' if parts[0].startswith('at') else ''}{' and '.join(parts)}"
 
     def schema(self) -> dict[str, float]:
-        """Returns the words of JSON Schema that say the same."""
+        """Returns the range as JSON Schema keywords."""
         return {_BOUNDS[name][1]: bound for name, bound in self.bounds().items()}
 
 
 @dataclass(frozen=True, slots=True)
 class Length:
-    """The required number of items of a list."""
+    """Required length of a list."""
 
     items: int
 
     def __post_init__(self) -> None:
-        """Refuses a length that is no whole number."""
+        """Checks that the length is a whole number."""
         if isinstance(self.items, bool) or not isinstance(self.items, int):
             raise TypeError(f"Length: items is {self.items!r}; write a whole number")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Types of the options of states, with checks that describe what is wrong with a value."""
+"""Types of state options, with checks that describe the fault of a value."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from modular_framework_core.state_api.option_limits import Length, Limits
 
 @dataclass(frozen=True, slots=True)
 class Anything:
-    """Every value: the source does not say more."""
+    """Any value, for options without a known type."""
 
     def describe(self) -> str:
-        """Says what is allowed."""
+        """Returns the allowed values in words."""
         return "any value"
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
-        """Returns the innermost value that does not fit, with what was allowed there; None when all fits."""
+        """Returns the innermost value that is not allowed and its required type, or None if all values are allowed."""
         return None
 
     def schema(self) -> dict[str, Any]:
-        """Returns the JSON Schema of the values."""
+        """Returns the JSON Schema of the allowed values."""
         return {}
 
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """Text, number, integer, bool or nothing; numbers may have limits."""
+    """Text, number, integer, bool or null; numbers may have limits."""
 
     kind: str
     limits: Limits | None = None
 
     def describe(self) -> str:
-        """Says what is allowed."""
+        """See ``Anything.describe``."""
         what = PLAIN[self.kind][0]
         return what if self.limits is None else self.limits.describe(what)
 
@@ -49,7 +49,7 @@ class Plain:
         return None if fits and not self.remedy(value) else (node, self)
 
     def remedy(self, value: Any) -> str:
-        """Says what to do about a number beyond the limits; nothing about other values."""
+        """Returns the remedy for a number outside of the limits; "" for other values."""
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         return self.limits.remedy(value) if self.limits is not None and is_number else ""
 
@@ -69,12 +69,12 @@ PLAIN: dict[str, tuple[str, Any, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of some values."""
+    """One of the given values."""
 
     values: tuple[Any, ...]
 
     def describe(self) -> str:
-        """Says what is allowed."""
+        """See ``Anything.describe``."""
         return "one of " + ", ".join(repr(value) for value in self.values)
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
@@ -91,13 +91,13 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class ListOf:
-    """A list whose items are of one type; it may have to have a certain length."""
+    """A list with items of one type and optionally a required length."""
 
     item: OptionType
     length: Length | None = None
 
     def describe(self) -> str:
-        """Says what is allowed."""
+        """See ``Anything.describe``."""
         what = "a list" if self.length is None else f"a list of {self.length.items} items"
         return what if isinstance(self.item, Anything) else f"{what}, each item {self.item.describe()}"
 
@@ -120,15 +120,15 @@ class MappingOf:
     value: OptionType
 
     def describe(self) -> str:
-        """Says what is allowed."""
+        """See ``Anything.describe``."""
         return "a mapping" if isinstance(self.value, Anything) else f"a mapping to {self.value.describe()}"
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
         """See ``Anything.mismatch``."""
         if not isinstance(node, Mapping):
             return node, self
-        found = (self.value.mismatch(item) for item in node.entries.values())
-        return next((item for item in found if item is not None), None)
+        mismatches = (self.value.mismatch(item) for item in node.entries.values())
+        return next((item for item in mismatches if item is not None), None)
 
     def schema(self) -> dict[str, Any]:
         """See ``Anything.schema``."""
@@ -142,16 +142,16 @@ class AnyOf:
     types: tuple[OptionType, ...]
 
     def describe(self) -> str:
-        """Says what is allowed."""
-        joint = ", or " if any(isinstance(item, ListOf | MappingOf) for item in self.types) else " or "
-        return joint.join(item.describe() for item in self.types)
+        """See ``Anything.describe``."""
+        separator = ", or " if any(isinstance(item, ListOf | MappingOf) for item in self.types) else " or "
+        return separator.join(item.describe() for item in self.types)
 
     def mismatch(self, node: Node) -> tuple[Node, OptionType] | None:
         """See ``Anything.mismatch``."""
-        found = [item.mismatch(node) for item in self.types]
-        if None in found:
+        mismatches = [item.mismatch(node) for item in self.types]
+        if None in mismatches:
             return None
-        deeper = [item for item in found if item is not None and item[0] is not node]
+        deeper = [item for item in mismatches if item is not None and item[0] is not node]
         return deeper[0] if deeper else (node, self)
 
     def schema(self) -> dict[str, Any]:
@@ -163,41 +163,40 @@ OptionType = Union[Anything, Plain, Choice, ListOf, MappingOf, AnyOf]  # noqa: U
 
 
 def or_reference(schema: dict[str, Any]) -> dict[str, Any]:
-    """Returns a JSON Schema that also takes a reference ``params.<key>``, which may stand wherever a value may."""
+    """Returns a JSON Schema that also allows a reference ``params.<key>``."""
     return {"anyOf": [schema, {"type": "string", "pattern": r"^params\."}]} if schema else {}
 
 
-def complaint(allowed: OptionType, node: Node) -> tuple[Node, str] | None:
-    """Says what is wrong with a value.
+def option_fault(allowed: OptionType, node: Node) -> tuple[Node, str] | None:
+    """Returns the fault of a value, or None if the value is allowed.
 
     Args:
-        allowed: What is allowed.
-        node: The value.
+        allowed: Type of the option.
+        node: Value of the option.
 
     Returns:
-        The innermost value that does not fit, and ``must be ..., found ...`` with what to do where that is clear; None
-        when all fits.
+        The innermost value that is not allowed, and the message ``must be ..., found ...`` with a remedy if known.
     """
     mismatch = allowed.mismatch(node)
     if mismatch is None:
         return None
-    node, wanted = mismatch
-    parts = wanted.types if isinstance(wanted, AnyOf) else (wanted,)
+    node, required = mismatch
+    parts = required.types if isinstance(required, AnyOf) else (required,)
     found = kind_of(node)
     if isinstance(node, Sequence) and any(isinstance(part, ListOf) and part.length for part in parts):
         found = f"a list of {len(node.items)}"
     hint = _remedy(node, parts) if isinstance(node, Scalar) else ""
-    return node, f"must be {wanted.describe()}, found {found}{hint}"
+    return node, f"must be {required.describe()}, found {found}{hint}"
 
 
 def _remedy(node: Scalar, parts: tuple[OptionType, ...]) -> str:
     value = node.value
     for part in parts:
-        if isinstance(part, Plain) and (what := part.remedy(value)):
-            return f"; {what}"
+        if isinstance(part, Plain) and (remedy := part.remedy(value)):
+            return f"; {remedy}"
     if isinstance(value, str):
         if len(parts) == 1 and isinstance(parts[0], Plain) and parts[0].kind in ("float", "int"):
-            return "; leave the quotes out to make it a number" if _is_quoted_number(value) else ""
+            return "; remove the quotes to make it a number" if _is_quoted_number(value) else ""
         names = [item for part in parts if isinstance(part, Choice) for item in part.values if isinstance(item, str)]
         return nearest(value, names)
     return "; put it in quotes to make it text" if parts == (Plain("str"),) and value is not None else ""

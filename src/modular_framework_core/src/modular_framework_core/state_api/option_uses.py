@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an option of a state refers to: a name that must exist, or userdata that the state needs.
+"""References of a state's options: to names that must exist, or to userdata keys that the state must declare.
 
-It is declared once, in the annotation of the state's constructor; ``--check`` reads it from the source::
+The annotations of the state's constructor declare the references, and ``--check`` reads them from the source::
 
     def __init__(self, pose_name: Annotated[str, Named("pose")], request: Annotated[Mapping[str, Any], Fields()]): ...
 """
@@ -11,27 +11,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 FROM_USERDATA = "userdata"
-"""Name that stands for a message in userdata, under ``selected_<kind>``."""
+"""Reserved name for the message under the userdata key ``selected_<kind>``."""
 USERDATA_PREFIX = "userdata."
-"""Prefix of a reference to userdata in the fields of a message; the key follows, and then fields of its value."""
+"""Prefix of a userdata reference in the fields of a message: ``userdata.<key>[.<field>...]``."""
 GRASP_STAGES = ("pregrasp", "grasp", "postgrasp")
 
 
 def kind_of(message_type: str) -> str:
-    """Returns the kind of message behind a type word: every stage of a grasp is kept in a grasp message."""
+    """Returns the kind of message of a type; all grasp stages are stored in a grasp message."""
     return "grasp" if message_type in GRASP_STAGES else message_type
 
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """The option is a name, or a list of names; an empty one stands for none.
+    """The option is a name or a list of names; empty names are ignored.
 
     Attributes:
-        kind: What it names: joint_state, trajectory, pose, plan or grasp, a state of the manipulator's group
-            (posture), a planning group (group), or a planner (planner); ``option:<name>`` for the kind that another
-            option says.
-        made: Whether the state itself stores something under the name.
-        userdata: Whether the name ``userdata`` takes what userdata has under ``selected_<kind>``, an input key then.
+        kind: Kind of the named thing: joint_state, trajectory, pose, plan, grasp, posture, group or planner;
+            ``option:<name>`` if another option gives the kind.
+        made: Whether the state stores a message under the name.
+        userdata: Whether the name ``userdata`` refers to the input key ``selected_<kind>``.
     """
 
     kind: str
@@ -41,12 +40,12 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """The option decides about a userdata key that the state declares.
+    """The option requires a userdata key that the state must declare.
 
     Attributes:
         direction: "input" or "output".
-        name: The key; ``{}`` in it stands for the kind of message that the option says; empty: the option is the key.
-        when: Value of the option for which the key is needed; empty for any that is not empty.
+        name: Userdata key, with ``{}`` for the kind of message given by the option; "" if the option itself is the key.
+        when: Value of the option that requires the key; "" for any nonempty value.
     """
 
     direction: str
@@ -56,7 +55,7 @@ class Key:
 
 @dataclass(frozen=True, slots=True)
 class Fields:
-    """The option has fields of a message; a text ``userdata.<key>`` in it takes the value from an input key."""
+    """The option contains fields of a message, in which ``userdata.<key>`` is replaced by the value of an input key."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,7 +83,7 @@ class HeaderReader:
         return header_fields.names(header.entries["outcomes"], "outcomes", self._faults)
 
     def shares_userdata(self, header: Mapping) -> bool:
-        """Returns whether a machine uses its parent's userdata."""
+        """Returns whether a machine uses the enclosing machine's userdata."""
         node = header.entries.get("userdata")
         if node is None:
             return False

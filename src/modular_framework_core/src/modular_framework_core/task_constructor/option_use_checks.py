@@ -8,7 +8,7 @@ from typing import Any
 
 from modular_framework_core.files.faults import FaultList, SourceLocation, listing, nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
-from modular_framework_core.state_api.option_types import complaint
+from modular_framework_core.state_api.option_types import option_fault
 from modular_framework_core.state_api.option_uses import (
     FROM_USERDATA,
     USERDATA_PREFIX,
@@ -70,7 +70,7 @@ class _Checker:
         source = self._state.source
         for option in source.options.values():
             node = self._state.nodes.get(option.name)
-            if node is not None and complaint(option.type, node):
+            if node is not None and option_fault(option.type, node):
                 continue  # already reported; further faults would only be consequences
             value = option.default if node is None else node.plain()
             for use in option.uses:

@@ -9,7 +9,7 @@ from typing import Any
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.state_api.constructor_keys import STATE_KEYS
-from modular_framework_core.state_api.option_types import complaint
+from modular_framework_core.state_api.option_types import option_fault
 from modular_framework_core.task_constructor import header_fields
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, intended_key, value_of
 from modular_framework_core.task_constructor.params_scope import ParamsScope
@@ -84,7 +84,7 @@ class StateBuilder:
             if option.required and option.name not in options:
                 self._faults.add(location, f"{what} '{option.name}' is missing; it has no default")
             elif option.name in options and option.name not in STATE_KEYS:
-                wrong = complaint(option.type, options[option.name])
+                wrong = option_fault(option.type, options[option.name])
                 if wrong is not None:
                     self._faults.add(wrong[0].location, f"{what} '{option.name}' {wrong[1]}")
         self._faults.harmless += len(self._faults) - faults_before
@@ -160,7 +160,7 @@ class StateBuilder:
 
 
 def plain_remapping(body: Mapping) -> dict[str, str]:
-    """Returns the remapping of a child, own key -> key of the parent machine; empty if unreadable."""
+    """Returns the remapping of a child, own key -> key of the enclosing machine; empty if unreadable."""
     return _plain_names(body.entries.get("remapping"))
 
 

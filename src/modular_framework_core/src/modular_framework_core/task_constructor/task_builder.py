@@ -99,10 +99,10 @@ class TaskBuilder:
         """Builds a machine from its header.
 
         Args:
-            label: Name in the parent machine.
+            label: Name in the enclosing machine.
             header: Header fields with references resolved.
             scope: Params visible inside the machine.
-            parent: Class name of the parent machine; None for the root.
+            parent: Class name of the enclosing machine; None for the root.
         """
         headers = self._headers
         template = headers.template(header, label)

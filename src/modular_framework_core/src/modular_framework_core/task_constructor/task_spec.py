@@ -18,14 +18,14 @@ class StateSpec:
     """A state of a task.
 
     Attributes:
-        label: Name in the parent machine.
+        label: Name in the enclosing machine.
         source: File and class of the state.
         type: Class name in the generated module.
         options: Keyword arguments of the class, including outcomes and userdata keys, as written in the task.
         outcomes: Possible outcomes; the first is positive, the last negative.
-        transitions: Outcome -> label or outcome of the parent machine; empty inside a concurrence.
+        transitions: Outcome -> label or outcome of the enclosing machine; empty inside a concurrence.
         location: Position of the definition.
-        remapping: Userdata key of the state -> key of the parent machine. Other keys keep their names.
+        remapping: Userdata key of the state -> key of the enclosing machine. Other keys keep their names.
         nodes: YAML nodes of the options, with the location of every value.
     """
 
@@ -45,19 +45,19 @@ class MachineSpec:
     """A state machine of a task: the root machine or a nested machine.
 
     Attributes:
-        label: Name in the parent machine; the task name for the root.
+        label: Name in the enclosing machine; the task name for the root.
         template: Template that generates the machine.
         type: Class name, unique in the generated module.
         outcomes: Possible outcomes; the first is positive, the last negative.
         states: Child states and machines, in order.
-        transitions: Outcome -> label or outcome of the parent machine; empty for the root and in a concurrence.
-        shares_userdata: Whether the machine uses its parent's userdata.
+        transitions: Outcome -> label or outcome of the enclosing machine; empty for the root and in a concurrence.
+        shares_userdata: Whether the machine uses the enclosing machine's userdata.
         default_outcome: Outcome of a concurrence if no entry of the outcome map matches; else None.
         outcome_map: For a concurrence, outcome -> {label: outcome of that child}.
-        input_keys: Userdata keys copied from the parent machine.
-        output_keys: Userdata keys copied to the parent machine.
+        input_keys: Userdata keys copied from the enclosing machine.
+        output_keys: Userdata keys copied to the enclosing machine.
         initial_state: Label of the initial state; "" for the first child.
-        remapping: Userdata key of the machine -> key of the parent machine. Other keys keep their names.
+        remapping: Userdata key of the machine -> key of the enclosing machine. Other keys keep their names.
         options: Header keys that only the template uses.
         location: Position of the definition.
     """

@@ -105,7 +105,9 @@ def _missing_key(
         f"{listing(sorted(available), 'it has none')}{nearest(key, sorted(available))}"
     )
     if not is_root:
-        return f"{text}; 'userdata: self.userdata' in the header of '{machine.label}' shares the parent machine's keys"
+        return (
+            f"{text}; 'userdata: self.userdata' in the header of '{machine.label}' shares the enclosing machine's keys"
+        )
     if key in provided_by:
         return f"{text}; the template {provided_by[key]} provides it"
     return f"{text}; name it in the output_keys of the state that writes it"
@@ -120,7 +122,7 @@ def _userdata_users(machine: MachineSpec) -> Iterable[ChildSpec]:
 
 
 def _remapped_keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
-    """Returns a state's declared keys under their names in the parent machine; None if unknown."""
+    """Returns a state's declared keys under their names in the enclosing machine; None if unknown."""
     names = declared_keys(state, key)
     return None if names is None else tuple(state.remapping.get(name, name) for name in names)
 
