@@ -352,7 +352,7 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers):
         ("kind.yaml", "kind: grasp\nnamed: {}\n", "holds messages of the kind 'grasp'"),
         ("field.yaml", "kind: plan\nnamed:\n  p: {no_such_field: 1}\n", "'p' is no moveit_msgs/RobotTrajectory"),
         ("a\0.yaml", None, "embedded null byte"),
-        ("~no_such_user/a.yaml", None, "is no path of a file"),
+        ("~no_such_user/a.yaml", None, "is not a valid path"),
         ("../a.yaml", None, "is outside of the managers' folder"),
         ("/etc/a.yaml", None, "is outside of the managers'"),
         ("deep.yaml", "a: " + "[" * 20000, "nested more than 100 levels deep"),
@@ -362,7 +362,11 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers):
             "positions[0] is nan",
         ),
         ("empty_name.yaml", 'kind: plan\nnamed: {"": {}}\n', "the name is empty"),
-        ("surrogate.yaml", '{"kind": "plan", "named": {"\\ud800": {}}}', "the name '\\ud800' has half of a character"),
+        (
+            "surrogate.yaml",
+            '{"kind": "plan", "named": {"\\ud800": {}}}',
+            "the name '\\ud800' contains half of a character",
+        ),
         ("type.yaml", "kind: plan\nanonymous:\n- {joint_trajectory: {joint_names: 5}}\n", "anonymous message 1 is no"),
     ],
 )
@@ -379,7 +383,7 @@ def test_a_pipe_is_refused_at_once_and_positions_that_are_not_finite_are_not_tak
     os.mkfifo(folder() / "pipe.yaml")
     for service in ("load_plans", "save_plans", "reload_joint_states"):
         answer = call(service, srv.MessageFile, "pipe.yaml")
-        assert not answer.success and "no regular file" in answer.message
+        assert not answer.success and "not a regular file" in answer.message
     assert lists("joint_states") == (["down", "up"], 0)
     nowhere = JointState(name=["a"], position=[math.nan])
     assert not call("add_joint_state", srv.AddJointState, nowhere, "nowhere").success

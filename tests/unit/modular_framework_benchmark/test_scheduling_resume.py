@@ -196,7 +196,7 @@ def test_a_report_that_cannot_be_written_is_named_and_loses_no_result(folder: Pa
     process = start(folder, "run_experiment", "experiment.yaml")
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 1 and finished(folder) == 3
-    assert f"error: no report: {folder}/plans.html: it is there already, and no regular file" in errors
+    assert f"error: no report: {folder}/plans.html: it exists and is not a regular file" in errors
     assert "modular_framework_benchmark report plans.db --experiment plans --into FILE" in errors
 
 

@@ -91,7 +91,7 @@ def test_a_cache_of_meshes_that_cannot_be_written_leaves_nothing_and_is_named(tm
 
 def test_what_is_there_and_no_file_is_not_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
-    with pytest.raises(OSError, match="no regular file.*pipe.yaml"):
+    with pytest.raises(OSError, match="not a regular file.*pipe.yaml"):
         write_atomically(tmp_path / "pipe.yaml", "text")
     assert left_in(tmp_path) == [] and (tmp_path / "pipe.yaml").is_fifo()
 
@@ -99,12 +99,12 @@ def test_what_is_there_and_no_file_is_not_replaced(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "reason"),
     [
-        ("a\0.yaml", "is no path of a file: embedded null byte; name a file in"),
-        ("~no_such_user/a.yaml", "is no path of a file: Could not determine home directory.; name a file in"),
+        ("a\0.yaml", "is not a valid path: embedded null byte; name a file in"),
+        ("~no_such_user/a.yaml", "is not a valid path: Could not determine home directory.; name a file in"),
         ("../a.yaml", "is outside of the managers' folder"),
         ("/etc/a.yaml", "is outside of the managers' folder"),
         ("link/a.yaml", "is outside of the managers' folder"),
-        ("ring/a.yaml", "is no path of a file"),
+        ("ring/a.yaml", "is not a valid path"),
         ("x.txt", "a file that ends in .yaml"),
         ("", "a file that ends in .yaml"),
         ("a.yaml/..", "a file that ends in"),
@@ -150,11 +150,11 @@ def test_what_is_nested_without_end_is_refused_with_its_line(tmp_path: Path, tex
 
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.yaml")
-    with pytest.raises(MessageFileError, match="pipe.yaml is no regular file; name a file"):
+    with pytest.raises(MessageFileError, match="pipe.yaml is not a regular file; name a text file"):
         message_files.load(tmp_path / "pipe.yaml", "joint state", JointState)
     faults = yaml_entries.read_each_entry(tmp_path / "pipe.yaml", lambda entry: None)
-    assert "is no regular file" in str(faults[0])
-    with pytest.raises(OSError, match="is no path of a file"):
+    assert "is not a regular file" in str(faults[0])
+    with pytest.raises(OSError, match="is not a valid path"):
         read_text(Path("a\0b"))
 
 

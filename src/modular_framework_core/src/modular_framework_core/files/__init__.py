@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files that people write: read with the line of every value, and written atomically."""
+"""Reads user-written files with the line of every value, and writes files atomically."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Folders of the framework's own states and templates, in devel and install space, and of the files it writes."""
+"""Finds the framework's states, templates, configuration and output folder, in devel and install space."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LAUNCH_FILE = "start_framework.launch"
 
 
 def framework_home() -> Path:
-    """Returns where the framework writes files of its own: ``$ROS_HOME`` (or ``~/.ros``) ``/modular_framework``."""
+    """Returns the framework's output folder, ``$ROS_HOME/modular_framework``, where ROS_HOME defaults to ``~/.ros``."""
     return Path(os.environ.get("ROS_HOME") or Path.home() / ".ros") / "modular_framework"
 
 
@@ -31,35 +31,35 @@ def states_folder() -> Path:
         FileNotFoundError: The package of the states is not on the Python path.
     """
     try:
-        found = importlib.util.find_spec(STATES_PACKAGE)
+        spec = importlib.util.find_spec(STATES_PACKAGE)
     except ModuleNotFoundError:
-        found = None
-    if found is None or not found.submodule_search_locations:
+        spec = None
+    if spec is None or not spec.submodule_search_locations:
         raise FileNotFoundError(
             f"{STATES_PACKAGE} is not on the Python path; source the workspace's setup.bash, or name the states "
             "directory"
         )
-    return Path(next(iter(found.submodule_search_locations)))
+    return Path(next(iter(spec.submodule_search_locations)))
 
 
-def states_folders(own: Sequence[Path]) -> list[Path]:
-    """Returns folders of one's own, and the framework's after them."""
-    return [*own, *([] if states_folder() in own else [states_folder()])]
+def states_folders(user_folders: Sequence[Path]) -> list[Path]:
+    """Returns the user's states folders followed by the framework's."""
+    return [*user_folders, *([] if states_folder() in user_folders else [states_folder()])]
 
 
-def templates_folders(own: Sequence[Path]) -> list[Path]:
-    """Returns folders of one's own, and the framework's after them."""
-    return [*own, *([] if templates_folder() in own else [templates_folder()])]
+def templates_folders(user_folders: Sequence[Path]) -> list[Path]:
+    """Returns the user's templates folders followed by the framework's."""
+    return [*user_folders, *([] if templates_folder() in user_folders else [templates_folder()])]
 
 
 def config_folder() -> Path | None:
-    """Returns the configuration folder of the API package; None when that package is not there."""
+    """Returns the configuration folder of the API package, or None if the package is not installed."""
     folder = _package(API_PACKAGE)
     return None if folder is None or not (folder / "config").is_dir() else folder / "config"
 
 
 def task_script(name: Path) -> Path:
-    """Returns the path of a task script: as given, or in the API package's folder when it is only the name of one."""
+    """Returns the path of a task script. A bare file name that does not exist is resolved in the API package."""
     folder = _package(API_PACKAGE)
     if name.exists() or name.name != str(name) or folder is None:
         return name
@@ -67,9 +67,9 @@ def task_script(name: Path) -> Path:
 
 
 def srdf_file(package: str = "") -> Path | None:
-    """Returns the SRDF of a MoveIt configuration package; by default that of the API package's launch file.
+    """Returns the SRDF of a MoveIt configuration package, by default the package in the API package's launch file.
 
-    None when a package is not there, or has no SRDF, or several and does not say which.
+    Returns None if the package is missing or does not have exactly one SRDF.
     """
     api = _package(API_PACKAGE)
     launch = None if api is None else api / "launch" / LAUNCH_FILE
@@ -77,8 +77,8 @@ def srdf_file(package: str = "") -> Path | None:
         args = xml_text.read(launch).findall("arg")
         package = next((item.get("default", "") for item in args if item.get("name") == "moveit_config_package"), "")
     folder = _package(package) if package else None
-    found = [] if folder is None else sorted(folder.glob("config/*.srdf"))
-    return found[0] if len(found) == 1 else None
+    srdf_files = [] if folder is None else sorted(folder.glob("config/*.srdf"))
+    return srdf_files[0] if len(srdf_files) == 1 else None
 
 
 def _package(name: str) -> Path | None:
@@ -92,7 +92,7 @@ def templates_folder() -> Path:
     """Returns the folder of the framework's templates.
 
     Raises:
-        FileNotFoundError: The package that has them is not in ROS_PACKAGE_PATH.
+        FileNotFoundError: The package with the templates is not in ROS_PACKAGE_PATH.
     """
     try:
         return Path(rospkg.RosPack().get_path(TEMPLATES_PACKAGE)) / "templates"

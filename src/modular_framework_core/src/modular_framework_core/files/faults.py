@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults of a task file: collected while it is checked, raised together, each with its location and what to do."""
+"""Collects the faults of a file, each with location and remedy, and raises them together."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SourceLocation:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Fault:
-    """One thing that is wrong in a task file."""
+    """A fault in a file."""
 
     location: SourceLocation
     message: str
@@ -38,17 +38,17 @@ class Fault:
 
 
 class FileFaults(Exception):
-    """A file cannot be used. Carries every fault that was found in it.
+    """A file is invalid; the exception carries all of its faults.
 
     Attributes:
-        kind: What the file describes, as the text says it.
-        faults: What is wrong, in the order of the file.
+        kind: Noun for the content of the file, used in the message.
+        faults: Faults in file order.
     """
 
     kind = "file"
 
     def __init__(self, faults: Iterable[Fault]) -> None:
-        """Sorts the faults by location and drops repetitions."""
+        """Sorts the faults by location and drops duplicates."""
         self.faults: tuple[Fault, ...] = tuple(sorted(set(faults)))
         lines = "\n".join(f"  {fault}" for fault in self.faults)
         count = f"{len(self.faults)} faults" if len(self.faults) != 1 else "1 fault"
@@ -56,45 +56,45 @@ class FileFaults(Exception):
 
 
 class TaskFault(FileFaults):
-    """A task file cannot be used."""
+    """A task file is invalid."""
 
     kind = "task"
 
 
 class FaultList:
-    """Collects the faults of one task file."""
+    """Collects the faults of one file."""
 
     def __init__(self) -> None:
         self._faults: list[Fault] = []
-        self._settled: set[SourceLocation] = set()
+        self._explained: set[SourceLocation] = set()
         self.harmless = 0
         """Number of faults that do not affect the known states and userdata of the task."""
 
     def add(self, location: SourceLocation, message: str) -> None:
         """Adds a fault, unless a fault added with ``add_cause`` at the same location explains it."""
-        if location not in self._settled:
+        if location not in self._explained:
             self._faults.append(Fault(location, message))
 
     def add_cause(self, location: SourceLocation, message: str) -> None:
-        """Adds a fault of a value that cannot be read at all, and hides later faults of that value."""
+        """Adds a fault of an unreadable value and hides later faults of that value."""
         self.add(location, message)
-        self._settled.add(location)
+        self._explained.add(location)
 
     def add_unknown(
         self, location: SourceLocation, what: str, found: str, allowed: Iterable[str], given: Container[str] = ()
     ) -> None:
-        """Adds a fault for a name that is not allowed, with the closest allowed one where one is similar.
+        """Adds a fault for an unknown name, with a similar allowed name as a suggestion.
 
         Args:
-            location: Where the name is.
-            what: What it names.
-            found: The name.
-            allowed: The names that are allowed.
-            given: Names that are used beside it already, and so cannot be what was meant.
+            location: Position of the name.
+            what: Noun phrase for the named thing.
+            found: Unknown name.
+            allowed: Allowed names.
+            given: Names already used at this place, which are not suggested.
         """
         names = list(dict.fromkeys(allowed))
-        free = [name for name in names if name not in given]
-        self.add(location, f"{what} '{found}' is unknown; {listing(names)}{nearest(found, free)}")
+        unused = [name for name in names if name not in given]
+        self.add(location, f"{what} '{found}' is unknown; {listing(names)}{nearest(found, unused)}")
 
     def extend(self, other: FaultList) -> None:
         """Adds the faults of another list."""
@@ -102,26 +102,26 @@ class FaultList:
             self.add(fault.location, fault.message)
 
     def sorted(self) -> tuple[Fault, ...]:
-        """Returns the faults by location, each once."""
+        """Returns the distinct faults, sorted by location."""
         return tuple(sorted(set(self._faults)))
 
     def __len__(self) -> int:
         return len(self._faults)
 
     def raise_if_any(self) -> None:
-        """Raises ``TaskFault`` with all faults noted so far, if there are any."""
+        """Raises ``TaskFault`` with all faults, if any."""
         if self._faults:
             raise TaskFault(self._faults)
 
 
 def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
-    """Returns the allowed names as text: ``allowed: a, b``; ``empty`` when there are none."""
+    """Returns the allowed names as ``allowed: a, b``, or ``empty`` if there are none."""
     names = list(dict.fromkeys(allowed))
     return f"allowed: {', '.join(names)}" if names else empty
 
 
 def closest(found: str, allowed: Iterable[str]) -> str | None:
-    """Returns the allowed name closest to the one found (or part of it), None where none is close."""
+    """Returns the allowed name that is closest to a name or contains it, or None."""
     by_lower = {str(name).lower(): str(name) for name in allowed}
     wanted = str(found).lower()
     matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.65)
@@ -131,6 +131,6 @@ def closest(found: str, allowed: Iterable[str]) -> str | None:
 
 
 def nearest(found: str, allowed: Iterable[str]) -> str:
-    """Returns ``; did you mean 'x'?`` for the closest allowed name, or nothing."""
+    """Returns ``; did you mean 'x'?`` for the closest allowed name, or ""."""
     name = closest(found, allowed)
     return f"; did you mean '{name}'?" if name is not None else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads YAML (1.2, safe types only) into a tree that remembers the line and column of every key and value."""
+"""Reads YAML 1.2 (safe types only) into a tree with the line and column of every key and value."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from modular_framework_core.files.faults import Fault, FaultList, SourceLocation
 from modular_framework_core.files.shallow_yaml import MAX_DEPTH
 
 MAX_NODES = 500_000
-"""Largest number of values in a file after its aliases are expanded: a guard against exponential expansion."""
+"""Maximum number of values after alias expansion, which can grow exponentially."""
 
 _TAG = "tag:yaml.org,2002:"
 _MERGE_KEY = "<<"
-# the plain scalars of YAML 1.2's core schema that are no text: pattern and what makes the value
+# non-text scalars of YAML 1.2's core schema: type, pattern, conversion
 _CORE: tuple[tuple[str, re.Pattern[str], Callable[[str], Any]], ...] = (
     ("null", re.compile(r"null|Null|NULL|~|"), lambda text: None),
     ("bool", re.compile(r"true|True|TRUE|false|False|FALSE"), lambda text: text[0] in "tT"),
@@ -33,7 +33,7 @@ _CORE: tuple[tuple[str, re.Pattern[str], Callable[[str], Any]], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """Text, number, bool or nothing."""
+    """A text, number, bool or null."""
 
     value: str | bool | int | float | None
     location: SourceLocation
@@ -57,7 +57,7 @@ class Sequence:
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """A mapping whose keys are unique; ``keys`` has the location of each key."""
+    """A mapping with unique keys; ``keys`` contains the location of each key."""
 
     entries: dict[str, Node]
     keys: dict[str, SourceLocation]
@@ -75,7 +75,7 @@ Node = Union[Scalar, Sequence, Mapping]  # noqa: UP007 - the classes above refer
 
 
 def kind_of(node: Node) -> str:
-    """Names the kind of a value, for messages."""
+    """Returns the kind of a value in words, for messages."""
     match node:
         case Mapping():
             return "a mapping"
@@ -95,24 +95,23 @@ def load(path: Path, faults: FaultList) -> Node:
     """Reads a YAML file.
 
     Args:
-        path: The file.
-        faults: Where faults of single values are noted that leave the rest readable: a key given twice, a key that is
-            no text, a tag other than those of text, number, bool, nothing, list and mapping.
+        path: Path of the file.
+        faults: Receives faults of single values: duplicate keys, keys that are not text, and unsupported tags.
 
     Raises:
-        TaskFault: The file cannot be read, is empty, is no valid YAML, or is nested too deeply.
+        TaskFault: The file cannot be read, is empty, is not valid YAML, or is nested too deeply.
     """
     start = SourceLocation(str(path), 1, 1)
     try:
         text = read_text(path)
     except FileNotFoundError as error:
-        there = sorted(file.name for file in path.parent.glob("*.yaml"))
+        yaml_names = sorted(file.name for file in path.parent.glob("*.yaml"))
         raise TaskFault(
             [
                 Fault(
                     start,
-                    f"there is no such file; {listing(there, 'no other .yaml is in its folder')}"
-                    f"{nearest(path.name, there)}",
+                    f"there is no such file; {listing(yaml_names, 'no other .yaml is in its folder')}"
+                    f"{nearest(path.name, yaml_names)}",
                 )
             ]
         ) from error
@@ -122,7 +121,13 @@ def load(path: Path, faults: FaultList) -> Node:
 
 
 def loads(text: str, file: str, faults: FaultList) -> Node:
-    """Reads YAML from text; ``file`` is the name used in messages. Notes faults and raises as ``load`` does."""
+    """Reads YAML from text, see ``load``.
+
+    Args:
+        text: YAML text.
+        file: File name for messages.
+        faults: Receives faults of single values.
+    """
     try:
         return _Reader(text, file, faults).read()
     except yaml.MarkedYAMLError as error:
@@ -137,14 +142,18 @@ def loads(text: str, file: str, faults: FaultList) -> Node:
 
 
 def _syntax_fault(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
-    mark, begun = error.problem_mark or error.context_mark, error.context_mark
-    location = SourceLocation(file, mark.line + 1, mark.column + 1) if mark else SourceLocation(file, 1, 1)
+    problem_mark, context_mark = error.problem_mark or error.context_mark, error.context_mark
+    location = (
+        SourceLocation(file, problem_mark.line + 1, problem_mark.column + 1)
+        if problem_mark
+        else SourceLocation(file, 1, 1)
+    )
     context = f" {error.context}" if error.context else ""
-    if begun and begun.line + 1 != location.line:
-        context += f" that begins in line {begun.line + 1}"
+    if context_mark and context_mark.line + 1 != location.line:
+        context += f" that begins in line {context_mark.line + 1}"
     lines = text.splitlines()
-    rest = lines[location.line - 1][location.column - 1 :] if location.line <= len(lines) else ""
-    hint = "; a tab is here: indent with spaces" if rest.startswith("\t") else ""
+    remainder = lines[location.line - 1][location.column - 1 :] if location.line <= len(lines) else ""
+    hint = "; a tab is here: indent with spaces" if remainder.startswith("\t") else ""
     return Fault(location, f"this is not valid YAML: {error.problem}{context}{hint}")
 
 
@@ -154,7 +163,7 @@ def _location_of(text: str, file: str, position: int) -> SourceLocation:
 
 
 class _Reader:
-    """Builds the tree from the parser's events, which come one by one however deep the file is nested."""
+    """Builds the tree from parser events, so that deep nesting is detected before the stack overflows."""
 
     def __init__(self, text: str, file: str, faults: FaultList) -> None:
         self._events = yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
@@ -163,10 +172,10 @@ class _Reader:
         self._count = 0
         self._depth = 0
         self._anchors: dict[str, tuple[Node, int]] = {}
-        self._open: set[str] = set()
+        self._anchors_in_progress: set[str] = set()
 
     def read(self) -> Node:
-        """Returns the one document of the file."""
+        """Returns the single document of the file."""
         root: Node | None = None
         for event in self._events:
             if isinstance(event, yaml.DocumentStartEvent):
@@ -175,7 +184,7 @@ class _Reader:
                         [
                             Fault(
                                 self._location(event),
-                                "the file has a second document; one is allowed, remove the '---'",
+                                "the file has a second document; only one is allowed, remove the '---'",
                             )
                         ]
                     )
@@ -198,30 +207,30 @@ class _Reader:
         location = self._location(event)
         if isinstance(event, yaml.AliasEvent):
             return self._alias(event.anchor, location)
-        before = self._count
-        self._counted(1, location)
+        count_before = self._count
+        self._count_values(1, location)
         if event.anchor:
-            self._open.add(event.anchor)
+            self._anchors_in_progress.add(event.anchor)
         is_scalar = isinstance(event, yaml.ScalarEvent)
         node: Node = self._scalar(event, location) if is_scalar else self._collection(event, location)
         if event.anchor:
-            self._open.discard(event.anchor)
-            self._anchors[event.anchor] = node, self._count - before
+            self._anchors_in_progress.discard(event.anchor)
+            self._anchors[event.anchor] = node, self._count - count_before
         return node
 
-    def _counted(self, more: int, location: SourceLocation) -> None:
-        self._count += more
+    def _count_values(self, count: int, location: SourceLocation) -> None:
+        self._count += count
         if self._count > MAX_NODES:
             raise TaskFault([Fault(location, f"the file has more than {MAX_NODES} values once aliases are expanded")])
 
     def _alias(self, name: str, location: SourceLocation) -> Node:
-        if name in self._open:
+        if name in self._anchors_in_progress:
             raise TaskFault([Fault(location, "this value contains itself through an alias")])
         if name not in self._anchors:
             reason = f"this is not valid YAML: the alias '*{name}' refers to no anchor before it"
             raise TaskFault([Fault(location, reason)])
         node, count = self._anchors[name]
-        self._counted(count, location)
+        self._count_values(count, location)
         return node
 
     def _collection(self, event: Any, location: SourceLocation) -> Node:
@@ -245,10 +254,10 @@ class _Reader:
         text, tag = event.value, event.tag
         if tag in ("!", _TAG + "str") or (tag is None and not event.implicit[0]):
             return Scalar(text, location)
-        for kind, pattern, make in _CORE:
+        for kind, pattern, convert in _CORE:
             if tag in (None, _TAG + kind) and pattern.fullmatch(text):
                 try:
-                    return Scalar(make(text), location)
+                    return Scalar(convert(text), location)
                 except ValueError as error:
                     self._faults.add(location, f"the number '{text[:20]}...' cannot be read: {error}")
                     return Scalar(None, location)
@@ -280,9 +289,9 @@ class _Reader:
         return Mapping(entries, keys, location)
 
     def _merged(self, value: Node) -> list[Mapping]:
-        found = list(value.items) if isinstance(value, Sequence) else [value]
-        mappings = [item for item in found if isinstance(item, Mapping)]
-        if len(mappings) != len(found):
+        items = list(value.items) if isinstance(value, Sequence) else [value]
+        mappings = [item for item in items if isinstance(item, Mapping)]
+        if len(mappings) != len(items):
             self._faults.add(value.location, f"'<<' takes a mapping or a list of mappings, found {kind_of(value)}")
         return mappings
 

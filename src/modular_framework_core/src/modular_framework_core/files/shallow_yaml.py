@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads untrusted YAML: too deep nesting is refused before it costs stack or time."""
+"""Reads untrusted YAML. Excessive nesting is refused before it costs stack or time."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Any
 import yaml
 
 MAX_DEPTH = 100
-"""Deepest nesting of lists and mappings."""
+"""Maximum nesting depth of lists and mappings."""
 
 
 class TooDeepError(yaml.YAMLError):
-    """A text is nested too deeply; says where."""
+    """A YAML text is nested too deeply."""
 
 
 def check_depth(text: str) -> None:
-    """Checks how deeply a YAML text is nested, event by event.
+    """Checks the nesting depth of a YAML text.
 
     Raises:
-        TooDeepError: It is nested deeper than ``MAX_DEPTH``.
-        yaml.YAMLError: It is no YAML up to there.
+        TooDeepError: The depth exceeds ``MAX_DEPTH``.
+        yaml.YAMLError: The text is not valid YAML.
     """
     depth = 0
     for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):

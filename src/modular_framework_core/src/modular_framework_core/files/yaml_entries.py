@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads YAML files entry by entry with line numbers, so that one bad entry is reported and the others are used."""
+"""Reads YAML files entry by entry with line numbers, so that one invalid entry does not affect the others."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ import yaml
 from modular_framework_core.files import shallow_yaml
 from modular_framework_core.files.atomic_files import read_text
 
-_NODES = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries read the text of a value: its tag is not needed
+_NODE_LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # entries convert the text themselves, without tags
 
 
 class EntryError(ValueError):
-    """One entry of a configuration file cannot be used.
+    """An entry of a configuration file is invalid.
 
     Args:
-        path: File that holds the entry.
-        line: Line of the fault, counted from 1.
-        text: What was found, what is allowed and what to do.
+        path: File of the entry.
+        line: Line of the fault, from 1.
+        text: Message with the found value, the allowed values and the remedy.
     """
 
     def __init__(self, path: Path, line: int, text: str) -> None:
@@ -32,11 +32,11 @@ class EntryError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A key with its still untyped YAML node.
+    """A key with its unconverted YAML node.
 
     Attributes:
         path: File of the entry.
-        line: Line of the key, counted from 1.
+        line: Line of the key, from 1.
         key: Text of the key.
         node: YAML node of the value.
     """
@@ -47,14 +47,14 @@ class Entry:
     node: yaml.Node
 
     def fault(self, text: str) -> EntryError:
-        """Makes an error that points at this entry."""
+        """Returns an error located at this entry."""
         return EntryError(self.path, self.line, f"'{self.key}': {text}")
 
     def children(self) -> list[Entry]:
-        """Splits a mapping into its entries.
+        """Returns the entries of a mapping.
 
         Raises:
-            EntryError: The value is no mapping, or a key occurs twice.
+            EntryError: The value is not a mapping, or a key occurs twice.
         """
         if not isinstance(self.node, yaml.MappingNode):
             raise self.fault(f"got {describe(self.node)}, expected a mapping of keys to values")
@@ -69,26 +69,26 @@ class Entry:
         return entries
 
     def items(self) -> list[Entry]:
-        """Splits a list into entries whose keys are the positions counted from 1.
+        """Returns the items of a list as entries ``key[1]``, ``key[2]``, ...
 
         Raises:
-            EntryError: The value is no list.
+            EntryError: The value is not a list.
         """
         if not isinstance(self.node, yaml.SequenceNode):
             raise self.fault(f"got {describe(self.node)}, expected a list")
         return [
-            Entry(self.path, int(node.start_mark.line) + 1, f"{self.key}[{number}]", node)
-            for number, node in enumerate(self.node.value, start=1)
+            Entry(self.path, int(node.start_mark.line) + 1, f"{self.key}[{index}]", node)
+            for index, node in enumerate(self.node.value, start=1)
         ]
 
     def number(self) -> float:
-        """Reads the value as a finite number in double precision.
+        """Returns the value as a finite number in double precision.
 
         Raises:
-            EntryError: The value is no finite number.
+            EntryError: The value is not a finite number.
         """
         text = self.text()
-        if isinstance(self.node, yaml.ScalarNode) and not self.node.style:  # plain: None, or "" from libyaml
+        if isinstance(self.node, yaml.ScalarNode) and not self.node.style:  # style of plain scalars: None or ""
             try:
                 value = float(text)
             except ValueError:
@@ -98,7 +98,7 @@ class Entry:
         raise self.fault(f"got {describe(self.node)}, expected a finite number")
 
     def text(self) -> str:
-        """Reads the value as text.
+        """Returns the value as text.
 
         Raises:
             EntryError: The value is a mapping or a list.
@@ -109,7 +109,7 @@ class Entry:
 
 
 def describe(node: yaml.Node) -> str:
-    """Names a YAML node for an error text."""
+    """Returns the kind of a YAML node in words, for messages."""
     match node:
         case yaml.MappingNode():
             return "a mapping"
@@ -120,26 +120,26 @@ def describe(node: yaml.Node) -> str:
 
 
 def read_entries(path: Path) -> Iterator[Entry | EntryError]:
-    """Reads the top-level mapping of a YAML file.
+    """Yields the entries of a file's top-level mapping.
 
     Args:
-        path: File to read; an empty file has no entries.
+        path: YAML file; an empty file has no entries.
 
     Yields:
         Each entry in file order, or an error for an entry that repeats an earlier key.
 
     Raises:
-        EntryError: The file cannot be read, is no YAML, or its top level is no mapping.
+        EntryError: The file cannot be read, is not valid YAML, or its top level is not a mapping.
     """
     try:
-        root = shallow_yaml.compose(read_text(path), _NODES)
+        root = shallow_yaml.compose(read_text(path), _NODE_LOADER)
     except (OSError, UnicodeDecodeError) as error:
         raise EntryError(path, 1, f"cannot be read ({error}); give the path of a readable YAML file") from error
     except yaml.MarkedYAMLError as error:
         line = int(error.problem_mark.line) + 1 if error.problem_mark else 1
-        raise EntryError(path, line, f"is no valid YAML: {error.problem}; correct this line") from error
+        raise EntryError(path, line, f"is not valid YAML: {error.problem}; correct this line") from error
     except yaml.YAMLError as error:
-        raise EntryError(path, 1, f"is no valid YAML: {error}") from error
+        raise EntryError(path, 1, f"is not valid YAML: {error}") from error
     if root is None:
         return
     if not isinstance(root, yaml.MappingNode):
@@ -148,30 +148,30 @@ def read_entries(path: Path) -> Iterator[Entry | EntryError]:
     for key_node, value_node in root.value:
         entry = Entry(path, int(key_node.start_mark.line) + 1, str(key_node.value), value_node)
         if entry.key in seen:
-            yield entry.fault("this name was used further up in the file; rename one of the two")
+            yield entry.fault("this name occurs earlier in the file; rename one of the two entries")
             continue
         seen.add(entry.key)
         yield entry
 
 
 def name_fault(name: str) -> str:
-    """Describes why a name cannot be sent in a message; "" if it can."""
+    """Returns the reason why a name cannot be sent in a ROS message; "" if valid."""
     try:
         name.encode()
     except UnicodeEncodeError:
-        return f"the name {name!r} has half of a character (a lone surrogate); leave it out"
-    return "" if name else "the name is empty; write one"
+        return f"the name {name!r} contains half of a character (a lone surrogate); remove it"
+    return "" if name else "the name is empty; write a name"
 
 
 def read_each_entry(path: Path, handle: Callable[[Entry], None]) -> list[EntryError]:
-    """Calls a function with every entry of a file, and continues after one that is not usable.
+    """Calls a function with every entry of a file and continues after invalid entries.
 
     Args:
-        path: File to read.
-        handle: Gets one entry after the other; raises EntryError for one it cannot use.
+        path: YAML file.
+        handle: Function that raises EntryError for an invalid entry.
 
     Returns:
-        One error for each entry (or for the file) that is not usable, in file order.
+        One error per invalid entry, or one error for an unreadable file, in file order.
     """
     faults: list[EntryError] = []
     try:

@@ -47,7 +47,7 @@ def path_of(text: str, folder: Path, others: Iterable[Path] = ()) -> Path:
         path = folder / Path(text).expanduser()
         inside = any(path.resolve().is_relative_to(allowed.resolve()) for allowed in (folder, *others))
     except (OSError, RuntimeError, ValueError) as error:  # of a name with a NUL byte, an unknown user, links in a ring
-        raise MessageFileError(f"path {text!r} is no path of a file: {error}; name a file in {folder}") from error
+        raise MessageFileError(f"path {text!r} is not a valid path: {error}; name a file in {folder}") from error
     if not text or path.suffix not in SUFFIXES:
         raise MessageFileError(f"path {text!r}: a file that ends in {' or '.join(SUFFIXES)} is needed, in {folder}")
     if not inside:
