@@ -139,4 +139,4 @@ def test_a_viewer_cannot_change_a_task_and_a_shown_task_stops_at_once(task) -> N
     assert time.monotonic() - asked < 10.0  # the state would stay for a minute
     output = task.stdout.read()
     assert "Traceback" not in output, output
-    assert "not shown" not in output
+    assert "not published for viewers" not in output

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs a task: its userdata, its states, and the record of what they did."""
+"""Runs a task, provides its userdata and records its states."""

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Records what the states of a running task do: when each started and ended, with which outcome, and why.
-
-The recorder observes any smach state, so a user's own states are recorded like the framework's.
-"""
+"""Records the start, end, outcome and reason of every state execution of a task, for any smach state."""
 
 from __future__ import annotations
 
@@ -21,17 +18,17 @@ from modular_framework_core.files.atomic_files import write_atomically
 
 @dataclass(frozen=True, slots=True)
 class StateRecord:
-    """One execution of one state.
+    """One execution of a state.
 
     Attributes:
         path: Labels from the root to the state, joined by "/".
-        started_s: When it started [s since the task started].
-        ended_s: When it ended [s since the task started]; None while it runs.
-        outcome: What it returned; None while it runs, or when it raised.
-        failed: Whether it ended with its negative (last) outcome, gave a reason, or raised.
-        reason: Why, in words of the state; "" when it gave none.
-        ros_started_s: When it started by the ROS clock, which is simulated time in simulation [s]; None without one.
-        ros_ended_s: When it ended by the ROS clock [s]; None while it runs, or without one.
+        started_s: Start time [s since the start of the task].
+        ended_s: End time [s since the start of the task]; None while running.
+        outcome: Outcome; None while running or after an exception.
+        failed: Whether the state returned its negative (last) outcome, gave a reason, or raised an exception.
+        reason: Reason given by the state; "" without a reason.
+        ros_started_s: Start time on the ROS clock [s]; None without a ROS clock.
+        ros_ended_s: End time on the ROS clock [s]; None while running or without a ROS clock.
     """
 
     path: str
@@ -46,12 +43,12 @@ class StateRecord:
 
 @dataclass(frozen=True, slots=True)
 class RunningState:
-    """A state that runs now.
+    """A running state.
 
     Attributes:
         path: Labels from the root to the state, joined by "/".
-        elapsed_s: For how long it has been running [s].
-        feedback: What the state reports that it is doing; "" without a report.
+        elapsed_s: Time since the start of the state [s].
+        feedback: Activity reported by the state; "" without a report.
     """
 
     path: str
@@ -61,14 +58,14 @@ class RunningState:
 
 @dataclass(frozen=True, slots=True)
 class FailureSummary:
-    """All executions of one state that failed.
+    """Summary of a state's failures.
 
     Attributes:
         path: Labels from the root to the state.
-        failures: How often it failed.
-        executions: How often it ran.
-        last_reason: Why it failed the last time.
-        different_reasons: How many different reasons it gave.
+        failures: Number of failed executions.
+        executions: Number of executions.
+        last_reason: Reason of the last failure.
+        different_reasons: Number of different reasons.
     """
 
     path: str
@@ -79,17 +76,17 @@ class FailureSummary:
 
     def __str__(self) -> str:
         times = "once" if self.failures == 1 else f"{self.failures} times"
-        of = "" if self.executions == self.failures else f" of {self.executions}"
-        more = f" (the last of {self.different_reasons} different reasons)" if self.different_reasons > 1 else ""
-        return f"{self.path} failed {times}{of}: {self.last_reason}{more}"
+        total = "" if self.executions == self.failures else f" of {self.executions}"
+        note = f" (the last of {self.different_reasons} different reasons)" if self.different_reasons > 1 else ""
+        return f"{self.path} failed {times}{total}: {self.last_reason}{note}"
 
 
 Listener = Callable[[StateRecord, tuple[str, ...]], None]
-"""Called at the start and the end of each state with its record and the paths of the states that run now."""
+"""Function called at the start and end of each state, with the state's record and the paths of all running states."""
 
 
 class TaskRecorder:
-    """Keeps the records of one run of one task; safe to use from several threads."""
+    """Keeps the records of one run of a task. All methods are thread-safe."""
 
     def __init__(
         self,
@@ -97,17 +94,17 @@ class TaskRecorder:
         clock: Callable[[], float] = time.monotonic,
         ros_clock: Callable[[], float | None] = lambda: None,
     ) -> None:
-        """Starts the task's clock.
+        """Stores the start time of the task.
 
         Args:
-            listener: Notified of each start and end of a state that has no children.
-            clock: Returns the time [s].
-            ros_clock: Returns the time by the ROS clock [s].
+            listener: Function called at each start and end of a leaf state.
+            clock: Function that returns the time [s].
+            ros_clock: Function that returns the ROS time [s].
         """
         self._listener = listener
         self._clock = clock
         self._ros_clock = ros_clock
-        self._zero = clock()
+        self._start_s = clock()
         self._lock = threading.Lock()
         self._notify_lock = threading.Lock()
         self._records: list[StateRecord] = []
@@ -115,10 +112,10 @@ class TaskRecorder:
 
     def elapsed_s(self) -> float:
         """Returns the time since the task started [s]."""
-        return self._clock() - self._zero
+        return self._clock() - self._start_s
 
     def attach(self, machine: smach.Container) -> None:
-        """Records every state in a machine and in the machines nested in it from now on."""
+        """Starts recording all states of a machine, including nested machines."""
         for label, child in machine.get_children().items():
             self._attach_state(child, label)
 
@@ -130,61 +127,61 @@ class TaskRecorder:
         execute = state.execute
 
         def recorded(userdata: Any) -> str:
-            for text in ("reason", "feedback"):
-                if hasattr(state, text):
-                    setattr(state, text, "")
-            number = self._begin(path, state)
+            for attribute in ("reason", "feedback"):
+                if hasattr(state, attribute):
+                    setattr(state, attribute, "")
+            index = self._begin(path, state)
             try:
                 outcome = execute(userdata)
             except BaseException as error:
-                self._end(number, None, True, f"raised {type(error).__name__}: {error}")
+                self._end(index, None, True, f"raised {type(error).__name__}: {error}")
                 raise
             reason = str(getattr(state, "reason", "") or "")
             outcomes = state.get_registered_outcomes()
             negative = len(outcomes) > 1 and outcome == outcomes[-1]
-            self._end(number, outcome, negative or bool(reason), reason)
+            self._end(index, outcome, negative or bool(reason), reason)
             return outcome
 
         state.execute = recorded  # type: ignore[method-assign]
 
     def _begin(self, path: str, state: smach.State) -> int:
         with self._lock:
-            number = len(self._records)
+            index = len(self._records)
             self._records.append(StateRecord(path, self.elapsed_s(), ros_started_s=self._ros_clock()))
-            self._active[number] = path, state
-        self._notify(number)
-        return number
+            self._active[index] = path, state
+        self._notify(index)
+        return index
 
-    def _end(self, number: int, outcome: str | None, failed: bool, reason: str) -> None:
+    def _end(self, index: int, outcome: str | None, failed: bool, reason: str) -> None:
         with self._lock:
-            self._active.pop(number, None)
+            self._active.pop(index, None)
             if failed and not reason:
                 reason = f"gave '{outcome}' and no reason"
-            self._records[number] = replace(
-                self._records[number],
+            self._records[index] = replace(
+                self._records[index],
                 ended_s=self.elapsed_s(),
                 outcome=outcome,
                 failed=failed,
                 reason=reason,
                 ros_ended_s=self._ros_clock(),
             )
-        self._notify(number)
+        self._notify(index)
 
-    def _notify(self, number: int) -> None:
+    def _notify(self, index: int) -> None:
         if self._listener is None:
             return
-        with self._notify_lock:  # so that the last notification has the current states
+        with self._notify_lock:  # keeps the notifications in order
             with self._lock:
-                record, active = self._records[number], tuple(path for path, _ in self._active.values())
+                record, active = self._records[index], tuple(path for path, _ in self._active.values())
             self._listener(record, active)
 
     def records(self) -> tuple[StateRecord, ...]:
-        """Returns all records, in the order the states started."""
+        """Returns all records, in the order of their start."""
         with self._lock:
             return tuple(self._records)
 
     def active(self) -> tuple[str, ...]:
-        """Returns the paths of the states that run now."""
+        """Returns the paths of the running states."""
         with self._lock:
             return tuple(path for path, _ in self._active.values())
 
@@ -193,19 +190,19 @@ class TaskRecorder:
         now = self.elapsed_s()
         with self._lock:
             return tuple(
-                RunningState(path, now - self._records[number].started_s, str(getattr(state, "feedback", "")))
-                for number, (path, state) in self._active.items()
+                RunningState(path, now - self._records[index].started_s, str(getattr(state, "feedback", "")))
+                for index, (path, state) in self._active.items()
             )
 
     def failures(self) -> tuple[FailureSummary, ...]:
-        """Returns one summary for each state that failed, in the order they failed first."""
+        """Returns one summary per failed state, in the order of first failure."""
         records = self.records()
         paths = dict.fromkeys(record.path for record in records if record.failed)
         summaries = []
         for path in paths:
-            mine = [record for record in records if record.path == path]
-            reasons = [record.reason for record in mine if record.failed]
-            summaries.append(FailureSummary(path, len(reasons), len(mine), reasons[-1], len(set(reasons))))
+            executions = [record for record in records if record.path == path]
+            reasons = [record.reason for record in executions if record.failed]
+            summaries.append(FailureSummary(path, len(reasons), len(executions), reasons[-1], len(set(reasons))))
         return tuple(summaries)
 
 
@@ -214,20 +211,20 @@ def write_record(
 ) -> Path:
     """Writes the record of one run as JSON, for tools that compare runs.
 
-    The file has ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error`` and ``states``: for each
-    execution of a state the fields of ``StateRecord``, times in seconds since the task started.
+    The keys are ``task``, ``begun`` [s since 1970], ``outcome``, ``succeeded``, ``error`` and ``states``, a list of
+    ``StateRecord`` fields.
 
     Args:
-        folder: Where to write; made when it is not there.
+        folder: Output folder; created if missing.
         task: Name of the task.
-        begun: When the task started [s since 1970].
+        begun: Start time of the task [s since 1970].
         outcome: Outcome of the task.
-        succeeded: Whether that is its success outcome.
-        error: What went wrong outside of the states' own reasons; "" when nothing did.
-        records: What the states did.
+        succeeded: Whether the outcome is the task's success outcome.
+        error: Error outside of the states' own reasons; "" without an error.
+        records: Records of the state executions.
 
     Returns:
-        The path of the file: ``<task>_<date>_<time>_<process>.json``.
+        The path of the file, ``<task>_<date>_<time>_<process>.json``.
     """
     folder.mkdir(parents=True, exist_ok=True)
     stamp = time.strftime("%Y%m%d_%H%M%S", time.gmtime(begun))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Brings a running stack to the state in which an episode begins, the same after a cold start and after an episode.
+"""Resets a running stack to the start of an episode, with the same state as after a cold start.
 
-What can be asked for with the parameters ``/wait_for_planning`` and ``/seed``: the same episode gives the same motions.
+With the parameters ``/wait_for_planning`` and ``/seed``, the same episode gives the same motions.
 """
 
 from __future__ import annotations
@@ -25,21 +25,20 @@ GENERATION_TIMEOUT_S = 300.0
 
 
 class EpisodeError(RuntimeError):
-    """An episode cannot begin; the text says why."""
+    """An episode cannot begin."""
 
 
 def begin_episode(spawn: Callable[[], None], settle_s: float) -> None:
-    """Begins an episode; simulated time has to be held by the caller, from here to the end of the episode.
+    """Begins an episode: restarts the world, spawns and settles the objects, and resets the managers.
 
-    In this sequence: the world begins again, objects are spawned while time stands still, they settle, the managers
-    forget what was added. Grasps are generated next, see :func:`generate_grasps`.
+    The caller must hold simulated time until the end of the episode. The next step is :func:`generate_grasps`.
 
     Args:
-        spawn: Puts the objects of the episode into the world.
-        settle_s: Simulated time for them to settle [s].
+        spawn: Function that spawns the objects of the episode.
+        settle_s: Settling time of the objects [s, simulated time].
 
     Raises:
-        EpisodeError: A node does not do its part.
+        EpisodeError: A node does not answer or reports a failure.
     """
     try:
         _trigger(RESTART_SERVICE, SERVICE_TIMEOUT_S)
@@ -52,20 +51,20 @@ def begin_episode(spawn: Callable[[], None], settle_s: float) -> None:
 
 
 def generate_grasps() -> bool:
-    """Asks the method to generate grasps; returns whether it offers the service. The task handles an empty result.
+    """Asks the method to generate grasps and returns whether the service exists. The task handles an empty result.
 
     Raises:
-        CallError: the method does not answer.
+        CallError: The method does not answer.
     """
     if rospy.resolve_name(GENERATE_SERVICE) not in rosservice.get_service_list():
         return False
-    answer = request_service(GENERATE_SERVICE, Trigger, TriggerRequest(), GENERATION_TIMEOUT_S)
-    rospy.loginfo("%s: %s", GENERATE_SERVICE, answer.message)
+    response = request_service(GENERATE_SERVICE, Trigger, TriggerRequest(), GENERATION_TIMEOUT_S)
+    rospy.loginfo("%s: %s", GENERATE_SERVICE, response.message)
     return True
 
 
 def _forget_messages(services: set[str]) -> None:
-    """Makes the managers forget what the episode before added, and drops the collisions that it allowed."""
+    """Resets the messages and allowed collisions that the previous episode added to the managers."""
     for name in sorted(name for name in services if name.rpartition("/")[2].startswith(REINITIALISE_PREFIX)):
         request_service(name, ReinitManager, ReinitManagerRequest(), SERVICE_TIMEOUT_S)
     if rospy.resolve_name(COLLISION_MATRIX_SERVICE) in services:
@@ -74,6 +73,6 @@ def _forget_messages(services: set[str]) -> None:
 
 
 def _trigger(name: str, timeout_s: float) -> None:
-    answer = request_service(name, Trigger, TriggerRequest(), timeout_s)
-    if not answer.success:
-        raise CallError(f"service '{name}': {answer.message}")
+    response = request_service(name, Trigger, TriggerRequest(), timeout_s)
+    if not response.success:
+        raise CallError(f"service '{name}': {response.message}")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fills the userdata of a framework state machine with the keys that the framework's states expect.
+"""Provides the userdata keys that the framework's states expect.
 
 Keys: ``selected_grasp``, ``selected_joint_state``, ``selected_trajectory``, ``selected_pose``, ``selected_plan`` (None
-until a state selects something), ``arm_commander`` (ArmCommander), ``manipulator_controller_client``
-(actionlib.SimpleActionClient of the Grasp action) and ``max_torque``; the last two are None when the task has no
-manipulator (parameter ``manipulator_prefix`` empty).
+until a state selects a message), ``arm_commander`` (ArmCommander), ``manipulator_controller_client``
+(actionlib.SimpleActionClient of the Grasp action) and ``max_torque``. The last two are None without a manipulator
+(empty parameter ``manipulator_prefix``).
 
 Parameters: see ``parameters/run_task.yaml``. Written: ``manipulator_links_indices``.
 Services called: ``get_planning_scene``, ``set_init_acm``.
@@ -32,49 +32,51 @@ SELECTED_KEYS = ("selected_grasp", "selected_joint_state", "selected_trajectory"
 
 
 class UserdataError(RuntimeError):
-    """The userdata cannot be filled; the text says what is missing."""
+    """The userdata cannot be initialised."""
 
 
 def initialise_userdata(userdata: Any) -> None:
-    """Puts the framework's keys into a userdata.
+    """Adds the framework's keys to the userdata.
 
     Raises:
-        ParameterError: Parameters are missing or wrong; names all of them and their files.
-        UserdataError, CallError, CommanderError: move_group or a manager is missing or refused.
+        ParameterError: Parameters are missing or invalid; the message names all of them and their files.
+        UserdataError, CallError, CommanderError: move_group or a manager is missing or refused a request.
     """
     arm = ("/planner_name", "/robot_speed_factor", "/arm_group_name", "/number_plan_attempt", "/planning_max_time")
     hand = ("/manipulator_prefix", "/manipulator_controller_action_server_name", "/max_torque")
-    *of_arm, prefix, action, max_torque = DeclaredParameters("modular_framework_core", "run_task").values(*arm, *hand)
+    *arm_settings, prefix, action, max_torque = DeclaredParameters("modular_framework_core", "run_task").values(
+        *arm, *hand
+    )
     for key in SELECTED_KEYS:
         userdata[key] = None
     initialise_acm(prefix)
-    userdata.arm_commander = _make_arm_commander(*of_arm)
+    userdata.arm_commander = _make_arm_commander(*arm_settings)
     userdata.max_torque = max_torque if prefix else None
     userdata.manipulator_controller_client = SteadyActionClient(action, GraspAction) if prefix else None
 
 
 def initialise_acm(manipulator_prefix: str) -> None:
-    """Sends move_group's allowed collision matrix to the ACM manager and sets which links are the manipulator's.
+    """Sends move_group's allowed collision matrix to the ACM manager and publishes the manipulator's link indices.
 
     Args:
-        manipulator_prefix: Texts separated by spaces, one of which is in the name of every link of the manipulator;
-            "" = there is no manipulator.
+        manipulator_prefix: Texts separated by spaces. A link whose name contains one of the texts belongs to the
+            manipulator. "" without a manipulator.
 
     Raises:
-        UserdataError: No link has such a text in its name, or the ACM manager refused the matrix.
+        UserdataError: No link name contains one of the texts, or the ACM manager refused the matrix.
         CallError: A service is missing or did not answer.
     """
     get_scene = rospy.ServiceProxy("/get_planning_scene", GetPlanningScene)
     set_acm = rospy.ServiceProxy("set_init_acm", SetInitACM)
     for proxy in (get_scene, set_acm):
         wait_for_service(proxy, start_timeout())
-    wanted = PlanningSceneComponents.ALLOWED_COLLISION_MATRIX | PlanningSceneComponents.SCENE_SETTINGS
-    request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=wanted))
+    components = PlanningSceneComponents.ALLOWED_COLLISION_MATRIX | PlanningSceneComponents.SCENE_SETTINGS
+    request = GetPlanningSceneRequest(components=PlanningSceneComponents(components=components))
     acm = call_service(get_scene, request, SERVICE_TIMEOUT_S).scene.allowed_collision_matrix
     indices = manipulator_links(list(acm.entry_names), manipulator_prefix)
     if manipulator_prefix and not indices:
         raise UserdataError(
-            f"manipulator_prefix is '{manipulator_prefix}', but no link has that in its name; the links are: "
+            f"manipulator_prefix is '{manipulator_prefix}', but no link name contains it; the links are: "
             f"{', '.join(acm.entry_names)}; correct it in the launch file, or leave it empty for a task without gripper"
         )
     rospy.set_param("manipulator_links_indices", indices)
@@ -86,10 +88,17 @@ def initialise_acm(manipulator_prefix: str) -> None:
 
 
 def _make_arm_commander(planner: str, speed: float, group: str, attempts: int, time_s: float) -> ArmCommander:
-    """Returns a connected commander for a planning group.
+    """Returns a connected commander of a planning group.
+
+    Args:
+        planner: Planner ID.
+        speed: Velocity scaling factor, above 0 and at most 1.
+        group: Planning group.
+        attempts: Number of planning attempts.
+        time_s: Planning time [s].
 
     Raises:
-        CommanderError: Something needed is missing, or there is no planner of that name.
+        CommanderError: A service, action or topic is missing, or the planner is unknown.
     """
     commander = ArmCommander(name=group, set_ground=False)
     commander.set_max_velocity_scaling_factor(speed)

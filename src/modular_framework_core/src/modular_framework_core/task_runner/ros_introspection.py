@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the state machine of a running task for viewers; the task never waits for this or fails because of it.
+"""Publishes the state machine of a running task for viewers, without delaying or failing the task.
 
-Publishers: ``<node>/smach/container_structure``, ``<node>/smach/container_status`` (smach_msgs). Viewers can watch, but
-not change the task: there is no subscriber.
+Publishers: ``<node>/smach/container_structure``, ``<node>/smach/container_status`` (smach_msgs). Viewers cannot change
+the task, because there is no subscriber.
 """
 
 from __future__ import annotations
@@ -15,36 +15,36 @@ import rospy
 import smach
 
 START_DELAY_S = 0.3
-"""Delay of the publishers, so that they do not slow the start of the task down [s]."""
+"""Delay of the publishers, so that they do not slow down the start of the task [s]."""
 
 
-def shown(name: str, factory: Callable[[], smach.Container]) -> Callable[[], smach.Container]:
-    """Returns a function that makes the same machine and has it shown.
+def with_introspection(name: str, factory: Callable[[], smach.Container]) -> Callable[[], smach.Container]:
+    """Returns a factory that also publishes its state machine.
 
-    To be called before the run begins: the import puts rospy's shutdown check in smach, and the run puts its own there.
+    Must be called before the run, because importing smach_ros sets smach's shutdown check, which the run replaces.
 
     Args:
-        name: Name of the task: the root of the paths shown.
-        factory: Makes the state machine.
+        name: Name of the task and root of the published paths.
+        factory: Function that creates the state machine.
     """
     try:
-        import smach_ros  # noqa: F401 - connects smach to rospy, therefore not wherever this module is imported
-    except Exception as error:  # a task runs without viewers too
-        rospy.logwarn(f"the task is not shown to viewers: {error}")
+        import smach_ros  # noqa: F401 - connects smach to rospy; imported here, not at import of this module
+    except Exception as error:  # the task also runs without viewers
+        rospy.logwarn(f"the task is not published for viewers: {error}")
         return factory
 
-    def make() -> smach.Container:
+    def make_and_publish() -> smach.Container:
         machine = factory()
-        # in a thread, and later: advertising asks the master several times; the first state is not to wait for that
-        thread = threading.Thread(target=_show, args=(machine, name), name="task introspection", daemon=True)
+        # delayed in a thread, because advertising needs several calls to the master and would delay the first state
+        thread = threading.Thread(target=_start_server, args=(machine, name), name="task introspection", daemon=True)
         thread.start()
         return machine
 
-    return make
+    return make_and_publish
 
 
-def _show(machine: smach.Container, name: str) -> None:
-    """Body of the thread: start the server."""
+def _start_server(machine: smach.Container, name: str) -> None:
+    """Starts the introspection server; body of the thread."""
     from smach_ros import IntrospectionServer
 
     threading.Event().wait(START_DELAY_S)
@@ -53,6 +53,6 @@ def _show(machine: smach.Container, name: str) -> None:
     try:
         path = "/" + name.replace("/", "_")
         IntrospectionServer(rospy.get_name(), machine, path, accept_commands=False).start()
-    except Exception as error:  # a task runs without viewers too
+    except Exception as error:  # the task also runs without viewers
         if not rospy.is_shutdown():
-            rospy.logwarn(f"the task is not shown to viewers: {type(error).__name__}: {error}")
+            rospy.logwarn(f"the task is not published for viewers: {type(error).__name__}: {error}")

@@ -1,25 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node that runs a task: makes its state machine, runs it, publishes what it does, and exits with its result.
+"""The node ``run_task``: generates a task's state machine, runs it, publishes its status and exits with its result.
 
-Node ``run_task``. Arguments: optionally the path of a task script (``.yaml``) or of a state machine (``.py``).
-Parameters (used where there is no argument):
-    ``~task_constructor_script``: path of the task script, or its name in the API package's folder of scripts.
-    ``~state_machine_to_load``: path of an existing state machine, or its name in the folder of generated ones; when it
-        is not empty, nothing is generated.
-    ``~generated_state_machine_name``: file name of the generated state machine; empty: the task's name.
-    ``~states_directory``, ``~templates_directory``: one directory, or several separated by ":" (or a list); the
-        framework's own are found after them.
-    ``~config_directory``: folder whose files have the names of messages a task may use; empty: these are not checked.
-    ``/robot_description_semantic``: has the postures and planning groups it may use.
-    ``/run_id``: written by roslaunch; holds the time at which the launch began.
-    ``~wait_for_start``: whether the task waits until it is asked to start, and may be started again and again (false).
-    ``~record_directory``: where the record of the run is written (default:
-        ``$ROS_HOME/modular_framework/task_records``).
-Services: ``~stop`` (std_srvs/Trigger) stops the task as SIGINT does, and answers when the request has been passed on;
-    with ``~wait_for_start`` ``~start`` (std_srvs/Trigger) starts the task, and answers at once.
-Publishers: ``task_outcome`` (std_msgs/String, latched), ``task_status`` (std_msgs/String, JSON, latched: at every start
-    and end of a state, and twice a second while states run), for viewers those of ``ros_introspection``.
-Exit code: 0 for the task's success outcome (its first), 1 for any other, 2 when the task could not be run.
+Arguments: optionally the path of a task script (``.yaml``) or of a state machine (``.py``).
+Parameters (without an argument):
+    ``~task_constructor_script``: Path of the task script, or its name in the API package's scripts folder.
+    ``~state_machine_to_load``: Path of an existing state machine, or its name in the folder of generated state
+        machines. If nonempty, nothing is generated.
+    ``~generated_state_machine_name``: File name of the generated state machine; default: the task's name.
+    ``~states_directory``, ``~templates_directory``: Directories, as a list or separated by ":". The framework's own
+        directories are searched last.
+    ``~config_directory``: Folder with the named messages of the task; if empty, message names are not checked.
+    ``/robot_description_semantic``: SRDF with the available postures and planning groups.
+    ``/run_id``: Run ID of roslaunch, which contains the launch time.
+    ``~wait_for_start``: Whether each run waits for a call of ``~start``; default: false.
+    ``~record_directory``: Output folder of run records; default: ``$ROS_HOME/modular_framework/task_records``.
+Services: ``~stop`` (std_srvs/Trigger) requests a stop like SIGINT and answers at once. With ``~wait_for_start``,
+    ``~start`` (std_srvs/Trigger) starts the task and answers at once.
+Publishers: ``task_outcome`` (std_msgs/String, latched); ``task_status`` (std_msgs/String, JSON, latched), at every
+    start and end of a state and twice a second in between; the topics of ``ros_introspection``.
+Exit code: 0 for the task's success outcome (its first), 1 for other outcomes, 2 if the task could not be run.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ from modular_framework_core.task_constructor import generator, loading, pipeline
 from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_runner.record import RunningState, StateRecord, TaskRecorder, write_record
-from modular_framework_core.task_runner.ros_introspection import shown
+from modular_framework_core.task_runner.ros_introspection import with_introspection
 from modular_framework_core.task_runner.task_runner import EXIT_NOT_RUN, EXIT_SUCCEEDED, TaskResult, TaskRun
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.node_handle import ParameterError
@@ -54,28 +53,28 @@ from modular_framework_ros.ros_frozen_nodes import frozen_nodes
 from modular_framework_ros.simulated_time import SimulatedTime
 
 STOP_GRACE_S = 0.6
-"""How long running states have to stop [s] before the node gives up on them."""
+"""Time for running states to stop before the node exits without them [s]."""
 
 STATUS_PERIOD_S = 0.5
-"""Time between two messages about states that are still running [s]."""
+"""Period of status messages about running states [s]."""
 
 PUBLISH_TIME_S = 0.2
-"""Time for the last messages to be sent before the process exits [s]."""
+"""Delay before the process exits, for the last messages to be sent [s]."""
 
 START_POLL_S = 0.1
-"""Time between two looks whether the node is to end while the task waits for its start [s]."""
+"""Period for polling shutdown while the task waits for its start [s]."""
 
 _PROCESS_START = time.time()
 _UUID_EPOCH_S = 12219292800
-"""Seconds from the start of UUID time (1582-10-15) to that of Unix time."""
+"""Offset of the UUID epoch (1582-10-15) to the Unix epoch [s]."""
 
 
 class TaskNotRun(Exception):
-    """The task cannot be run; the text says why."""
+    """The task cannot be run."""
 
 
 def launch_time() -> float:
-    """Returns when the launch began [s since 1970]: the time in roslaunch's run id, else the start of this process."""
+    """Returns the launch time [s since 1970] from roslaunch's run ID, or the start time of this process."""
     try:
         run_id = uuid.UUID(str(rospy.get_param("/run_id")))
     except (KeyError, ValueError):
@@ -84,13 +83,13 @@ def launch_time() -> float:
 
 
 class TaskReporter:
-    """Reports to other nodes and the log what the task does."""
+    """Publishes and logs the progress of a task."""
 
     def __init__(self, name: str) -> None:
         """Advertises the topics."""
         self._name = name
         self._lock = threading.Lock()
-        self._first_seen = False
+        self._has_started_state = False
         self._started = time.monotonic()
         self._status = rospy.Publisher("task_status", String, queue_size=100, latch=True)
         self._outcome = rospy.Publisher("task_outcome", String, queue_size=1, latch=True)
@@ -98,11 +97,11 @@ class TaskReporter:
     def on_state(self, record: StateRecord, active: tuple[str, ...]) -> None:
         """Publishes the start or end of a state; logs the first start."""
         with self._lock:
-            first, self._first_seen = not self._first_seen, True
-        if first:
-            begun = launch_time()
-            clock = time.strftime("%H:%M:%S", time.localtime(begun))
-            rospy.loginfo(f"first state running: {record.path} after {time.time() - begun:.1f} s since {clock}")
+            is_first, self._has_started_state = not self._has_started_state, True
+        if is_first:
+            launched = launch_time()
+            clock = time.strftime("%H:%M:%S", time.localtime(launched))
+            rospy.loginfo(f"first state running: {record.path} after {time.time() - launched:.1f} s since {clock}")
         ended = record.ended_s is not None
         self._publish(
             {
@@ -120,7 +119,7 @@ class TaskReporter:
             rospy.loginfo(f"state {record.path} ended with '{record.outcome}'")
 
     def on_running(self, states: tuple[RunningState, ...]) -> None:
-        """Publishes for how long the states that run now have been running, and what they say they are doing."""
+        """Publishes the elapsed times and feedback of the running states."""
         if not states:
             return
         self._publish(
@@ -139,11 +138,11 @@ class TaskReporter:
         self._status.publish(String(json.dumps(status)))
 
     def on_end(self, result: TaskResult, frozen: str = "") -> None:
-        """Publishes and prints how the task ended.
+        """Publishes and prints the result of the task.
 
         Args:
             result: Result of the task.
-            frozen: Description of the nodes that are frozen at its end; empty if there are none.
+            frozen: Description of the nodes that are frozen at the end of the task; "" if there are none.
         """
         self._outcome.publish(String(result.outcome))
         self._publish(
@@ -160,7 +159,7 @@ class TaskReporter:
             }
         )
         print("\n".join(result.lines()), flush=True)
-        if not result.succeeded:  # run_framework reads this and prints it last, so it is not printed twice
+        if not result.succeeded:  # run_framework reads this log message and prints it last
             reasons = "; ".join([*map(str, result.failures), *([result.error] if result.error else [])])
             logging.getLogger("modular_framework_core.task").critical(
                 "outcome '%s'%s", result.outcome, f": {reasons}" if reasons else ""
@@ -168,68 +167,68 @@ class TaskReporter:
 
 
 def run_machine(name: str, factory: Callable[[], smach.Container], on_signal: Callable[[], None] = lambda: None) -> int:
-    """Runs a task to its end, or until SIGINT, SIGTERM or the shutdown of ROS; returns the exit code.
+    """Runs a task until it ends or is stopped by SIGINT, SIGTERM or the shutdown of ROS; returns the exit code.
 
     Args:
         name: Name of the task.
-        factory: Makes its state machine; called in the task's thread.
-        on_signal: Called when SIGINT or SIGTERM arrives.
+        factory: Function that creates the state machine, called in the task's thread.
+        on_signal: Function called on SIGINT or SIGTERM.
     """
-    asked_by: list[str] = []
+    stop_causes: list[str] = []
 
-    def on_stop(received: int, frame: Any) -> None:
-        asked_by.append(signal.Signals(received).name)
+    def on_stop(signal_number: int, frame: Any) -> None:
+        stop_causes.append(signal.Signals(signal_number).name)
         on_signal()
 
-    previous = {number: signal.signal(number, on_stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    reporter, begun = TaskReporter(name), time.time()
+    previous_handlers = {item: signal.signal(item, on_stop) for item in (signal.SIGINT, signal.SIGTERM)}
+    reporter, started = TaskReporter(name), time.time()
     recorder = TaskRecorder(reporter.on_state, ros_clock=rospy.get_time)
-    run = TaskRun(name, shown(name, factory), recorder)
-    stop = rospy.Service("~stop", Trigger, lambda request: _asked(asked_by))
+    run = TaskRun(name, with_introspection(name, factory), recorder)
+    stop = rospy.Service("~stop", Trigger, lambda request: _on_stop_request(stop_causes))
     try:
-        with SimulatedTime().held(f"task '{name}'"):  # nothing of it passes while states compute
+        with SimulatedTime().held(f"task '{name}'"):  # simulated time stands still while states compute
             run.start()
-            _wait(run, asked_by, lambda: reporter.on_running(recorder.running()))
+            _wait(run, stop_causes, lambda: reporter.on_running(recorder.running()))
     finally:
         stop.shutdown("the task has ended")
-        for number, handler in previous.items():
-            signal.signal(number, handler)
+        for signal_number, handler in previous_handlers.items():
+            signal.signal(signal_number, handler)
     result = run.result()
-    _keep_record(name, begun, result, recorder)
+    _write_record(name, started, result, recorder)
     reporter.on_end(result, frozen_nodes())
     time.sleep(PUBLISH_TIME_S)
     return result.exit_code
 
 
-def _asked(asked_by: list[str]) -> TriggerResponse:
-    asked_by.append("the service ~stop")
+def _on_stop_request(stop_causes: list[str]) -> TriggerResponse:
+    stop_causes.append("the service ~stop")
     return TriggerResponse(success=True, message="the running states have been asked to stop")
 
 
-def _keep_record(name: str, begun: float, result: TaskResult, recorder: TaskRecorder) -> None:
+def _write_record(name: str, started: float, result: TaskResult, recorder: TaskRecorder) -> None:
     try:
         folder = Path(_parameter("~record_directory") or default_folders.framework_home() / "task_records")
-        path = write_record(folder, name, begun, result.outcome, result.succeeded, result.error, recorder.records())
+        path = write_record(folder, name, started, result.outcome, result.succeeded, result.error, recorder.records())
     except (OSError, TaskNotRun) as error:
-        rospy.logwarn(f"the record of the run is not kept: {error}; set ~record_directory to a folder to write to")
+        rospy.logwarn(f"the record of the run is not written: {error}; set ~record_directory to a writable folder")
         return
     rospy.loginfo(f"record of the run: {path}")
 
 
-def _wait(run: TaskRun, asked_by: list[str], report_status: Callable[[], None]) -> None:
-    """Waits for the end of a run; passes a request to stop on to it, and gives up a little later."""
-    give_up: float | None = None
+def _wait(run: TaskRun, stop_causes: list[str], report_status: Callable[[], None]) -> None:
+    """Waits for the end of a run. After a stop request, waits at most ``STOP_GRACE_S``."""
+    deadline: float | None = None
     next_status = time.monotonic() + STATUS_PERIOD_S
     while not run.wait(0.02):
         if time.monotonic() > next_status:
             next_status = time.monotonic() + STATUS_PERIOD_S
             report_status()
             if frozen := frozen_nodes():
-                asked_by.append(f"the watch of the nodes: {frozen}")
-        if give_up is None and (asked_by or rospy.is_shutdown()):
-            run.request_stop(asked_by[0] if asked_by else "the shutdown of ROS")
-            give_up = time.monotonic() + STOP_GRACE_S
-        if give_up is not None and time.monotonic() > give_up:
+                stop_causes.append(f"the watch of the nodes: {frozen}")
+        if deadline is None and (stop_causes or rospy.is_shutdown()):
+            run.request_stop(stop_causes[0] if stop_causes else "the shutdown of ROS")
+            deadline = time.monotonic() + STOP_GRACE_S
+        if deadline is not None and time.monotonic() > deadline:
             return
 
 
@@ -246,7 +245,13 @@ def _finish(exit_code: int) -> int:
 
 
 def run_as_node(node_name: str, task_name: str, factory: Callable[[], smach.Container]) -> int:
-    """Runs one state machine as a ROS node: the main block of generated modules; returns the exit code."""
+    """Runs a state machine as a ROS node and returns the exit code. Generated modules call this function.
+
+    Args:
+        node_name: Name of the ROS node.
+        task_name: Name of the task.
+        factory: Function that creates the state machine.
+    """
     _start_node(node_name)
     return _finish(run_machine(task_name, factory))
 
@@ -256,11 +261,11 @@ def main() -> int:
     _start_node("run_task")
     try:
         name, factory = prepare(rospy.myargv()[1:])
-        waits = _parameter("~wait_for_start")
+        wait_for_start = _parameter("~wait_for_start")
     except TaskNotRun as error:
         rospy.logfatal("The task could not be run: %s", error)
         return _finish(EXIT_NOT_RUN)
-    if waits:
+    if wait_for_start:
         return _finish(StartedRuns(name, factory).serve())
     return _finish(run_machine(name, factory))
 
@@ -269,7 +274,7 @@ def _parameter(name: str) -> Any:
     """Returns a parameter of the node.
 
     Raises:
-        TaskNotRun: Its value is not allowed.
+        TaskNotRun: The value is not allowed.
     """
     try:
         return DeclaredParameters("modular_framework_core", "run_task").value(name)
@@ -278,61 +283,61 @@ def _parameter(name: str) -> Any:
 
 
 class StartedRuns:
-    """Runs a task whenever it is asked to, until SIGINT, SIGTERM or the shutdown of ROS."""
+    """Runs a task on request, until SIGINT, SIGTERM or the shutdown of ROS."""
 
     def __init__(self, name: str, factory: Callable[[], smach.Container]) -> None:
-        """Stores what to run.
+        """Stores the task.
 
         Args:
             name: Name of the task.
-            factory: Makes its state machine, for each run a new one.
+            factory: Function that creates a new state machine for each run.
         """
         self._name, self._factory = name, factory
-        self._asked, self._running, self._ended = threading.Event(), threading.Lock(), threading.Event()
+        self._requested, self._running, self._ended = threading.Event(), threading.Lock(), threading.Event()
 
     def serve(self) -> int:
         """Runs the task each time the service ``~start`` is called; returns the exit code of the last run."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda received, frame: self._ended.set())
+        for stop_signal in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(stop_signal, lambda signal_number, frame: self._ended.set())
         service = rospy.Service("~start", Trigger, lambda request: self._start())
         exit_code = EXIT_SUCCEEDED
         while not self._ended.is_set() and not rospy.is_shutdown():
-            if not self._asked.wait(START_POLL_S):
+            if not self._requested.wait(START_POLL_S):
                 continue
             with self._running:
-                self._asked.clear()
+                self._requested.clear()
                 exit_code = run_machine(self._name, self._factory, self._ended.set)
         service.shutdown("the node ends")
         return exit_code
 
     def _start(self) -> TriggerResponse:
-        if self._running.locked() or self._asked.is_set():
+        if self._running.locked() or self._requested.is_set():
             return TriggerResponse(success=False, message=f"task '{self._name}' runs already; wait for its end")
-        self._asked.set()
+        self._requested.set()
         return TriggerResponse(success=True, message=f"task '{self._name}' starts")
 
 
 def prepare(arguments: list[str]) -> tuple[str, Callable[[], smach.Container]]:
-    """Finds out what is to be run, from the arguments or the parameters.
+    """Returns the name of the task to run and the function that creates its state machine.
 
-    Returns:
-        The name of the task, and the function that makes its state machine.
+    Args:
+        arguments: Command-line arguments. Without arguments, the parameters select the task.
 
     Raises:
-        TaskNotRun: There is nothing to run, or it is faulty.
+        TaskNotRun: No task is given, or the task has faults.
     """
-    given = Path(arguments[0]) if arguments else None
-    machine = _parameter("~state_machine_to_load").strip() if given is None else ""
-    if given is None:
-        given = Path(machine or _parameter("~task_constructor_script"))
-    if not given.name:
+    path = Path(arguments[0]) if arguments else None
+    machine = _parameter("~state_machine_to_load").strip() if path is None else ""
+    if path is None:
+        path = Path(machine or _parameter("~task_constructor_script"))
+    if not path.name:
         raise TaskNotRun(
-            "nothing to run was given; give a task script or a state machine as argument, or as parameter "
+            "no task is given; give a task script or a state machine as argument, or as parameter "
             "~task_constructor_script or ~state_machine_to_load"
         )
-    if machine or given.suffix == ".py":
-        return _prepare_machine(given)
-    return _prepare_task(default_folders.task_script(given))
+    if machine or path.suffix == ".py":
+        return _prepare_machine(path)
+    return _prepare_task(default_folders.task_script(path))
 
 
 def _prepare_machine(path: Path) -> tuple[str, Callable[[], smach.Container]]:
@@ -362,7 +367,7 @@ def _prepare_task(script: Path) -> tuple[str, Callable[[], smach.Container]]:
 
 
 def _known_names() -> KnownNames:
-    """Returns the names that the configuration files of the launch and the robot have."""
+    """Returns the names in the configuration folder and in the robot's SRDF."""
     config = _parameter("~config_directory")
     names = names_of_config(Path(config)) if config else KnownNames()
     srdf = str(rospy.get_param("/robot_description_semantic", "") or "")
@@ -370,6 +375,6 @@ def _known_names() -> KnownNames:
 
 
 def _directories(parameter: str) -> list[Path]:
-    """Returns the directories of a parameter."""
+    """Returns the directories in a parameter, given as a list or separated by ":"."""
     value = _parameter(f"~{parameter}")
     return [Path(str(item)) for item in value] if isinstance(value, list) else pipeline.directories_from(str(value))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the state machine of a task in a thread, stops it when asked, and reports how it ended."""
+"""Runs the state machine of a task in a thread, stops it on request and reports its result."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXIT_NOT_RUN = 2
 
 
 LOCATION_MARK = "(  # defined in "
-"""Separator that generated modules write between the call of a state's class and its location in the task."""
+"""Mark in generated modules before the location of a state in the task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +27,11 @@ class TaskResult:
 
     Attributes:
         name: Name of the task.
-        outcome: Outcome of its machine; "preempted" when it was stopped, "error" when a state raised, "not run" when
-            its machine could not be made.
-        exit_code: 0 for the success outcome, 1 for any other, 2 when the task could not be run.
-        failures: The states that failed, in order.
-        error: What went wrong outside of the states' own reasons; "" when nothing did.
+        outcome: Outcome of the state machine, or "preempted" after a stop request, "error" after an exception, "not
+            run" if the state machine could not be created.
+        exit_code: 0 for the success outcome, 1 for other outcomes, 2 if the task could not be run.
+        failures: Failed states, in order.
+        error: Error outside of the states' own reasons; "" without an error.
     """
 
     name: str
@@ -46,7 +46,7 @@ class TaskResult:
         return self.exit_code == EXIT_SUCCEEDED
 
     def lines(self) -> list[str]:
-        """Returns the report for the user: the reasons when it did not succeed, and the outcome in the last line."""
+        """Returns the lines of the report: the reasons of a failure and, last, the outcome."""
         lines: list[str] = []
         if not self.succeeded:
             if self.failures:
@@ -59,15 +59,15 @@ class TaskResult:
 
 
 class TaskRun:
-    """One run of one task. Making the machine and executing it both happen in the run's own thread."""
+    """One run of a task. The state machine is created and executed in the run's own thread."""
 
     def __init__(self, name: str, factory: Callable[[], smach.Container], recorder: TaskRecorder) -> None:
         """Stores the parts of a run.
 
         Args:
             name: Name of the task.
-            factory: Makes the state machine.
-            recorder: Records its states.
+            factory: Function that creates the state machine.
+            recorder: Recorder of the states.
         """
         self._name = name
         self._factory = factory
@@ -80,15 +80,15 @@ class TaskRun:
         self._thread = threading.Thread(target=self._run, name=f"task-{name}", daemon=True)
 
     def start(self) -> None:
-        """Starts the thread. From here on ``smach`` shuts down when the run is asked to stop."""
+        """Starts the thread and ties smach's shutdown check to the stop request of this run."""
         smach.set_shutdown_check(self._stop.is_set)
         self._thread.start()
 
     def request_stop(self, cause: str) -> None:
-        """Asks the running states to stop; no state is started after this. Further requests change nothing.
+        """Asks the running states to stop. No further state starts; repeated requests have no effect.
 
         Args:
-            cause: Who asked, for the result: "SIGINT", say.
+            cause: Origin of the request for the result, such as "SIGINT".
         """
         with self._lock:
             if self._stop.is_set():
@@ -100,28 +100,28 @@ class TaskRun:
             machine.request_preempt()
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Waits for the end of the run; returns whether it has ended."""
+        """Waits for the end of the run and returns whether the run has ended."""
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
     def result(self) -> TaskResult:
-        """Returns how the run ended, or, if it has not, that it was given up while it did not stop."""
+        """Returns the result of the run. A run that has not ended counts as stopped but not ended in time."""
         if self._result is not None:
             return self._result
         active = ", ".join(self._recorder.active()) or "the construction of the state machine"
         return self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}, but {active} did not end in time")
 
     def _run(self) -> None:
-        """Body of the thread."""
+        """Creates and executes the state machine; body of the thread."""
         try:
             with stoppable(self._stop.is_set):
                 machine = self._factory()
-        except Exception as error:  # a state's constructor may raise anything, which is reported to the user
+        except Exception as error:  # constructors of users' states can raise anything
             smach.logdebug(traceback.format_exc())
             if self._stop.is_set():
                 self._result = self._ended("preempted", EXIT_FAILED, f"stopped by {self._stop_cause}")
             else:
-                text = f"the state machine could not be made: {_where_defined(error)}{type(error).__name__}: {error}"
+                text = f"the state machine could not be made: {_location_prefix(error)}{type(error).__name__}: {error}"
                 self._result = self._ended("not run", EXIT_NOT_RUN, text)
             return
         self._recorder.attach(machine)
@@ -149,8 +149,8 @@ class TaskRun:
         return TaskResult(self._name, outcome, exit_code, self._recorder.failures(), error)
 
 
-def _where_defined(error: Exception) -> str:
-    """Returns the location in the task of the state whose constructor raised, and ": "; "" where it is not known."""
+def _location_prefix(error: Exception) -> str:
+    """Returns the task location of the state whose constructor raised, followed by ": "; "" if unknown."""
     lines = [frame.line or "" for frame in traceback.extract_tb(error.__traceback__)]
     locations = [line.partition(LOCATION_MARK)[2] for line in lines if LOCATION_MARK in line]
     return f"{locations[-1]}: " if locations else ""
