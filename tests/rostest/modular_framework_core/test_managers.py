@@ -247,7 +247,7 @@ def test_loose_objects_of_the_simulation_are_known_without_being_added_and_stati
     try:
         before = call("get_modified_acm", srv.GetModifiedACM, touch, [], True)
         assert before.success
-        assert "cannot be looked up" in managers.log()
+        assert "models of the simulation are unknown" in managers.log()
         services = [
             rospy.Service("get_planning_scene", GetPlanningScene, scene),
             rospy.Service("gazebo/get_model_properties", GetModelProperties, properties),
@@ -349,8 +349,12 @@ def test_messages_are_saved_and_loaded_to_the_last_bit(managers):
         ("x.txt", None, "a file that ends in .yaml"),
         ("missing.yaml", None, "cannot be read"),
         ("bad.yaml", "kind: [", "cannot be read"),
-        ("kind.yaml", "kind: grasp\nnamed: {}\n", "holds messages of the kind 'grasp'"),
-        ("field.yaml", "kind: plan\nnamed:\n  p: {no_such_field: 1}\n", "'p' is no moveit_msgs/RobotTrajectory"),
+        ("kind.yaml", "kind: grasp\nnamed: {}\n", "contains messages of the kind 'grasp'"),
+        (
+            "field.yaml",
+            "kind: plan\nnamed:\n  p: {no_such_field: 1}\n",
+            "'p' is not a valid moveit_msgs/RobotTrajectory",
+        ),
         ("a\0.yaml", None, "embedded null byte"),
         ("~no_such_user/a.yaml", None, "is not a valid path"),
         ("../a.yaml", None, "is outside of the managers' folder"),

@@ -418,7 +418,7 @@ def test_what_managers_hold_is_stored_loaded_and_forgotten() -> None:
     assert names("joint_states") == ["mine", "up"]
     assert run(ReinitialiseManagers())[0] == "success"
     for state, reason in (
-        (Load("plan", "kept.yaml"), "holds messages of the kind 'joint state'"),
+        (Load("plan", "kept.yaml"), "contains messages of the kind 'joint state'"),
         (Store("pose", "poses.txt"), "a file that ends in .yaml"),
     ):
         assert run(state)[0] == "fail"

@@ -18,7 +18,7 @@ from modular_framework_core.files import shallow_yaml, yaml_entries
 from modular_framework_core.files.atomic_files import read_text, write_atomically
 from modular_framework_core.managers import message_files
 from modular_framework_core.managers.message_files import MessageFileError
-from modular_framework_core.managers.message_numbers import unusable_position
+from modular_framework_core.managers.message_numbers import position_fault
 from modular_framework_core.managers.named_joint_states import load_joint_states
 from modular_framework_core.srv import AddMoveitPlanRequest, AddStandardisedGraspRequest
 from modular_framework_core.task_constructor import generator
@@ -160,17 +160,17 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 
 def test_positions_that_are_not_finite_are_found_and_other_numbers_left_alone() -> None:
     state = JointState(name=["a", "b"], position=[0.0, float("nan")], velocity=[float("nan"), 0.0])
-    assert unusable_position(state) == "position[1] is nan"
+    assert position_fault(state) == "position[1] is nan"
     state.position = [1e308, 1e308]
-    assert unusable_position(state) == ""
+    assert position_fault(state) == ""
     state.velocity = [0.0]
-    assert unusable_position(state) == "velocity has 1 values for 2 names"
+    assert position_fault(state) == "velocity has 1 values for 2 names"
     plan = AddMoveitPlanRequest().moveit_plan
     plan.joint_trajectory.points = [
         JointTrajectoryPoint(positions=[0.0], accelerations=[float("nan")]),
         JointTrajectoryPoint(positions=[float("-inf")]),
     ]
-    assert unusable_position(plan) == "joint_trajectory.points[1].positions[0] is -inf"
+    assert position_fault(plan) == "joint_trajectory.points[1].positions[0] is -inf"
     grasp = AddStandardisedGraspRequest().grasp_message
     grasp.grasp.pose.pose.orientation.w = float("inf")
-    assert unusable_position(grasp) == "grasp.pose.pose.orientation.w is inf"
+    assert position_fault(grasp) == "grasp.pose.pose.orientation.w is inf"

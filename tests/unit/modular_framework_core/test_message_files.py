@@ -101,5 +101,5 @@ def test_messages_written_by_hand_may_leave_fields_out_and_list_them_in_order(tm
 def test_a_value_of_another_type_is_refused_by_name(tmp_path, value):
     path = tmp_path / "wrong.yaml"
     path.write_text(f"kind: thing\nnamed: {{good: {{}}, bad: {value}}}\n")
-    with pytest.raises(MessageFileError, match="'bad' is no sensor_msgs/JointState"):
+    with pytest.raises(MessageFileError, match="'bad' is not a valid sensor_msgs/JointState"):
         message_files.load(path, "thing", JointState)

@@ -52,7 +52,7 @@ def test_positions_keep_double_precision_and_file_order(tmp_path: Path) -> None:
         ("good: {a: 1}\nbad: {}\n", 2, "no joint"),
         ("good: {a: 1}\nbad:\n  a: 1\n  b: .nan\n", 4, "finite number"),
         ("good: {a: 1}\nbad: {a: 1, a: 2}\n", 2, "twice"),
-        ("good: {a: 1}\ngood: {a: 2}\n", 2, "further up"),
+        ("good: {a: 1}\ngood: {a: 2}\n", 2, "occurs earlier"),
         ("good: {a: 1}\nbad: {a: '1'}\n", 2, "finite number"),
         ('good: {a: 1}\n"": {a: 1}\n', 2, "the name is empty"),
     ],
@@ -77,7 +77,7 @@ def test_joints_of_the_robot_that_move_and_their_bounds_are_read_from_its_descri
     ("entry", "hint"),
     [
         ("{elbow: 2.1}", "got 2.1, the joint moves from -1.0000 to 2.0000"),
-        ("{elbw: 0}", "no joint 'elbw' that moves; it has elbow, wheel; did you mean 'elbow'?"),
+        ("{elbw: 0}", "no movable joint 'elbw'; it has elbow, wheel; did you mean 'elbow'?"),
         ("{mount: 0}", "'mount'"),
     ],
 )

@@ -112,12 +112,12 @@ def test_an_object_name_is_taken_until_it_is_deleted() -> None:
 def test_types_follow_the_simulation_but_keep_what_is_about_to_be_spawned() -> None:
     types = ObjectTypes()
     types.add("cup", "mug")
-    assert types.follow(["table"]) == []
-    assert types.follow(["table", "cup"]) == []
+    assert types.remove_missing(["table"]) == []
+    assert types.remove_missing(["table", "cup"]) == []
     types.add("ball_1", "ball")
-    assert types.follow(["table"]) == ["cup"]
+    assert types.remove_missing(["table"]) == ["cup"]
     with pytest.raises(ObjectTypeError, match=r"Registered: ball_1"):
         types.get("cup")
     types.add("cup", "can")
-    assert types.follow([]) == []
+    assert types.remove_missing([]) == []
     assert types.get("cup") == "can"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the allowed collision matrix of links and objects; a request changes no other pairs than its own.
+"""Keeps the allowed collision matrix of links and objects. A request changes only its own pairs.
 
-The reference matrix comes from the planning scene. Objects that appear later are added to it; the manipulator may then
-be allowed to touch itself or some objects. Forbidding again restores the reference.
+The reference matrix comes from the planning scene. New objects are added later, and collisions of the manipulator with
+itself or with objects can be allowed. Disallowing these collisions restores the reference.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ DEFAULT_LINK = "link"
 
 
 @dataclass(frozen=True, slots=True)
-class AcmAnswer:
-    """A matrix with warnings for the requester.
+class AcmResult:
+    """Result of a request.
 
     Attributes:
-        matrix: Pairs that may touch from now on.
-        warnings: Parts of the request that had no effect.
+        matrix: Allowed collision matrix after the request.
+        warnings: Parts of the request without effect.
     """
 
     matrix: CollisionMatrix
@@ -34,9 +34,9 @@ class AcmAnswer:
 
 @dataclass(slots=True)
 class AcmManager:
-    """Keeps the reference matrix, the objects added since and the permissions given.
+    """Keeps the reference matrix, the added objects and the allowed collisions.
 
-    Objects may be added before the reference matrix is known; they join it when it arrives.
+    Objects may be added before the reference matrix is set.
     """
 
     _initial: CollisionMatrix | None = None
@@ -49,24 +49,24 @@ class AcmManager:
     def set_initial(
         self, matrix: CollisionMatrix, manipulator_indices: Sequence[int] = (), manipulator_prefix: str = ""
     ) -> bool:
-        """Takes a new reference matrix and drops every permission given so far.
+        """Sets the reference matrix and resets all allowed collisions.
 
         Args:
             matrix: Matrix of the planning scene.
-            manipulator_indices: Positions of the manipulator's links in ``matrix.names``.
-            manipulator_prefix: Texts separated by spaces, one of which is in the name of each link of the manipulator;
-                used when no index is given.
+            manipulator_indices: Indices of the manipulator's links in ``matrix.names``.
+            manipulator_prefix: Texts separated by spaces. A link whose name contains one of the texts belongs to the
+                manipulator. Ignored if indices are given.
 
         Returns:
-            True when an earlier reference was replaced.
+            Whether an earlier reference was replaced.
 
         Raises:
-            AcmError: An index points outside the matrix.
+            AcmError: An index is out of range.
         """
         outside = [index for index in manipulator_indices if not 0 <= index < len(matrix.names)]
         if outside:
             raise AcmError(
-                f"manipulator_links_indices holds {outside}, the matrix has {len(matrix.names)} entries "
+                f"manipulator_links_indices contains {outside}, the matrix has {len(matrix.names)} entries "
                 f"(0 to {len(matrix.names) - 1}); compute the indices from the matrix that is sent."
             )
         links = [matrix.names[index] for index in manipulator_indices]
@@ -81,18 +81,18 @@ class AcmManager:
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """Ids of the objects added so far."""
+        """IDs of the added objects."""
         with self._lock:
             return tuple(self._objects)
 
     def add_object(self, entry_name: str) -> str:
-        """Adds an object that may touch nothing yet.
+        """Adds an object without allowed collisions.
 
         Args:
-            entry_name: Name of the model, or the full ``<model>__<link>`` id of one of its links.
+            entry_name: Model name, or ``<model>__<link>`` for one link of the model.
 
         Returns:
-            A warning when the object is known already, else an empty text.
+            Warning if the object exists already, else "".
 
         Raises:
             AcmError: The name is empty.
@@ -100,39 +100,39 @@ class AcmManager:
         name = object_id(entry_name)
         with self._lock:
             if name in self._objects:
-                return f"'{name}' is in the collision matrix already; nothing was added."
+                return f"'{name}' is already in the collision matrix; nothing was added."
             self._objects.append(name)
             if self._table is not None and name not in self._table.names:
                 self._table.add(name)
             return ""
 
-    def follow(self, models: Collection[str]) -> list[str]:
-        """Removes the objects that were in the simulation and are not any more.
+    def remove_missing(self, models: Collection[str]) -> list[str]:
+        """Removes the objects that have disappeared from the simulation.
 
         Args:
-            models: Names of the models that are in the simulation now.
+            models: Names of all models in the simulation.
 
         Returns:
-            Ids of the objects that were removed.
+            IDs of the removed objects.
         """
         with self._lock:
-            gone = [name for name in self._objects if name in self._simulated and _model_of(name) not in models]
-            for name in gone:
+            removed = [name for name in self._objects if name in self._simulated and _model_of(name) not in models]
+            for name in removed:
                 self.delete_object(name)
             self._simulated = {name for name in self._objects if _model_of(name) in models}
-            return gone
+            return removed
 
     def delete_object(self, entry_name: str) -> str:
         """Removes an object.
 
         Args:
-            entry_name: As given to :meth:`add_object`.
+            entry_name: Name as in :meth:`add_object`.
 
         Returns:
-            A warning when there is no such object, else an empty text.
+            Warning if the object is unknown, else "".
 
         Raises:
-            AcmError: The name is empty, or names a link of the reference matrix.
+            AcmError: The name is empty.
         """
         name = object_id(entry_name)
         with self._lock:
@@ -146,7 +146,7 @@ class AcmManager:
             return ""
 
     def reinitialise(self) -> None:
-        """Drops every permission given so far; the objects stay in the matrix.
+        """Resets all allowed collisions to the reference; the objects stay in the matrix.
 
         Raises:
             AcmError: There is no reference matrix.
@@ -155,71 +155,68 @@ class AcmManager:
             self._require_initial()
             self._restore()
 
-    def current(self) -> AcmAnswer:
-        """Returns the matrix as it stands.
+    def current(self) -> AcmResult:
+        """Returns the current matrix.
 
         Raises:
             AcmError: There is no reference matrix.
         """
         with self._lock:
-            return AcmAnswer(self._matrix())
+            return AcmResult(self._matrix())
 
-    def allow_self_collision(self, allow: bool, links: Sequence[str] = ()) -> AcmAnswer:
-        """Lets links touch each other, or restores the reference.
+    def allow_self_collision(self, allow: bool, links: Sequence[str] = ()) -> AcmResult:
+        """Allows collisions between links, or restores the reference.
 
         Args:
-            allow: False restores the reference.
-            links: Names of the links; none means those of the manipulator.
-
-        Returns:
-            The new matrix.
+            allow: Whether to allow the collisions; False restores the reference.
+            links: Link names; empty for the manipulator's links.
 
         Raises:
-            AcmError: There is no reference matrix, or it has no such link.
+            AcmError: There is no reference matrix, or a link is unknown.
         """
         with self._lock:
             initial, table = self._require_initial()
-            chosen = self._chosen(links)
-            for position, first in enumerate(chosen):
-                for second in chosen[position + 1 :]:
+            selected_links = self._selected_links(links)
+            for index, first in enumerate(selected_links):
+                for second in selected_links[index + 1 :]:
                     table.set(first, second, allow or bool(initial.allowed(first, second)))
-            return AcmAnswer(self._matrix(), _link_warnings(chosen))
+            return AcmResult(self._matrix(), _link_warnings(selected_links))
 
-    def allow_object_collision(self, objects: Iterable[str], allow: bool, links: Sequence[str] = ()) -> AcmAnswer:
-        """Lets links touch objects, or restores the reference.
+    def allow_object_collision(self, objects: Iterable[str], allow: bool, links: Sequence[str] = ()) -> AcmResult:
+        """Allows collisions between links and objects, or restores the reference.
 
         Args:
-            objects: Models or ids; none means every object added so far.
-            allow: False restores the reference.
-            links: Names of the links; none means those of the manipulator.
+            objects: Model names or object IDs; empty for all added objects.
+            allow: Whether to allow the collisions; False restores the reference.
+            links: Link names; empty for the manipulator's links.
 
         Returns:
-            The new matrix, with a warning for every name that matches nothing.
+            The new matrix, with a warning for every unknown object.
 
         Raises:
-            AcmError: There is no reference matrix, or it has no such link.
+            AcmError: There is no reference matrix, or a link is unknown.
         """
         with self._lock:
             initial, table = self._require_initial()
-            chosen, wanted = self._chosen(links), list(objects)
-            targets, unknown = _match(wanted, table, chosen) if wanted else (list(self._objects), [])
+            selected_links, requested = self._selected_links(links), list(objects)
+            targets, unknown = _match(requested, table, selected_links) if requested else (list(self._objects), [])
             warnings = [
                 f"No entry of the collision matrix belongs to the object '{name}'; add it first." for name in unknown
             ]
-            if not wanted and not targets:
+            if not requested and not targets:
                 warnings.append("No object was added to the collision matrix; the manipulator may touch none.")
             for target in targets:
-                for link in chosen:
+                for link in selected_links:
                     if link != target:
                         table.set(link, target, allow or bool(initial.allowed(link, target)))
-            return AcmAnswer(self._matrix(), (*warnings, *_link_warnings(chosen)))
+            return AcmResult(self._matrix(), (*warnings, *_link_warnings(selected_links)))
 
     def permissions(self) -> frozenset[frozenset[str]]:
-        """Returns the pairs that may touch now and may not by the reference."""
+        """Returns the pairs that are allowed now but not in the reference."""
         with self._lock:
             if self._initial is None or self._table is None:
                 return frozenset()
-            names, reference = self._table.names, self._initial.rows  # its entries come first, objects after them
+            names, reference = self._table.names, self._initial.rows  # the table begins with the reference's entries
             return frozenset(
                 frozenset((names[i], names[j]))
                 for i, row in enumerate(self._table.rows)
@@ -227,7 +224,7 @@ class AcmManager:
                 if row[j] and not (i < len(reference) and reference[i][j])
             )
 
-    def _chosen(self, links: Sequence[str]) -> tuple[str, ...]:
+    def _selected_links(self, links: Sequence[str]) -> tuple[str, ...]:
         initial, _ = self._require_initial()
         for link in links:
             if link not in initial.names:
@@ -262,13 +259,7 @@ def _model_of(object_name: str) -> str:
 
 
 def object_id(entry_name: str) -> str:
-    """Completes a model's name to the id of its default link; an id that names a link stays.
-
-    Args:
-        entry_name: ``box`` or ``box__body``.
-
-    Returns:
-        ``box__link`` or ``box__body``.
+    """Returns the object ID of a model's default link: ``box`` -> ``box__link``. An ID with link is unchanged.
 
     Raises:
         AcmError: The name is empty.
@@ -278,17 +269,17 @@ def object_id(entry_name: str) -> str:
     return entry_name if LINK_SEPARATOR in entry_name else f"{entry_name}{LINK_SEPARATOR}{DEFAULT_LINK}"
 
 
-def _match(wanted: Sequence[str], table: MutableMatrix, links: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Finds the entries of objects, and the names that have none."""
+def _match(requested: Sequence[str], table: MutableMatrix, links: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Returns the matrix entries of the requested objects, and the requested names without entry."""
     candidates = [name for name in table.names if name not in links]
-    found: list[str] = []
+    matches: list[str] = []
     unknown: list[str] = []
-    for name in wanted:
-        hits = [entry for entry in candidates if entry == name or entry.startswith(name + LINK_SEPARATOR)]
-        found.extend(hits)
-        if not hits:
+    for name in requested:
+        entries = [entry for entry in candidates if entry == name or entry.startswith(name + LINK_SEPARATOR)]
+        matches.extend(entries)
+        if not entries:
             unknown.append(name)
-    return list(dict.fromkeys(found)), unknown
+    return list(dict.fromkeys(matches)), unknown
 
 
 def _link_warnings(links: Sequence[str]) -> tuple[str, ...]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of pairs of links and objects that may touch."""
+"""The allowed collision matrix: pairs of links and objects that may touch."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 
 class AcmError(ValueError):
-    """A request cannot be served; the text says why and what to do."""
+    """A request for the allowed collision matrix is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
 class CollisionMatrix:
-    """A symmetric table of pairs that may touch.
+    """A symmetric matrix of pairs that may touch.
 
     Attributes:
-        names: Links and objects, one for each row and column.
-        rows: ``rows[i][j]`` is True when ``names[i]`` may touch ``names[j]``.
-        default_names: Links and objects with a rule for every pair that is not in the table.
-        default_values: The rules of ``default_names``.
+        names: Links and objects of the rows and columns.
+        rows: ``rows[i][j]`` is True if ``names[i]`` may touch ``names[j]``.
+        default_names: Links and objects with a default for pairs outside of the matrix.
+        default_values: Defaults of ``default_names``.
     """
 
     names: tuple[str, ...]
@@ -27,7 +27,7 @@ class CollisionMatrix:
     default_values: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
-        """Checks that the table is square and the defaults are paired."""
+        """Checks that the matrix is square and that every default name has a value."""
         size = len(self.names)
         widths = {len(row) for row in self.rows}
         if len(self.rows) != size or (size and widths != {size}):
@@ -44,7 +44,7 @@ class CollisionMatrix:
             )
 
     def allowed(self, first: str, second: str) -> bool | None:
-        """Returns whether a pair may touch, None when one of the two is not in the table."""
+        """Returns whether a pair may touch, or None if the matrix does not contain both names."""
         if first not in self.names or second not in self.names:
             return None
         return self.rows[self.names.index(first)][self.names.index(second)]
@@ -52,7 +52,7 @@ class CollisionMatrix:
 
 @dataclass(slots=True)
 class MutableMatrix:
-    """Working copy of a collision matrix."""
+    """A mutable copy of a collision matrix."""
 
     names: list[str]
     rows: list[list[bool]]
@@ -63,7 +63,7 @@ class MutableMatrix:
         return cls(list(matrix.names), [list(row) for row in matrix.rows])
 
     def add(self, name: str) -> None:
-        """Adds an entry that may touch nothing but itself."""
+        """Adds an entry without allowed collisions, except with itself."""
         for row in self.rows:
             row.append(False)
         self.names.append(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the joints of the robot and their bounds, so that a named joint state is checked before it is used."""
+"""Checks joint positions against the joint limits of the URDF."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from modular_framework_core.files.faults import nearest
 from modular_framework_urdf.urdf_reader import read_urdf
 
 Bounds = tuple[float, float]
-TOLERANCE = 1e-6  # [rad or m]; numbers rounded in a file may end just outside
+TOLERANCE = 1e-6  # [rad or m], for positions rounded in a file
 
 
 @lru_cache(maxsize=1)
 def bounds_from_urdf(text: str) -> Mapping[str, Bounds]:
-    """Returns (lower, upper) [rad or m] of every joint that moves; a continuous joint has no bounds.
+    """Returns (lower, upper) [rad or m] of every movable joint, infinite for continuous joints.
 
     Raises:
-        ValueError: The text is no XML, has a DOCTYPE, or a limit is no number.
+        ValueError: The text is not XML, has a DOCTYPE, or a limit is not a number.
     """
     bounds: dict[str, Bounds] = {}
     for joint in read_urdf(text).joints:
@@ -33,17 +33,17 @@ def bounds_from_urdf(text: str) -> Mapping[str, Bounds]:
 
 
 def bounds_fault(joint: str, position: float, bounds: Mapping[str, Bounds]) -> str:
-    """Says what is wrong with a joint's position; nothing when it is all right or no joint is known.
+    """Returns the fault of a joint position, or "" if the position is within the limits.
 
     Args:
-        joint: Name of the joint.
-        position: Its position [rad or m].
-        bounds: (lower, upper) of each joint of the robot; empty switches the check off.
+        joint: Joint name.
+        position: Joint position [rad or m].
+        bounds: (lower, upper) [rad or m] of each joint; empty to disable the check.
     """
     if not bounds:
         return ""
     if joint not in bounds:
-        return f"the robot has no joint '{joint}' that moves; it has {', '.join(bounds)}{nearest(joint, bounds)}"
+        return f"the robot has no movable joint '{joint}'; it has {', '.join(bounds)}{nearest(joint, bounds)}"
     lower, upper = bounds[joint]
     if not lower - TOLERANCE <= position <= upper + TOLERANCE:
         return f"got {position}, the joint moves from {lower:.4f} to {upper:.4f}"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the messages of a manager to a YAML file and reads them back, every number to the last bit.
+"""Saves the messages of a manager to a YAML file and loads them without loss of precision.
 
-A saved file is JSON, which is YAML too, one line a message: a parser of JSON reads a plan hundreds of times as fast as
-one of YAML, which is kept for files that were written or changed by hand.
+A saved file is JSON, a subset of YAML, with one line per message. JSON parses hundreds of times as fast as YAML; files
+edited by hand may use all of YAML.
 """
 
 from __future__ import annotations
@@ -29,31 +29,31 @@ SUFFIXES = (".yaml", ".yml")
 
 
 class MessageFileError(ValueError):
-    """A file cannot be written, or is no file of a manager's messages; the text says why."""
+    """A message file cannot be written or read."""
 
 
-def path_of(text: str, folder: Path, others: Iterable[Path] = ()) -> Path:
-    """Returns the path a request names.
+def path_of(text: str, folder: Path, other_folders: Iterable[Path] = ()) -> Path:
+    """Returns the file path given in a request.
 
     Args:
-        text: What was asked for; a relative path starts at ``folder``.
-        folder: Where the managers keep files.
-        others: Further folders it may be in.
+        text: Requested path; a relative path starts at ``folder``.
+        folder: Folder of the managers' files.
+        other_folders: Further allowed folders.
 
     Raises:
-        MessageFileError: No path was given, it does not end in .yaml, or it is in none of the folders.
+        MessageFileError: The path is empty, does not end in .yaml, or is outside of the allowed folders.
     """
     try:
         path = folder / Path(text).expanduser()
-        inside = any(path.resolve().is_relative_to(allowed.resolve()) for allowed in (folder, *others))
-    except (OSError, RuntimeError, ValueError) as error:  # of a name with a NUL byte, an unknown user, links in a ring
+        inside = any(path.resolve().is_relative_to(allowed.resolve()) for allowed in (folder, *other_folders))
+    except (OSError, RuntimeError, ValueError) as error:  # NUL byte, unknown user, cycle of links
         raise MessageFileError(f"path {text!r} is not a valid path: {error}; name a file in {folder}") from error
     if not text or path.suffix not in SUFFIXES:
-        raise MessageFileError(f"path {text!r}: a file that ends in {' or '.join(SUFFIXES)} is needed, in {folder}")
+        raise MessageFileError(f"path {text!r}: give a file that ends in {' or '.join(SUFFIXES)}, in {folder}")
     if not inside:
         raise MessageFileError(
-            f"path {text!r} is outside of the managers' folder {folder}; name a file in it, or "
-            "start the managers with another one (parameter ~file_directory)"
+            f"path {text!r} is outside of the managers' folder {folder}; name a file in this folder, or "
+            "change the folder (parameter ~file_directory of the managers)"
         )
     return path
 
@@ -62,27 +62,27 @@ def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[An
     """Writes messages to a file atomically.
 
     Args:
-        path: File to write; its folder is made when it is not there.
-        kind: Kind of the messages, for whoever reads the file.
+        path: Output file; the folder is created if missing.
+        kind: Kind of the messages, stored in the file.
         named: Messages by name.
-        anonymous: Messages without a name, oldest first.
+        anonymous: Anonymous messages, oldest first.
 
     Returns:
-        How many messages were written.
+        The number of written messages.
 
     Raises:
         MessageFileError: The file cannot be written.
     """
-    by_name = [f" {json.dumps(name)}: {flow_text(message)}" for name, message in named.items()]
-    waiting = [f" {flow_text(message)}" for message in anonymous]
+    named_lines = [f" {json.dumps(name)}: {flow_text(message)}" for name, message in named.items()]
+    anonymous_lines = [f" {flow_text(message)}" for message in anonymous]
     text = "\n".join(
         [
             f'{{"kind": {json.dumps(kind)},',
             '"named": {',
-            ",\n".join(by_name),
+            ",\n".join(named_lines),
             "},",
             '"anonymous": [',
-            ",\n".join(waiting),
+            ",\n".join(anonymous_lines),
             "]}",
             "",
         ]
@@ -92,41 +92,41 @@ def save(path: Path, kind: str, named: Mapping[str, Any], anonymous: Iterable[An
         write_atomically(path, text, mode=0o600)
     except OSError as error:
         raise MessageFileError(f"{path} cannot be written: {error}") from error
-    return len(by_name) + len(waiting)
+    return len(named_lines) + len(anonymous_lines)
 
 
 def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list[Any]]:
-    """Reads what ``save`` wrote.
+    """Reads the messages in a saved file.
 
     Args:
-        path: File to read.
-        kind: Kind of messages that is expected.
+        path: Message file.
+        kind: Expected kind of the messages.
         message_type: Class of the messages.
 
     Returns:
-        The messages by name, and those without one, oldest first.
+        The messages by name, and the anonymous messages, oldest first.
 
     Raises:
-        MessageFileError: The file cannot be read, has another kind of message, or a message does not fit its type;
-            every message that does not is named.
+        MessageFileError: The file cannot be read, contains a different kind of message, or contains messages that do
+            not match the type. The message names all of them.
     """
     try:
         content = parsed(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise MessageFileError(f"{path} cannot be read: {error}") from error
     if not isinstance(content, dict) or content.get("kind") != kind:
-        found = content.get("kind") if isinstance(content, dict) else None
+        file_kind = content.get("kind") if isinstance(content, dict) else None
         raise MessageFileError(
-            f"{path} holds messages of the kind '{found}'; a saved file of the kind '{kind}' is needed"
+            f"{path} contains messages of the kind '{file_kind}'; give a saved file of the kind '{kind}'"
         )
-    given, waiting = content.get("named") or {}, content.get("anonymous") or []
-    if not isinstance(given, dict) or not isinstance(waiting, list):
+    mapping, items = content.get("named") or {}, content.get("anonymous") or []
+    if not isinstance(mapping, dict) or not isinstance(items, list):
         raise MessageFileError(f"{path}: 'named' must be a mapping of names to messages and 'anonymous' a list")
-    faults = [f"{path}: {fault}" for name in given if (fault := name_fault(str(name)))]
-    named = {str(name): _filled(message_type, value, f"{path}: '{name}'", faults) for name, value in given.items()}
+    faults = [f"{path}: {fault}" for name in mapping if (fault := name_fault(str(name)))]
+    named = {str(name): _filled(message_type, value, f"{path}: '{name}'", faults) for name, value in mapping.items()}
     anonymous = [
-        _filled(message_type, value, f"{path}: anonymous message {number}", faults)
-        for number, value in enumerate(waiting, start=1)
+        _filled(message_type, value, f"{path}: anonymous message {index}", faults)
+        for index, value in enumerate(items, start=1)
     ]
     if faults:
         raise MessageFileError("\n".join(faults))
@@ -134,7 +134,7 @@ def load(path: Path, kind: str, message_type: Any) -> tuple[dict[str, Any], list
 
 
 class _YamlLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Reads numbers as JSON has them, too: YAML 1.1 reads 1e-07, NaN and Infinity as text."""
+    """YAML loader that also reads JSON's numbers: YAML 1.1 reads 1e-07, NaN and Infinity as text."""
 
 
 _YamlLoader.add_implicit_resolver(
@@ -143,8 +143,8 @@ _YamlLoader.add_implicit_resolver(
 
 
 def parsed(text: str) -> Any:
-    """Returns the data of a text in JSON or YAML."""
-    for parse in (orjson.loads, json.loads):  # only the slower one reads NaN and Infinity
+    """Returns the content of a JSON or YAML text."""
+    for parse in (orjson.loads, json.loads):  # only the slower json reads NaN and Infinity
         try:
             return parse(text)
         except json.JSONDecodeError:
@@ -155,15 +155,15 @@ def parsed(text: str) -> Any:
 
 
 def flow_text(message: Any) -> str:
-    """Writes a message as one line of JSON."""
+    """Returns a message as one line of JSON."""
     text = orjson.dumps(message, default=_plain).decode()
-    if "null" in text:  # written for numbers that are not finite, which only the slower writer can write
+    if "null" in text:  # orjson writes null for non-finite numbers; the slower json writes their names
         return json.dumps(message, default=_plain)
     return text
 
 
 def _plain(value: Any) -> Any:
-    """Converts what a JSON writer cannot write."""
+    """Converts a value that JSON does not support."""
     match value:
         case genpy.Message():
             return {name: getattr(value, name) for name in value.__slots__}
@@ -180,28 +180,28 @@ def _filled(message_type: Any, value: Any, where: str, faults: list[str]) -> Any
     try:
         try:
             message = _built(message_type, value)
-        except (LookupError, TypeError):  # by hand a message may be written in other ways, too
+        except (LookupError, TypeError):  # messages written by hand may omit fields
             genpy.message.fill_message_args(message, [value])
         message.serialize(io.BytesIO())
     except (genpy.MessageException, ValueError, TypeError, AttributeError) as error:
-        faults.append(f"{where} is no {message_type._type}: {error}")
+        faults.append(f"{where} is not a valid {message_type._type}: {error}")
     return message
 
 
 def _built(message_type: Any, value: Any) -> Any:
-    """Makes a message of the output of ``save``, ten times as fast as genpy does.
+    """Returns a message read from the output of ``save``, ten times as fast as genpy.
 
     Raises:
-        LookupError, TypeError: The value is not the mapping of all fields that ``save`` writes.
+        LookupError, TypeError: The value is not a mapping with all fields.
     """
     fields = fields_of(message_type)
     if type(value) is not dict or len(value) != len(fields):
-        raise TypeError(f"no mapping of all fields of {message_type}")
+        raise TypeError(f"not a mapping with all fields of {message_type}")
     message = message_type.__new__(message_type)
     for name, part, is_list in fields:
         content = value[name]
         if is_list and type(content) is not list:
-            raise TypeError(f"{name} is no list")
+            raise TypeError(f"{name} is not a list")
         if part is not None:
             content = [_built(part, item) for item in content] if is_list else _built(part, content)
         setattr(message, name, content)
@@ -210,7 +210,7 @@ def _built(message_type: Any, value: Any) -> Any:
 
 @cache
 def fields_of(message_type: Any) -> tuple[tuple[str, Any, bool], ...]:
-    """Returns name, class where it is a message or several, and whether it is a list, of each field."""
+    """Returns (name, message class or None, whether the field is a list) of each field."""
     if issubclass(message_type, genpy.TVal):
         return ("secs", None, False), ("nsecs", None, False)
     fields = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds positions in a message that are not finite, or not one for each joint: planners and controllers refuse them."""
+"""Finds invalid positions in a message: non-finite values and lists whose length differs from the number of joints."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ _LISTS = ("position", "positions")
 _COORDINATES = ("geometry_msgs/Point", "geometry_msgs/Quaternion")
 
 
-def unusable_position(message: Any, where: str = "") -> str:
-    """Describes the first position of a message that is not finite, or has no joint; "" when there is none.
+def position_fault(message: Any, where: str = "") -> str:
+    """Returns the fault of the first invalid position in a message, or "" if all positions are valid.
 
     Args:
-        message: Any message; its joint positions, points and orientations are checked at any depth.
-        where: Its own field, for the text.
+        message: Message whose joint positions, points and orientations are checked at any depth.
+        where: Path of the message's own field, for the returned text.
     """
     if message._type == "sensor_msgs/JointState":
         for name in ("position", "velocity", "effort"):
             if (count := len(getattr(message, name))) not in (0, len(message.name)):
                 return f"{where}.{name}".lstrip(".") + f" has {count} values for {len(message.name)} names"
-    is_place = message._type in _COORDINATES
+    is_coordinate = message._type in _COORDINATES
     for name, part, is_list in fields_of(message.__class__):
         value = getattr(message, name)
         path = f"{where}.{name}".lstrip(".")
         if part is not None and is_list:
-            found = next(
-                (text for number, item in enumerate(value) if (text := unusable_position(item, f"{path}[{number}]"))),
+            fault = next(
+                (text for index, item in enumerate(value) if (text := position_fault(item, f"{path}[{index}]"))),
                 "",
             )
         elif part is not None:
-            found = unusable_position(value, path) if hasattr(value, "_type") else ""
+            fault = position_fault(value, path) if hasattr(value, "_type") else ""
         elif is_list and name in _LISTS:
-            found = _unusable_in(value, path)
+            fault = _list_fault(value, path)
         else:
-            found = f"{path} is {value}" if is_place and not math.isfinite(value) else ""
-        if found:
-            return found
+            fault = f"{path} is {value}" if is_coordinate and not math.isfinite(value) else ""
+        if fault:
+            return fault
     return ""
 
 
-def _unusable_in(values: Any, path: str) -> str:
-    if math.isfinite(sum(values)):  # quick, and right for all but sums beyond the greatest number
+def _list_fault(values: Any, path: str) -> str:
+    if math.isfinite(sum(values)):  # fast path; an overflowing sum falls through to the exact check
         return ""
-    return next((f"{path}[{number}] is {value}" for number, value in enumerate(values) if not math.isfinite(value)), "")
+    return next((f"{path}[{index}] is {value}" for index, value in enumerate(values) if not math.isfinite(value)), "")

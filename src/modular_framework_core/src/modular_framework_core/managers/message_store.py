@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps messages of one kind so that components exchange them without knowing each other.
+"""Stores messages of one kind, which decouples the nodes that exchange them.
 
-A message stored with a name stays until it is overwritten or removed. A message stored without a name joins a queue:
-the oldest is handed out first and leaves the queue for good.
+A named message stays until it is overwritten or removed. Anonymous messages form a queue: reading removes the oldest
+message.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from enum import Enum
 from typing import Generic, TypeVar
 
 MessageT = TypeVar("MessageT")
-LISTED_NAMES = 10
-"""Names in the text of an error; a line of the log is written to every listener of the log."""
+MAX_LISTED_NAMES = 10
+"""Maximum number of names in an error message, because every log subscriber receives the message."""
 
 
 class Action(Enum):
-    """The kind of a change of a store."""
+    """Kind of a change of a store."""
 
     ADDED = 0
     REPLACED = 1
@@ -36,10 +36,10 @@ class Change:
     """One change of a store.
 
     Attributes:
-        action: What happened.
-        name: Name of the message; empty for an anonymous one, and where several messages changed.
-        named: How many named messages there are after it.
-        anonymous: How many anonymous messages wait after it.
+        action: Kind of the change.
+        name: Name of the message; "" for an anonymous message or several messages.
+        named: Number of named messages after the change.
+        anonymous: Number of anonymous messages after the change.
     """
 
     action: Action
@@ -49,18 +49,18 @@ class Change:
 
 
 class MessageNotFoundError(LookupError):
-    """No message answers the request; the text says what was asked for and what there is.
+    """The store has no message for the request.
 
     Args:
-        kind: Noun of the stored messages, for example ``joint state``.
-        name: Name that was asked for; empty for the anonymous queue.
-        known_names: Names the store does hold, sorted.
+        kind: Noun for the stored messages, for example ``joint state``.
+        name: Requested name; "" for the anonymous queue.
+        known_names: Stored names, sorted.
     """
 
     def __init__(self, kind: str, name: str, known_names: tuple[str, ...]) -> None:
         self.kind, self.name, self.known_names = kind, name, known_names
-        place = max(0, bisect.bisect(known_names, name) - LISTED_NAMES // 2) if name else 0
-        listed = [shown if len(shown) <= 80 else f"{shown[:80]}..." for shown in known_names[place:][:LISTED_NAMES]]
+        start = max(0, bisect.bisect(known_names, name) - MAX_LISTED_NAMES // 2) if name else 0
+        listed = [item if len(item) <= 80 else f"{item[:80]}..." for item in known_names[start:][:MAX_LISTED_NAMES]]
         allowed = ", ".join(listed) or "none"
         if len(listed) < len(known_names):
             allowed += f" (the nearest of {len(known_names)} in the alphabet)"
@@ -68,19 +68,19 @@ class MessageNotFoundError(LookupError):
             text = f"No {kind} named '{name}' is stored. Stored names: {allowed}. Add it first or correct the name."
         else:
             text = (
-                f"No anonymous {kind} is waiting to be read: none was added, or all were handed out already. "
-                f"Stored names: {allowed}. Add one, or ask by name."
+                f"No anonymous {kind} is stored: none was added, or all were read. "
+                f"Stored names: {allowed}. Add one, or request a stored name."
             )
         super().__init__(text)
 
 
 class MessageStore(Generic[MessageT]):
-    """Thread-safe store of the messages of one kind.
+    """Thread-safe store of messages of one kind.
 
     Args:
-        kind: Noun used in error texts, for example ``grasp``.
-        on_named: Called with (message, name) before a named message is stored; may complete the message in place.
-        on_change: Called after each change, in the order of the changes; must not call the store.
+        kind: Noun for error messages, for example ``grasp``.
+        on_named: Function called with (message, name) before a named message is stored. It may change the message.
+        on_change: Function called after each change, in the order of the changes. It must not call the store.
     """
 
     def __init__(
@@ -100,20 +100,20 @@ class MessageStore(Generic[MessageT]):
         """Stores a message.
 
         Args:
-            message: What to keep.
-            name: Key of the message; an empty one appends to the anonymous queue.
+            message: Message to store.
+            name: Name of the message; "" to append to the anonymous queue.
 
         Returns:
-            True when a message of that name was replaced.
+            Whether a message of this name was replaced.
         """
         with self._lock:
             if not name:
                 self._anonymous.append(message)
-                self._changed(Action.ADDED)
+                self._notify(Action.ADDED)
                 return False
             replaced = name in self._named
             self._put(message, name)
-            self._changed(Action.REPLACED if replaced else Action.ADDED, name)
+            self._notify(Action.REPLACED if replaced else Action.ADDED, name)
             return replaced
 
     def _put(self, message: MessageT, name: str) -> None:
@@ -121,28 +121,25 @@ class MessageStore(Generic[MessageT]):
             self._on_named(message, name)
         self._named[name] = message
 
-    def _changed(self, action: Action, name: str = "") -> None:
+    def _notify(self, action: Action, name: str = "") -> None:
         if self._on_change is not None:
             self._on_change(Change(action, name, len(self._named), len(self._anonymous)))
 
     def get(self, name: str = "") -> MessageT:
-        """Hands out a message: the named one, which stays, or the oldest anonymous one, which is removed.
+        """Returns a named message, or removes and returns the oldest anonymous message.
 
         Args:
-            name: Key of the message; empty asks the anonymous queue.
-
-        Returns:
-            The message.
+            name: Name of the message; "" for the anonymous queue.
 
         Raises:
-            MessageNotFoundError: Nothing of that name is stored, or the queue is empty.
+            MessageNotFoundError: The name is unknown, or the queue is empty.
         """
         with self._lock:
             if name and name in self._named:
                 return self._named[name]
             if not name and self._anonymous:
                 message = self._anonymous.popleft()
-                self._changed(Action.HANDED_OUT)
+                self._notify(Action.HANDED_OUT)
                 return message
             raise MessageNotFoundError(self.kind, name, tuple(sorted(self._named)))
 
@@ -150,34 +147,34 @@ class MessageStore(Generic[MessageT]):
         """Removes a named message.
 
         Raises:
-            MessageNotFoundError: Nothing of that name is stored.
+            MessageNotFoundError: The name is unknown.
         """
         with self._lock:
             if name not in self._named:
                 raise MessageNotFoundError(self.kind, name, tuple(sorted(self._named)))
             del self._named[name]
-            self._changed(Action.REMOVED, name)
+            self._notify(Action.REMOVED, name)
 
     def clear(self, *, named: bool = True) -> None:
-        """Removes every anonymous message and, unless they are to stay, the named ones."""
+        """Removes all anonymous messages and, if ``named`` is True, all named messages."""
         with self._lock:
             if named:
                 self._named.clear()
             self._anonymous.clear()
-            self._changed(Action.CLEARED)
+            self._notify(Action.CLEARED)
 
     def contents(self) -> tuple[dict[str, MessageT], list[MessageT]]:
-        """Returns the named messages and the anonymous ones, oldest first, without removing any."""
+        """Returns the named messages, and the anonymous messages, oldest first, without removing them."""
         with self._lock:
             return dict(self._named), list(self._anonymous)
 
     def load(self, named: Mapping[str, MessageT], anonymous: Iterable[MessageT] = (), *, clear: bool = False) -> None:
-        """Stores many messages in one step; readers see all of them or none.
+        """Stores several messages atomically.
 
         Args:
-            named: Messages by name; those of a name that is taken replace the older one.
+            named: Messages by name, which replace stored messages of the same names.
             anonymous: Messages to append to the queue, oldest first.
-            clear: Whether everything stored before is removed.
+            clear: Whether to remove all stored messages first.
         """
         with self._lock:
             if clear:
@@ -186,7 +183,7 @@ class MessageStore(Generic[MessageT]):
             for name, message in named.items():
                 self._put(message, name)
             self._anonymous.extend(anonymous)
-            self._changed(Action.LOADED)
+            self._notify(Action.LOADED)
 
     def names(self) -> tuple[str, ...]:
         """Returns the stored names in alphabetical order."""
@@ -194,6 +191,6 @@ class MessageStore(Generic[MessageT]):
             return tuple(sorted(self._named))
 
     def anonymous_count(self) -> int:
-        """Returns how many anonymous messages wait to be read."""
+        """Returns the number of anonymous messages."""
         with self._lock:
             return len(self._anonymous)

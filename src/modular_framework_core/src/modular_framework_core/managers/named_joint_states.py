@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads joint states a user has given names to, and keeps the good ones when some are wrong."""
+"""Reads files of named joint states."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from modular_framework_core.managers.joint_bounds import Bounds, bounds_fault
 
 @dataclass(frozen=True, slots=True)
 class NamedJointState:
-    """Positions of some joints under a name.
+    """A named joint state.
 
     Attributes:
         name: Name of the state.
-        joint_names: Joints in file order.
-        positions: One position a joint [rad or m].
+        joint_names: Joint names in file order.
+        positions: Joint positions [rad or m].
     """
 
     name: str
@@ -27,22 +27,19 @@ class NamedJointState:
 
 
 def parse_joint_state(entry: Entry, bounds: Mapping[str, Bounds]) -> NamedJointState:
-    """Turns one entry of the file into a joint state.
+    """Returns the joint state of an entry.
 
     Args:
         entry: Mapping of joint names to positions [rad or m].
-        bounds: (lower, upper) of each joint of the robot; empty when they are not known.
-
-    Returns:
-        The joint state.
+        bounds: (lower, upper) [rad or m] of each joint; empty to disable the check.
 
     Raises:
-        EntryError: The entry is empty, no mapping, or a position is no number; or the robot has no such joint, or its
-            joint cannot go there.
+        EntryError: The entry is not a nonempty mapping of joints to numbers, a joint is unknown, or a position is
+            outside of the joint's limits.
     """
     joints = entry.children()
     if not joints:
-        raise entry.fault("holds no joint; write one 'joint: position' line for each joint")
+        raise entry.fault("contains no joint; write one 'joint: position' line for each joint")
     positions = tuple(joint.number() for joint in joints)
     for joint, position in zip(joints, positions, strict=True):
         fault = bounds_fault(joint.key, position, bounds)
@@ -58,10 +55,10 @@ def load_joint_states(
 
     Args:
         path: YAML file, name to {joint: position [rad or m]}.
-        bounds: (lower, upper) of each joint of the robot, for a check against them; none leaves it out.
+        bounds: (lower, upper) [rad or m] of each joint; None or empty to disable the check.
 
     Returns:
-        The usable states in file order, and one error for each entry (or for the file) that is not usable.
+        The valid states in file order, and one error per invalid entry or for an unreadable file.
     """
     states: list[NamedJointState] = []
     faults = read_each_entry(path, lambda entry: states.append(parse_joint_state(entry, bounds or {})))

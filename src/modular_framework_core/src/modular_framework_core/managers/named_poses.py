@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads poses a user has given names to: of one thing each, or of several end effectors of a robot at once."""
+"""Reads files of named poses: single poses, or poses of several end effectors of a robot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Placement:
     """A pose.
 
     Attributes:
-        position_m: x, y, z [m].
+        position_m: Position x, y, z [m].
         quaternion_xyzw: Unit quaternion.
     """
 
@@ -30,12 +30,12 @@ class Placement:
 
 @dataclass(frozen=True, slots=True)
 class NamedPose:
-    """One entry of the file.
+    """A named pose or robot pose.
 
     Attributes:
         name: Name of the pose.
-        reference_frame: Frame it is given in.
-        placements: Pose of each end effector's link; the link is "" for a pose of one thing.
+        reference_frame: Reference frame of the pose.
+        placements: Pose of each end-effector link, by link name; a single pose has the key "".
     """
 
     name: str
@@ -44,15 +44,15 @@ class NamedPose:
 
     @property
     def is_robot_pose(self) -> bool:
-        """Whether it says where end effectors are, by the names of their links."""
+        """Whether the entry gives poses of end-effector links."""
         return "" not in self.placements
 
 
 def parse_placement(entry: Entry) -> Placement:
-    """Reads ``position: {x, y, z}`` and ``orientation: {r, p, y}`` or ``{x, y, z, w}`` of an entry.
+    """Returns the pose in ``position: {x, y, z}`` and ``orientation: {r, p, y}`` or ``{x, y, z, w}`` of an entry.
 
     Raises:
-        EntryError: A key is missing, or a value is no number, or the quaternion has no length.
+        EntryError: A key is missing, a value is not a number, or the norm of the quaternion is 0.
     """
     fields = {child.key: child for child in entry.children()}
     missing = [key for key in ("position", "orientation") if key not in fields]
@@ -68,15 +68,15 @@ def _orientation(entry: Entry) -> tuple[float, ...]:
     values = numbers(entry, QUATERNION_KEYS)
     norm = math.sqrt(sum(value * value for value in values))
     if norm < 1e-6:
-        raise entry.fault("the quaternion has no length; give a rotation")
+        raise entry.fault("the norm of the quaternion is 0; give a unit quaternion")
     return tuple(value / norm for value in values)
 
 
 def numbers(entry: Entry, keys: tuple[str, ...]) -> tuple[float, ...]:
-    """Reads a mapping that has exactly some keys, each a number.
+    """Returns the numbers of a mapping with exactly the given keys.
 
     Raises:
-        EntryError: It has other keys, or a value is no number.
+        EntryError: The keys differ, or a value is not a number.
     """
     fields = {child.key: child for child in entry.children()}
     if set(fields) != set(keys):
@@ -85,10 +85,10 @@ def numbers(entry: Entry, keys: tuple[str, ...]) -> tuple[float, ...]:
 
 
 def frame_name(entry: Entry) -> str:
-    """Reads the name of a frame; a leading slash is dropped.
+    """Returns a frame name without leading slashes.
 
     Raises:
-        EntryError: It is empty.
+        EntryError: The name is empty.
     """
     name = entry.text().lstrip("/")
     if not name:
@@ -97,18 +97,18 @@ def frame_name(entry: Entry) -> str:
 
 
 def parse_pose(entry: Entry) -> NamedPose:
-    """Turns one entry of the file into a pose.
+    """Returns the pose of an entry.
 
     Args:
-        entry: ``reference_frame`` with ``position`` and ``orientation``; or, for a pose of a robot, ``reference_frame``
-            and for each link of an end effector its ``position`` and ``orientation``.
+        entry: Mapping with ``reference_frame``, and either ``position`` and ``orientation`` or one such pair for each
+            end-effector link.
 
     Raises:
-        EntryError: A key is missing or a value is not usable.
+        EntryError: A key is missing or a value is invalid.
     """
     fields = {child.key: child for child in entry.children()}
     if "reference_frame" not in fields:
-        raise entry.fault("the key 'reference_frame' is missing; name the frame the pose is given in")
+        raise entry.fault("the key 'reference_frame' is missing; name the reference frame of the pose")
     frame = frame_name(fields.pop("reference_frame"))
     if "position" in fields or "orientation" in fields:
         unknown = sorted(set(fields) - {"position", "orientation"})
@@ -116,7 +116,7 @@ def parse_pose(entry: Entry) -> NamedPose:
             raise entry.fault(f"unknown keys {unknown}; allowed are reference_frame, position and orientation")
         return NamedPose(entry.key, frame, {"": parse_placement(entry)})
     if not fields:
-        raise entry.fault("holds no pose; give position and orientation, or those of each end effector's link")
+        raise entry.fault("contains no pose; give position and orientation, once or for each end-effector link")
     return NamedPose(entry.key, frame, {link: parse_placement(field) for link, field in fields.items()})
 
 
@@ -127,7 +127,7 @@ def load_poses(path: Path) -> tuple[list[NamedPose], list[EntryError]]:
         path: YAML file, name to pose.
 
     Returns:
-        The usable poses in file order, and one error for each entry (or for the file) that is not usable.
+        The valid poses in file order, and one error per invalid entry or for an unreadable file.
     """
     poses: list[NamedPose] = []
     faults = read_each_entry(path, lambda entry: poses.append(parse_pose(entry)))

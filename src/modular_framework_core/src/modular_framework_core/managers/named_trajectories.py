@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads trajectories written as lists of named joint states, and times them."""
+"""Reads files of named trajectories, which are lists of named joint states with times."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ JointLookup = Callable[[str], Mapping[str, float] | None]
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """A joint state to pass through.
+    """A waypoint of a trajectory.
 
     Attributes:
-        entry: Where the waypoint is written.
+        entry: File entry of the waypoint.
         joint_state_name: Name of the joint state.
-        interpolate_time_s: Time to get there from the waypoint before [s].
-        pause_time_s: Time to stay there [s].
+        interpolate_time_s: Duration of the motion from the previous waypoint [s].
+        pause_time_s: Duration of the pause at the waypoint [s].
     """
 
     entry: Entry
@@ -33,12 +33,12 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class TimedTrajectory:
-    """A trajectory of positions over time.
+    """A named trajectory of joint positions.
 
     Attributes:
         name: Name of the trajectory.
-        joint_names: Joints in alphabetical order.
-        points: (positions [rad or m] in the order of ``joint_names``, time from the start [s]).
+        joint_names: Joint names in alphabetical order.
+        points: Pairs of positions [rad or m], in the order of ``joint_names``, and time from start [s].
     """
 
     name: str
@@ -47,13 +47,10 @@ class TimedTrajectory:
 
 
 def parse_waypoint(entry: Entry) -> Waypoint:
-    """Turns one list item into a waypoint.
+    """Returns the waypoint of a list item.
 
     Args:
         entry: Mapping with ``name``, ``interpolate_time`` (> 0) and optionally ``pause_time`` (>= 0) [s].
-
-    Returns:
-        The waypoint.
 
     Raises:
         EntryError: A key is missing or unknown, or a time is out of range.
@@ -75,18 +72,15 @@ def parse_waypoint(entry: Entry) -> Waypoint:
 
 
 def time_trajectory(name: str, waypoints: list[Waypoint], lookup: JointLookup) -> TimedTrajectory:
-    """Looks up the joint states of the waypoints and lays them out in time.
+    """Returns the trajectory through waypoints; a pause adds a second point with the same positions.
 
     Args:
         name: Name of the trajectory.
         waypoints: At least one waypoint.
-        lookup: Gives {joint: position} of a joint state's name, None when there is none.
-
-    Returns:
-        The trajectory; a pause adds a second point with the same positions.
+        lookup: Function that returns {joint: position [rad or m]} of a named joint state, or None if unknown.
 
     Raises:
-        EntryError: A joint state is unknown, or its joints differ from those of the first waypoint.
+        EntryError: A joint state is unknown, or its joints differ from the joints of the first waypoint.
     """
     joint_names: tuple[str, ...] = ()
     points: list[tuple[tuple[float, ...], float]] = []
@@ -119,18 +113,18 @@ def load_trajectories(path: Path, lookup: JointLookup) -> tuple[list[TimedTrajec
 
     Args:
         path: YAML file, name to list of waypoints.
-        lookup: Gives {joint: position} of a joint state's name, None when there is none.
+        lookup: Function that returns {joint: position [rad or m]} of a named joint state, or None if unknown.
 
     Returns:
-        The usable trajectories in file order, and one error for each entry (or for the file) that is not usable.
+        The valid trajectories in file order, and one error per invalid entry or for an unreadable file.
     """
     trajectories: list[TimedTrajectory] = []
 
-    def take(entry: Entry) -> None:
+    def add_trajectory(entry: Entry) -> None:
         waypoints = [parse_waypoint(item) for item in entry.items()]
         if not waypoints:
-            raise entry.fault("holds no waypoint; write at least one")
+            raise entry.fault("contains no waypoint; write at least one waypoint")
         trajectories.append(time_trajectory(entry.key, waypoints, lookup))
 
-    faults = read_each_entry(path, take)
+    faults = read_each_entry(path, add_trajectory)
     return trajectories, faults

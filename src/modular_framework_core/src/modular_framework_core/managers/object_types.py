@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stores which model each simulated object was made from."""
+"""Stores the model of each simulated object."""
 
 from __future__ import annotations
 
@@ -8,40 +8,38 @@ from collections.abc import Collection
 
 
 class ObjectTypeError(LookupError):
-    """A mapping of object names to types was refused; the text says why."""
+    """A request for an object type is invalid."""
 
 
 class ObjectTypes:
-    """Thread-safe map of object name to object type (a model's name or an SDF file)."""
+    """Thread-safe map of object names to types, which are model names or SDF files."""
 
     def __init__(self) -> None:
         self._types: dict[str, str] = {}
         self._simulated: set[str] = set()
         self._lock = threading.Lock()
 
-    def follow(self, models: Collection[str]) -> list[str]:
-        """Forgets the objects that were in the simulation and are not any more.
-
-        An object that was never there stays: it may be about to be spawned.
+    def remove_missing(self, models: Collection[str]) -> list[str]:
+        """Removes the objects that have disappeared from the simulation; objects not yet spawned stay.
 
         Args:
-            models: Names of the models that are in the simulation now.
+            models: Names of all models in the simulation.
 
         Returns:
-            Names of the objects that were forgotten.
+            Names of the removed objects.
         """
         with self._lock:
-            gone = sorted(self._simulated.difference(models))
-            for name in gone:
+            removed = sorted(self._simulated.difference(models))
+            for name in removed:
                 del self._types[name]
             self._simulated = self._types.keys() & set(models)
-            return gone
+            return removed
 
     def add(self, object_name: str, object_type: str) -> None:
         """Registers an object.
 
         Raises:
-            ObjectTypeError: The name is empty or in use; the earlier type is kept.
+            ObjectTypeError: The name is empty or already registered.
         """
         with self._lock:
             if not object_name:
@@ -57,22 +55,22 @@ class ObjectTypes:
         """Returns the type of an object.
 
         Raises:
-            ObjectTypeError: No such object.
+            ObjectTypeError: The object is not registered.
         """
         with self._lock:
-            return self._types[self._known(object_name)]
+            return self._types[self._checked_name(object_name)]
 
     def delete(self, object_name: str) -> None:
         """Removes an object.
 
         Raises:
-            ObjectTypeError: No such object.
+            ObjectTypeError: The object is not registered.
         """
         with self._lock:
-            del self._types[self._known(object_name)]
+            del self._types[self._checked_name(object_name)]
             self._simulated.discard(object_name)
 
-    def _known(self, object_name: str) -> str:
+    def _checked_name(self, object_name: str) -> str:
         if object_name not in self._types:
             known = ", ".join(sorted(self._types)) or "none"
             raise ObjectTypeError(f"No object named '{object_name}' is registered. Registered: {known}.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services of the allowed collision matrix of the manipulator."""
+"""Services of the allowed collision matrix."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import rospy
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, ApplyPlanningSceneRequest
 
-from modular_framework_core.managers.acm import AcmAnswer, AcmManager
+from modular_framework_core.managers.acm import AcmManager, AcmResult
 from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix
 from modular_framework_core.managers.ros_manager_services import ManagerServices
 from modular_framework_core.managers.ros_simulated_objects import new_movable_objects, simulated_models
@@ -36,10 +36,10 @@ APPLY_TIMEOUT_S = 3.0
 
 
 def matrix_from_message(message: AllowedCollisionMatrix) -> CollisionMatrix:
-    """Converts a message.
+    """Returns the matrix of a message.
 
     Raises:
-        AcmError: The message is not square, or names an entry twice.
+        AcmError: The matrix is not square or has duplicate names.
     """
     rows = tuple(tuple(map(bool, row.enabled)) for row in message.entry_values)
     defaults = tuple(map(bool, message.default_entry_values))
@@ -47,7 +47,7 @@ def matrix_from_message(message: AllowedCollisionMatrix) -> CollisionMatrix:
 
 
 def matrix_to_message(matrix: CollisionMatrix) -> AllowedCollisionMatrix:
-    """Converts to a message."""
+    """Returns a matrix as a message."""
     return AllowedCollisionMatrix(
         entry_names=list(matrix.names),
         entry_values=[AllowedCollisionEntry(enabled=list(row)) for row in matrix.rows],
@@ -57,42 +57,48 @@ def matrix_to_message(matrix: CollisionMatrix) -> AllowedCollisionMatrix:
 
 
 def apply_matrix(message: AllowedCollisionMatrix, timeout_s: float) -> None:
-    """Sends a matrix to move_group, and waits until it is in force there.
+    """Applies a matrix to move_group's planning scene and waits until it is in effect.
+
+    Args:
+        message: Allowed collision matrix.
+        timeout_s: Timeout of the service call [s].
 
     Raises:
-        CallError: move_group is not there within this time [s], or does not take the matrix.
+        CallError: move_group does not answer in time or refuses the matrix.
     """
     scene = PlanningScene(is_diff=True, allowed_collision_matrix=message)
     scene.robot_state.is_diff = True
     request = ApplyPlanningSceneRequest(scene=scene)
     if not request_service("apply_planning_scene", ApplyPlanningScene, request, timeout_s).success:
         raise CallError(
-            f"service '{rospy.resolve_name('apply_planning_scene')}' did not take the collision matrix of "
+            f"service '{rospy.resolve_name('apply_planning_scene')}' refused the collision matrix of "
             f"{len(message.entry_names)} entries; its node logged the reason"
         )
 
 
 class AcmServices(ManagerServices):
-    """The collision matrix manager behind its services.
+    """ROS interface of the ACM manager.
 
     Parameters:
-        ``manipulator_links_indices`` (list of int): rows of the manipulator's links in the matrix of ``set_init_acm``.
-        ``manipulator_prefix`` (string): texts in the names of the manipulator's links; used without the indices.
-        Both are read each time a reference matrix is set.
-        ``~grip_interfaces`` (bool, false): serves ``update_acm_entry`` with GRIP's type, which has a field ``publish``.
-        ``simulation`` (bool): True adds the movable objects of the simulation before a request about objects is served,
-            and removes those that were deleted from it before any request.
+        ``manipulator_links_indices`` (list of int): Indices of the manipulator's links in the matrix of
+            ``set_init_acm``. Read at every ``set_init_acm``.
+        ``manipulator_prefix`` (string): Texts in the names of the manipulator's links, used without indices. Read at
+            every ``set_init_acm``.
+        ``~grip_interfaces`` (bool, false): Whether ``update_acm_entry`` has GRIP's type with the field ``publish``.
+        ``simulation`` (bool): Whether to add the movable objects of the simulation before a request about objects,
+            and to remove deleted objects before any request.
 
     Services:
         ``set_init_acm`` (SetInitACM), ``update_acm_entry`` (UpdateACMEntry), ``get_modified_acm`` (GetModifiedACM):
-        of the manipulator. ``modify_acm`` (ModifyACM): of any links.
-    Services called: ``apply_planning_scene`` when ``modify_acm`` asks for it, and when ``update_acm_entry`` takes a
-        permission back; in simulation ``get_planning_scene``, ``gazebo/get_model_properties`` and
+        For the manipulator.
+        ``modify_acm`` (ModifyACM): For any links.
+    Services called: ``apply_planning_scene`` if ``modify_acm`` requests it or ``update_acm_entry`` disallows a
+        collision; in simulation ``get_planning_scene``, ``gazebo/get_model_properties`` and
         ``gazebo/get_world_properties``.
     """
 
     def __init__(self) -> None:
-        """Makes a manager without a matrix; nothing is advertised before :meth:`connect`."""
+        """Creates a manager without a matrix; :meth:`connect` advertises the services."""
         self.manager = AcmManager()
         super().__init__()
 
@@ -119,24 +125,24 @@ class AcmServices(ManagerServices):
             return SetInitACMResponse(success=False)
 
     def _update_entry(self, request: Any) -> Any:
-        before, publish = self.manager.permissions(), bool(getattr(request, "publish", False))
-        self._follow_simulation()
+        permissions_before, publish = self.manager.permissions(), bool(getattr(request, "publish", False))
+        self._remove_deleted_objects()
         response = (
             UpdateACMEntryResponse if isinstance(request, UpdateACMEntryRequest) else (UpdateAndPublishACMEntryResponse)
         )
         try:
             warning = self._apply_update(request.action, request.entry_name)
-            self._follow_simulation()
-            if publish or before - self.manager.permissions():
+            self._remove_deleted_objects()
+            if publish or permissions_before - self.manager.permissions():
                 apply_matrix(matrix_to_message(self.manager.current().matrix), APPLY_TIMEOUT_S)
         except AcmError as error:
             rospy.logerr("update_acm_entry: %s", error)
             return response(success=False)
         except CallError as error:
             if publish:
-                rospy.logerr("update_acm_entry: the matrix was to be published: %s", error)
+                rospy.logerr("update_acm_entry: the matrix could not be published: %s", error)
                 return response(success=False)
-            warning = f"move_group still has the collision matrix it had: {error}"
+            warning = f"move_group keeps the previous collision matrix: {error}"
         if warning:
             rospy.logwarn("update_acm_entry: %s", warning)
         return response(success=True)
@@ -154,17 +160,17 @@ class AcmServices(ManagerServices):
                 raise AcmError(f"got action {action}, allowed are ADD_ENTRY=0, DELETE_ENTRY=1, REINIT=2")
 
     def _get_modified(self, request: Any) -> GetModifiedACMResponse:
-        self._follow_simulation()
+        self._remove_deleted_objects()
         try:
-            answer = self._modify(request)
+            result = self._modify(request)
         except AcmError as error:
             rospy.logerr("get_modified_acm: %s", error)
             return GetModifiedACMResponse(success=False)
-        for warning in answer.warnings:
+        for warning in result.warnings:
             rospy.logwarn("get_modified_acm: %s", warning)
-        return GetModifiedACMResponse(acm=matrix_to_message(answer.matrix), success=True)
+        return GetModifiedACMResponse(acm=matrix_to_message(result.matrix), success=True)
 
-    def _modify(self, request: Any) -> AcmAnswer:
+    def _modify(self, request: Any) -> AcmResult:
         match request.modification:
             case GetModifiedACMRequest.NOTHING:
                 return self.manager.current()
@@ -180,19 +186,19 @@ class AcmServices(ManagerServices):
                 )
 
     def _modify_links(self, request: Any) -> ModifyACMResponse:
-        self._follow_simulation()
+        self._remove_deleted_objects()
         try:
-            answer = self._modified(request)
+            result = self._modified(request)
             if request.publish:
-                apply_matrix(matrix_to_message(answer.matrix), APPLY_TIMEOUT_S)
+                apply_matrix(matrix_to_message(result.matrix), APPLY_TIMEOUT_S)
         except (AcmError, CallError) as error:
             rospy.logerr("modify_acm: %s", error)
             return ModifyACMResponse(success=False)
-        for warning in answer.warnings:
+        for warning in result.warnings:
             rospy.logwarn("modify_acm: %s", warning)
         return ModifyACMResponse(success=True)
 
-    def _modified(self, request: Any) -> AcmAnswer:
+    def _modified(self, request: Any) -> AcmResult:
         match request.modification:
             case ModifyACMRequest.ROBOT_SELF_COLLISION:
                 return self.manager.allow_self_collision(request.allow_collision, request.robot_links)
@@ -207,25 +213,24 @@ class AcmServices(ManagerServices):
                     "ROBOT_OBJECT_COLLISION=1"
                 )
 
-    def _follow_simulation(self) -> None:
-        """Removes objects that somebody else deleted from the simulation."""
+    def _remove_deleted_objects(self) -> None:
+        """Removes objects that were deleted from the simulation."""
         try:
             models = simulated_models()
         except CallError as error:
-            rospy.logwarn("collision matrix: the models of the simulation cannot be looked up: %s", error)
+            rospy.logwarn("collision matrix: the models of the simulation are unknown: %s", error)
             return
         if models is not None:
-            for name in self.manager.follow(models):
-                rospy.loginfo("collision matrix: '%s' is not in the simulation any more and was removed", name)
+            for name in self.manager.remove_missing(models):
+                rospy.loginfo("collision matrix: '%s' is no longer in the simulation and was removed", name)
 
     def _add_simulated_objects(self) -> None:
-        """Adds objects that a world file or another node has put into the simulation since the last request."""
+        """Adds objects that appeared in the simulation since the last request."""
         try:
             for name in new_movable_objects(self.manager.objects):
                 self.manager.add_object(name)
         except CallError as error:
             rospy.logwarn(
-                "get_modified_acm: the objects of the simulation cannot be looked up, only those that were "
-                "added are known: %s",
+                "get_modified_acm: the objects of the simulation are unknown, only added objects are used: %s",
                 error,
             )

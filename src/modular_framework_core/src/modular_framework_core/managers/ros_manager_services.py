@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The services of a manager."""
+"""Base class of the managers' ROS interfaces."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import rospy
 
 
 class ManagerServices:
-    """Services that are withdrawn together."""
+    """A set of services that are shut down together."""
 
     def __init__(self) -> None:
         self._services: list[rospy.Service] = []
 
     def close(self) -> None:
-        """Withdraws the services; may be called twice."""
+        """Shuts down the services. May be called twice."""
         while self._services:
             self._services.pop().shutdown("the manager is closed")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services of the message stores, one set for each kind of message, and the topic of their changes."""
+"""Services of the message stores, one set for each kind of message, and a topic with all changes."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from modular_framework_core import srv
 from modular_framework_core.files import default_folders
 from modular_framework_core.files.yaml_entries import EntryError
 from modular_framework_core.managers import message_files
-from modular_framework_core.managers.message_numbers import unusable_position
+from modular_framework_core.managers.message_numbers import position_fault
 from modular_framework_core.managers.message_store import Change, MessageNotFoundError, MessageStore
 from modular_framework_core.managers.ros_manager_services import ManagerServices
 from modular_framework_core.msg import ManagerChange
 from modular_framework_ros.declared_parameters import DeclaredParameters
 
-OVERWRITTEN_PERIOD_S = 1.0  # a line of the log takes as long as ten requests; manager_changes reports every one
+OVERWRITE_LOG_PERIOD_S = 1.0  # logging takes as long as ten requests; manager_changes reports every change
 
 
 @dataclass(frozen=True, slots=True)
 class MessageKind:
-    """The services and message types of one kind of message.
+    """Services and message types of one kind of message.
 
     Attributes:
-        noun: Word for the message in log lines.
+        noun: Noun for the message in logs.
         add_type: Service type that stores a message.
-        get_type: Service type that hands one out.
+        get_type: Service type that returns a message.
         message_field: Field of the message in both types.
         name_field: Field of the name in both requests.
-        suffixes: Services for one message are called ``add_<suffix>`` and ``get_<suffix>``.
-        plural: Services for all messages are called ``list_<plural>`` and so on; only the last suffix has a
+        suffixes: Suffixes of the services ``add_<suffix>`` and ``get_<suffix>``; only the last suffix has
             ``remove_<suffix>``.
+        plural: Suffix of the services for all messages, such as ``list_<plural>``.
     """
 
     noun: str
@@ -84,18 +84,18 @@ GRASP = MessageKind(
 
 
 def complete_grasp_id(grasp: Any, name: str) -> None:
-    """Gives a grasp without an id the name it is stored under."""
+    """Sets the ID of a grasp without ID to the grasp's name."""
     if not grasp.grasp_id:
         grasp.grasp_id = name
 
 
 @dataclass(frozen=True, slots=True)
 class NamedFile:
-    """A file of named messages a manager begins with.
+    """A file with the initial messages of a manager.
 
     Attributes:
-        path: The file.
-        read: Gives its usable messages by name, and the faults of the others.
+        path: Path of the file.
+        read: Function that returns the valid messages by name, and the errors of invalid entries.
     """
 
     path: Path
@@ -103,27 +103,28 @@ class NamedFile:
 
 
 class MessageServices(ManagerServices):
-    """One store behind its services.
+    """ROS interface of a message store.
 
-    A request that cannot be served answers ``success=False`` and logs the reason; it never raises.
+    An invalid request is answered with ``success=False``, and its reason is logged.
 
     Services:
-        ``add_<suffix>``, ``get_<suffix>``: of the kind's types, for each of its suffixes.
-        ``remove_<suffix>`` (RemoveMessage), ``list_<plural>`` (ListMessages), ``clear_<plural>`` (std_srvs/Trigger):
-            all messages; ``clear_anonymous_<plural>`` (std_srvs/Trigger): those that wait to be read.
-        ``save_<plural>``, ``load_<plural>`` (MessageFile): all messages to a file and from one.
-        ``reload_<plural>`` (MessageFile): forgets everything and reads the file of named messages again, or
-            another one. ``reinitialise_<suffix>_manager`` (ReinitManager): GRIP's name for that.
+        ``add_<suffix>``, ``get_<suffix>`` (types of the kind): Store or return a message.
+        ``remove_<suffix>`` (RemoveMessage): Removes a named message.
+        ``list_<plural>`` (ListMessages), ``clear_<plural>`` (std_srvs/Trigger): List or remove all messages.
+        ``clear_anonymous_<plural>`` (std_srvs/Trigger): Removes the anonymous messages.
+        ``save_<plural>``, ``load_<plural>`` (MessageFile): Save all messages to a file, or load a saved file.
+        ``reload_<plural>`` (MessageFile): Replaces all messages by the content of a file of named messages, by default
+            the initial file.
+        ``reinitialise_<suffix>_manager`` (ReinitManager): GRIP's name of ``reload_<plural>``.
     Parameters:
-        ``~file_directory``: folder of the files that are saved and loaded (default:
-            ``$ROS_HOME/modular_framework/managers``); a file elsewhere is refused, but for
-            ``reload_<plural>``, which also takes one beside the node's own.
+        ``~file_directory``: Folder of saved files; default: ``$ROS_HOME/modular_framework/managers``. Files elsewhere
+            are refused, except that ``reload_<plural>`` also reads from the folder of the initial file.
     Publishers:
-        ``manager_changes`` (ManagerChange): every change, in order.
+        ``manager_changes`` (ManagerChange): Every change, in order.
     """
 
     def __init__(self, kind: MessageKind, named_file: NamedFile | None = None) -> None:
-        """Reads the file of named messages, if there is one; nothing is advertised before :meth:`connect`."""
+        """Reads the file of named messages, if any; :meth:`connect` advertises the services."""
         self.kind = kind
         self._file = named_file
         self.store: MessageStore[Any] = MessageStore(
@@ -136,9 +137,13 @@ class MessageServices(ManagerServices):
                 rospy.logerr("%s. This entry is skipped.", fault)
 
     def connect(self) -> None:
-        """Advertises the services; raises ParameterError where a parameter has a wrong value."""
-        given = DeclaredParameters("modular_framework_core", "managers").value("~file_directory")
-        self._folder = Path(given) if given else default_folders.framework_home() / "managers"
+        """Advertises the services.
+
+        Raises:
+            ParameterError: A parameter has an invalid value.
+        """
+        directory = DeclaredParameters("modular_framework_core", "managers").value("~file_directory")
+        self._folder = Path(directory) if directory else default_folders.framework_home() / "managers"
         self._changes = rospy.Publisher("manager_changes", ManagerChange, queue_size=1000)
         kind, last = self.kind, self.kind.suffixes[-1]
         for suffix in kind.suffixes:
@@ -148,12 +153,12 @@ class MessageServices(ManagerServices):
         self._serve(f"list_{kind.plural}", srv.ListMessages, self._list)
         self._serve(f"clear_{kind.plural}", Trigger, self._clear)
         self._serve(f"clear_anonymous_{kind.plural}", Trigger, self._clear_anonymous)
-        for verb, work in (("save", self._save), ("load", self._load), ("reload", self._reload)):
-            self._serve(f"{verb}_{kind.plural}", srv.MessageFile, work)
+        for verb, handler in (("save", self._save), ("load", self._load), ("reload", self._reload)):
+            self._serve(f"{verb}_{kind.plural}", srv.MessageFile, handler)
         self._serve(f"reinitialise_{last}_manager", srv.ReinitManager, self._reinitialise)
 
-    def _serve(self, name: str, service_type: Any, work: Callable[[Any], Any]) -> None:
-        self._services.append(rospy.Service(name, service_type, work))
+    def _serve(self, name: str, service_type: Any, handler: Callable[[Any], Any]) -> None:
+        self._services.append(rospy.Service(name, service_type, handler))
 
     def _publish_change(self, change: Change) -> None:
         if self._changes is not None:
@@ -165,14 +170,14 @@ class MessageServices(ManagerServices):
 
     def _add(self, request: Any) -> Any:
         name = getattr(request, self.kind.name_field)
-        wrong = unusable_position(getattr(request, self.kind.message_field))
-        if wrong:
+        fault = position_fault(getattr(request, self.kind.message_field))
+        if fault:
             rospy.logerr(
-                "The %s '%s' is not stored: %s; give one finite position for each joint.", self.kind.noun, name, wrong
+                "The %s '%s' is not stored: %s; give one finite position for each joint.", self.kind.noun, name, fault
             )
             return self.kind.add_type._response_class(success=False)
         if self.store.add(getattr(request, self.kind.message_field), name):
-            rospy.loginfo_throttle(OVERWRITTEN_PERIOD_S, f"The {self.kind.noun} '{name}' was overwritten.")
+            rospy.loginfo_throttle(OVERWRITE_LOG_PERIOD_S, f"The {self.kind.noun} '{name}' was overwritten.")
         return self.kind.add_type._response_class(success=True)
 
     def _get(self, request: Any) -> Any:
@@ -220,15 +225,15 @@ class MessageServices(ManagerServices):
             return self._refused(str(error))
         messages = [
             *((f"'{name}'", item) for name, item in named.items()),
-            *((f"anonymous message {number}", item) for number, item in enumerate(anonymous, start=1)),
+            *((f"anonymous message {index}", item) for index, item in enumerate(anonymous, start=1)),
         ]
-        wrong = [
-            f"{path}: {what}: {found}; give one finite position for each joint"
-            for what, item in messages
-            if (found := unusable_position(item))
+        faults = [
+            f"{path}: {label}: {fault}; give one finite position for each joint"
+            for label, item in messages
+            if (fault := position_fault(item))
         ]
-        if wrong:
-            return self._refused("\n".join(wrong))
+        if faults:
+            return self._refused("\n".join(faults))
         self.store.load(named, anonymous)
         return srv.MessageFileResponse(success=True, message=str(path), count=len(named) + len(anonymous))
 
@@ -236,8 +241,8 @@ class MessageServices(ManagerServices):
         if self._file is None:
             if request.path:
                 return self._refused(
-                    f"no file of named messages is known for the kind '{self.kind.noun}'; "
-                    f"load_{self.kind.plural} reads saved files"
+                    f"no file of named messages is configured for the kind '{self.kind.noun}'; "
+                    f"use load_{self.kind.plural} to read a saved file"
                 )
             self.store.clear()
             return srv.MessageFileResponse(success=True)
@@ -254,11 +259,11 @@ class MessageServices(ManagerServices):
         return srv.MessageFileResponse(success=True, message=str(file.path), count=count)
 
     def _reinitialise(self, request: Any) -> Any:
-        answer = self._reload(srv.MessageFileRequest(path=request.argument))
-        return srv.ReinitManagerResponse(success=answer.success)
+        response = self._reload(srv.MessageFileRequest(path=request.argument))
+        return srv.ReinitManagerResponse(success=response.success)
 
     def _read(self, file: NamedFile) -> tuple[int, list[EntryError]]:
-        """Replaces the stored messages by the usable ones of a file; keeps them when the file has none."""
+        """Replaces the stored messages by the valid messages of a file, unless all of its entries are invalid."""
         named, faults = file.read(file.path)
         if faults and not named:
             return 0, faults

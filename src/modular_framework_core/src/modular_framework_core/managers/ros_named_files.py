@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the messages of the files of named joint states, trajectories and poses."""
+"""Reads files of named joint states, trajectories and poses as ROS messages."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ NamedMessages = tuple[dict[str, Any], list[EntryError]]
 
 
 def joint_state_message(state: NamedJointState) -> JointState:
-    """Converts a named joint state; header, velocities and efforts stay empty."""
+    """Returns a named joint state as a message without header, velocities and efforts."""
     return JointState(name=list(state.joint_names), position=list(state.positions))
 
 
 def trajectory_message(trajectory: TimedTrajectory) -> JointTrajectory:
-    """Converts a timed trajectory; only positions and times are filled."""
+    """Returns a timed trajectory as a message with positions and times only."""
     points = [
         JointTrajectoryPoint(positions=list(positions), time_from_start=rospy.Duration.from_sec(time_s))
         for positions, time_s in trajectory.points
@@ -41,13 +41,13 @@ def trajectory_message(trajectory: TimedTrajectory) -> JointTrajectory:
 
 
 def pose_message(pose: NamedPose) -> PoseStamped:
-    """Converts a named pose of one thing, stamped now."""
+    """Returns a named single pose as a message, stamped with the current time."""
     header = Header(stamp=rospy.Time.now(), frame_id=pose.reference_frame)
     return PoseStamped(header=header, pose=_pose(pose.placements[""]))
 
 
 def robot_pose_message(pose: NamedPose) -> RobotPose:
-    """Converts a named pose of a robot's end effectors, stamped now."""
+    """Returns a named robot pose as a message, stamped with the current time."""
     header = Header(stamp=rospy.Time.now(), frame_id=pose.reference_frame)
     poses = [_pose(placement) for placement in pose.placements.values()]
     return RobotPose(end_effector_link_names=list(pose.placements), pose_array=PoseArray(header=header, poses=poses))
@@ -58,13 +58,13 @@ def _pose(placement: Placement) -> Pose:
 
 
 def read_joint_states(path: Path) -> NamedMessages:
-    """Reads a file of joint states, checked against the joints of ``robot_description`` where that is set."""
+    """Reads a file of joint states and checks them against the joints of ``robot_description``, if set."""
     states, faults = load_joint_states(path, robot_bounds())
     return {state.name: joint_state_message(state) for state in states}, faults
 
 
 def trajectory_reader(lookup: JointLookup) -> Callable[[Path], NamedMessages]:
-    """Returns a reader of files of trajectories that takes joint states from a lookup."""
+    """Returns a reader of trajectory files with a given lookup of joint states."""
 
     def read(path: Path) -> NamedMessages:
         trajectories, faults = load_trajectories(path, lookup)
@@ -74,19 +74,19 @@ def trajectory_reader(lookup: JointLookup) -> Callable[[Path], NamedMessages]:
 
 
 def read_poses(path: Path) -> NamedMessages:
-    """Reads the poses of one thing each from a file of poses."""
+    """Reads the single poses in a file of poses."""
     poses, faults = load_poses(path)
     return {pose.name: pose_message(pose) for pose in poses if not pose.is_robot_pose}, faults
 
 
 def read_robot_poses(path: Path) -> NamedMessages:
-    """Reads the poses of a robot's end effectors from a file of poses; its faults are reported by ``read_poses``."""
+    """Reads the robot poses in a file of poses. Faults are reported by ``read_poses`` only."""
     poses, _ = load_poses(path)
     return {pose.name: robot_pose_message(pose) for pose in poses if pose.is_robot_pose}, []
 
 
 def robot_bounds() -> Mapping[str, Bounds]:
-    """Returns the bounds of the robot's joints; none when no robot is described, or not as XML (which is logged)."""
+    """Returns the limits of the robot's joints; empty without a valid ``robot_description``."""
     description = rospy.get_param_cached("robot_description", "")
     if not description:
         return {}
@@ -98,7 +98,7 @@ def robot_bounds() -> Mapping[str, Bounds]:
 
 
 def joint_lookup(services: MessageServices) -> JointLookup:
-    """Makes a lookup of joint states that live in the same process."""
+    """Returns a lookup of joint states in the same process."""
 
     def lookup(name: str) -> Mapping[str, float] | None:
         if name not in services.store.names():
@@ -110,13 +110,10 @@ def joint_lookup(services: MessageServices) -> JointLookup:
 
 
 def lookup_over_service(timeout_s: float) -> JointLookup:
-    """Makes a lookup of joint states that live in another node.
+    """Returns a lookup of joint states in a different node. If the service does not appear, the lookup is empty.
 
     Args:
-        timeout_s: Longest wait for the service ``get_joint_state`` [s], spent at most once.
-
-    Returns:
-        The lookup; it knows nothing when the service does not appear, which is logged.
+        timeout_s: Timeout of the wait for the service ``get_joint_state`` [s].
     """
     get_joint_state = rospy.ServiceProxy("get_joint_state", GetJointState)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Starts the managers: all of them in one node, or one of them in a node of its own."""
+"""Runs all managers in one node, or one manager in its own node."""
 
 from __future__ import annotations
 
@@ -28,26 +28,33 @@ from modular_framework_ros.service_backlog import widen_backlog
 from modular_framework_ros.start_up import start_timeout
 
 TOPICS_IN_LOG_PARAMETER = "/rosout_disable_topics_generation"
-COLLECT_AFTER = 50_000  # objects; messages are freed by reference counts, and five plans are a few thousand objects
+GC_THRESHOLD = 50_000  # [objects]; messages have no reference cycles, and five plans are a few thousand objects
 
 
 def start(node_name: str) -> list[str]:
-    """Starts a node and returns its arguments without the remappings of ROS; an empty one may stand for a missing one.
+    """Starts a node and returns its command-line arguments without ROS remappings.
 
-    rospy asks the master for the parameter of the topics in the log at every line, as long as nobody has set it: half a
-    request's time. Where it is not set it gets the value that has the same meaning.
+    If ``/rosout_disable_topics_generation`` is not set, it is set to its default: rospy otherwise asks the master for
+    it at every log message, which takes half the time of a request.
     """
     rospy.init_node(node_name)
     widen_backlog()
     if not rospy.has_param(TOPICS_IN_LOG_PARAMETER):
         rospy.set_param(TOPICS_IN_LOG_PARAMETER, False)
-    gc.freeze()  # looking for cycles among the modules, at every tenth file loaded, took 20 ms
-    gc.set_threshold(COLLECT_AFTER)
+    gc.freeze()  # garbage collection over all modules took 20 ms at every tenth loaded file
+    gc.set_threshold(GC_THRESHOLD)
     return list(rospy.myargv(sys.argv)[1:])
 
 
 def run_message_manager(kind: MessageKind, node_name: str) -> None:
-    """Runs the manager of one kind of message; argument: optional file of named messages, where the kind has such."""
+    """Runs the manager of one kind of message.
+
+    Args:
+        kind: Kind of the messages.
+        node_name: Name of the node.
+
+    Command-line argument (optional): file of named messages.
+    """
     arguments = [argument for argument in start(node_name) if argument]
     readers = {kinds.JOINT_STATE: read_joint_states, kinds.POSE: read_poses, kinds.ROBOT_POSE: read_robot_poses}
     if kind is kinds.TRAJECTORY and arguments:
@@ -65,23 +72,23 @@ def run_acm_manager() -> None:
 
 
 def run_object_types() -> None:
-    """Runs the map of simulated objects to their types."""
+    """Runs the manager of object types."""
     start("gazebo_mapping_server")
     ObjectTypeServices().connect()
     rospy.spin()
 
 
 def run_all() -> None:
-    """Runs every manager in one node.
+    """Runs all managers in one node.
 
-    Arguments (all optional, empty for none): file of named joint states, of named trajectories, of named poses. The
-    parameters ``~named_joint_states_file``, ``~named_trajectories_file`` and ``~named_poses_file`` do the same. The
-    file of poses may be missing: older configurations have none.
+    Command-line arguments (optional, "" for none): files of named joint states, named trajectories and named poses. The
+    parameters ``~named_joint_states_file``, ``~named_trajectories_file`` and ``~named_poses_file`` take precedence. The
+    file of poses may be missing, as in older configurations.
     """
     arguments = [*start("managers"), "", "", ""]
     read = DeclaredParameters("modular_framework_core", "managers").values
-    given = read("~named_joint_states_file", "~named_trajectories_file", "~named_poses_file")
-    files = [path or argument for path, argument in zip(given, arguments, strict=False)]
+    parameters = read("~named_joint_states_file", "~named_trajectories_file", "~named_poses_file")
+    files = [path or argument for path, argument in zip(parameters, arguments, strict=False)]
 
     def named(path: str, read: Callable[[Path], NamedMessages]) -> NamedFile | None:
         return NamedFile(Path(path), read) if path else None

@@ -22,10 +22,10 @@ from modular_framework_ros.calls import CallError
 
 
 class ObjectTypeServices(ManagerServices):
-    """The object types behind their services.
+    """ROS interface of the object types.
 
     Parameters:
-        ``simulation`` (bool): True forgets objects that were deleted from the simulation before a request is served.
+        ``simulation`` (bool): Whether to remove objects that were deleted from the simulation, before each request.
 
     Services:
         ``add_gazebo_mapping`` (AddGazeboMapping), ``get_object_type`` (GetGazeboType),
@@ -34,7 +34,7 @@ class ObjectTypeServices(ManagerServices):
     """
 
     def __init__(self) -> None:
-        """Makes an empty map; nothing is advertised before :meth:`connect`."""
+        """Creates an empty map; :meth:`connect` advertises the services."""
         self.types = ObjectTypes()
         super().__init__()
 
@@ -46,19 +46,19 @@ class ObjectTypeServices(ManagerServices):
             rospy.Service("delete_gazebo_mapping", DeleteGazeboMapping, self._delete),
         ]
 
-    def _follow_simulation(self) -> None:
-        """Forgets objects that somebody else deleted from the simulation."""
+    def _remove_deleted_objects(self) -> None:
+        """Removes objects that were deleted from the simulation."""
         try:
             models = simulated_models()
         except CallError as error:
-            rospy.logwarn("object types: the models of the simulation cannot be looked up: %s", error)
+            rospy.logwarn("object types: the models of the simulation are unknown: %s", error)
             return
         if models is not None:
-            for name in self.types.follow(models):
-                rospy.loginfo("object types: '%s' is not in the simulation any more and was forgotten", name)
+            for name in self.types.remove_missing(models):
+                rospy.loginfo("object types: '%s' is no longer in the simulation and was removed", name)
 
     def _add(self, request: Any) -> AddGazeboMappingResponse:
-        self._follow_simulation()
+        self._remove_deleted_objects()
         try:
             self.types.add(request.object_name, request.object_type)
             return AddGazeboMappingResponse(success=True)
@@ -67,7 +67,7 @@ class ObjectTypeServices(ManagerServices):
             return AddGazeboMappingResponse(success=False)
 
     def _get(self, request: Any) -> GetGazeboTypeResponse:
-        self._follow_simulation()
+        self._remove_deleted_objects()
         try:
             return GetGazeboTypeResponse(object_type=self.types.get(request.object_name), success=True)
         except ObjectTypeError as error:
