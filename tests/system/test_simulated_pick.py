@@ -79,7 +79,7 @@ def test_wrong_launch_argument_is_refused_and_named(session: RosSession) -> None
 @pytest.mark.parametrize(
     ("name", "value", "code", "cause"),
     [
-        ("simulation", "flase", 2, "argument 'simulation' is 'flase', allowed are true and false"),
+        ("simulation", "flase", 2, "argument 'simulation' is 'flase'; it must be true or false"),
         ("task_constructor_script", "no.yaml", 2, "no.yaml:1:1: there is no such file"),
         ("world_file", "no.world", 2, "argument 'world_file' is 'no.world'.*did you mean 'bin.world'"),
         ("world_file", "../../../tests/system/nameless_link.world", 3, r"node 'gazebo' died .*nameless_link\.world:4"),

@@ -95,7 +95,7 @@ def test_an_object_enters_and_leaves_the_simulation(simulation: FakeSimulation) 
     assert object_type("mine") == "box"
     code, text = manage(simulation, "-t", "box", "-n", "mine")
     assert code == 1
-    assert "there is an object 'mine' already" in text
+    assert "an object 'mine' exists already" in text
     assert manage(simulation, "-d", "true", "-n", "mine")[0] == 0
     assert not simulation.models
     assert object_type("mine") == ""
@@ -169,7 +169,7 @@ def test_the_file_of_sensors_is_read_again_on_request(simulation: FakeSimulation
     answer = reload()
     assert not answer.success
     assert "sensors.yaml:2" in answer.message and "no pose named 'nowhere' is stored" in answer.message
-    assert "'simulated_kinect2' is not in the file any more" in answer.message
+    assert "'simulated_kinect2' was removed from the file" in answer.message
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer)
     transform = buffer.lookup_transform("world", "camera_frame", rospy.Time(0), rospy.Duration(60)).transform

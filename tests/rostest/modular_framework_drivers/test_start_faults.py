@@ -93,7 +93,7 @@ def test_a_fault_at_the_start_is_in_the_diagnostics_and_ends_the_wait_of_the_nod
 
 
 def test_the_spawner_of_the_controllers_names_the_causes(drivers: Drivers) -> None:
-    waited = "for topic /listed_ready of hardware 'listed' to say True in vain; "
+    waited = "for True on topic /listed_ready of hardware 'listed' in vain; "
     until(lambda: waited in drivers.session.log(), "the end of the spawner", timeout_s=90.0)
     line = next(line for line in drivers.session.log().splitlines() if waited in line)
     assert "Could not connect to" in line and "has no power" in line

@@ -35,5 +35,5 @@ def test_an_argument_of_neither_and_a_wrong_value_are_refused(robot: str) -> Non
     check_arguments(robot, ["gui:=false", "hand:=three"])
     with pytest.raises(roslaunch.core.RLException, match="unknown argument 'guy'; did you mean 'gui'"):
         check_arguments(robot, ["guy:=false"])
-    with pytest.raises(roslaunch.core.RLException, match="'gui' is 'no', allowed are true and false"):
+    with pytest.raises(roslaunch.core.RLException, match="'gui' is 'no'; it must be true or false"):
         check_arguments(robot, ["gui:=no"])

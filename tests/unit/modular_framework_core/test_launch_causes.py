@@ -36,11 +36,11 @@ def test_the_last_fatal_message_is_the_cause_with_all_its_lines(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("argument", "hint"),
     [
-        ("simulation:=flase", "argument 'simulation' is 'flase', allowed are true and false"),
+        ("simulation:=flase", "argument 'simulation' is 'flase'; it must be true or false"),
         ("gui:=", "argument 'gui' is ''"),
         ("worldfile:=b", "did you mean 'world_file'"),
         ("b.world", "not of the form name:=value"),
-        ("world_file:=a:=b", "argument 'world_file' is 'a:=b'; roslaunch takes no value with ':='"),
+        ("world_file:=a:=b", "argument 'world_file' is 'a:=b'; roslaunch does not support values with ':='"),
         ("gui=false", "'gui=false' is not of the form name:=value; did you mean 'gui:=false'"),
     ],
 )
@@ -59,7 +59,7 @@ METHOD = """<launch><arg name="method_launch_file" default=""/><arg name="config
     [
         (
             "method_launch_file:=top_down_grasp/a.launch",
-            "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; allowed is PACKAGE/FILE with a "
+            "is 'top_down_grasp/a.launch', and there is no package 'top_down_grasp'; it must be PACKAGE/FILE with a "
             "file in the package's folder launch, the path of a launch file from /, or none; correct it, or build and "
             "source the workspace with the package; did you mean 'top_down_grasps'?",
         ),
@@ -68,13 +68,13 @@ METHOD = """<launch><arg name="method_launch_file" default=""/><arg name="config
             "and the package has no such file; allowed: top_down_grasps/top_down_grasps.launch; did you mean "
             "'top_down_grasps/top_down_grasps.launch'?",
         ),
-        ("method_launch_file:=modular_framework_msgs", "which is no launch file; allowed is PACKAGE/FILE"),
-        ("method_launch_file:=/nowhere/a.launch", "and there is no such file; allowed is PACKAGE/FILE"),
+        ("method_launch_file:=modular_framework_msgs", "which is not a launch file; it must be PACKAGE/FILE"),
+        ("method_launch_file:=/nowhere/a.launch", "and there is no such file; it must be PACKAGE/FILE"),
         (
             "config_directory:=/nowhere",
-            "argument 'config_directory' is '/nowhere', allowed is the path of a folder from /",
+            "argument 'config_directory' is '/nowhere'; it must be the path of a folder from /",
         ),
-        ("config_directory:=config", "argument 'config_directory' is 'config', allowed is the path of a folder from /"),
+        ("config_directory:=config", "argument 'config_directory' is 'config'; it must be the path of a folder from /"),
     ],
 )
 def test_a_method_or_a_configuration_that_is_not_there_is_refused(tmp_path: Path, argument: str, hint: str) -> None:

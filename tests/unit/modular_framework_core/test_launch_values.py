@@ -92,7 +92,7 @@ def test_broken_files_of_world_and_robot_are_named_with_their_line(start: str, t
     ("argument", "sentence"),
     [
         ("world_file:=ur5_setp.world", "argument 'world_file' is 'ur5_setp.world', and "),
-        ("simulation:=maybe", "argument 'simulation' is 'maybe', allowed are true and false"),
+        ("simulation:=maybe", "argument 'simulation' is 'maybe'; it must be true or false"),
         ("task_constructor_script:=/none.yaml", "argument 'task_constructor_script' is '/none.yaml': "),
     ],
 )

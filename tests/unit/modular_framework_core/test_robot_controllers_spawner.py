@@ -46,7 +46,7 @@ def test_a_joint_state_controller_is_added_only_where_there_is_none(tmp_path: Pa
         ("", "expected a mapping"),
         ("arm: {type: [", "not valid YAML"),
         ("arm: {type: NoSlash}\n", "'arm/type' is 'NoSlash'"),
-        ("arm: {joints: [x]}\n", "no controller in it"),
+        ("arm: {joints: [x]}\n", "has a 'type'; add a controller"),
         ("1: {type: a/B}\n", "key 1 is not a name"),
         ("arm: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
     ],

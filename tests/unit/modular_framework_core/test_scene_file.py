@@ -80,14 +80,14 @@ def test_objects_with_poses_meshes_and_subframes_are_read(tmp_path: Path) -> Non
     [
         ("box", "bottle", ":6: got 'bottle', expected a kind of shape: box, sphere"),
         ("1 2 3", "1 2", ":7: got '1 2', expected the size of a box"),
-        ("1 2 3", "1 -2 3", "more than 0"),
+        ("1 2 3", "1 -2 3", "greater than 0"),
         ("1 2 3", "1 nan 3", "finite"),
         (TURN, "0 0 0 0", ":4: .* unit quaternion"),
         ("0 1 2", "0 1 3", "indices below 3"),
         ("1 0 0 1", "1 0 0 2", ":19: .* in 0..1"),
         ("\n.\n", "\n", "ends where"),
         ("* shelf", "shelf", ":2: got 'shelf one', expected an object"),
-        ("handle\n0 0 1\n0 0 0 1\n.", "handle\n0 0 1\n0 0 0 1\n* shelf one\n0\n.", "no object above"),
+        ("handle\n0 0 1\n0 0 0 1\n.", "handle\n0 0 1\n0 0 0 1\n* shelf one\n0\n.", "no earlier object"),
     ],
 )
 def test_a_fault_is_reported_with_its_line(tmp_path: Path, old: str, new: str, hint: str) -> None:
@@ -138,5 +138,5 @@ def test_the_older_layout_has_the_objects_pose_in_its_shapes(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("name", ["", " ", "two\nlines"])
 def test_a_name_that_does_not_fit_on_a_line_is_refused(name: str) -> None:
-    with pytest.raises(SceneFileError, match="one line that is not empty"):
+    with pytest.raises(SceneFileError, match="one nonempty line"):
         scene_text(Scene("room", (SceneObject(name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), ()),)))

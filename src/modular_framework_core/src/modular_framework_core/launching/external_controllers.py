@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decides from the parameters which node drives the manipulator."""
+"""Reads from the parameters which node drives the manipulator."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NAME_KEY = "manipulator_controller_node_name"
 
 @dataclass(frozen=True, slots=True)
 class ControllerNode:
-    """A node to run: the executable ``node_type`` of a ROS package, under a name."""
+    """A node: executable ``node_type`` of a ROS package, and node name."""
 
     package: str
     node_type: str
@@ -23,16 +23,13 @@ class ControllerNode:
 
 
 def controller_node(parameters: Mapping[str, object]) -> ControllerNode | None:
-    """Reads which node to run.
+    """Returns the node that drives the manipulator, or None if a ros_control plug-in drives it (empty package).
 
     Args:
-        parameters: Values of the keys above that are set.
-
-    Returns:
-        The node; None when the package is empty, which says that the manipulator is driven by a ros_control plug-in.
+        parameters: Values of the keys above, if set.
 
     Raises:
-        ParameterError: A parameter is not set or empty.
+        ParameterError: A required parameter is not set or empty.
     """
     if PACKAGE_KEY not in parameters:
         raise ParameterError(

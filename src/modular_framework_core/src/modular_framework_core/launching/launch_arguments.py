@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks the arguments of a launch file before anything is started; roslaunch ignores an unknown one silently."""
+"""Checks the arguments of a launch file before anything starts, because roslaunch ignores unknown arguments."""
 
 from __future__ import annotations
 
@@ -17,32 +17,28 @@ from modular_framework_core.launching.launch_values import value_faults
 from modular_framework_urdf import xml_text
 
 BOOLEANS = ("true", "false", "1", "0")
-"""Texts that roslaunch accepts as a bool, in upper or lower case."""
+"""Texts that roslaunch accepts as a bool, case-insensitive."""
 
 
 def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
-    """Returns the values of the arguments of a launch file and of those it passes all of them to, defaults included.
+    """Returns the argument values of a launch file and of files included with `pass_all_args`, including defaults.
 
     Args:
         path: Launch file.
-        arguments: What is given, `name:=value`.
+        arguments: Given arguments, `name:=value`.
     """
     loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False, args_only=True)
     roslaunch.config.load_config_default([(path, arguments)], None, loader=loader, verbose=False, assign_machines=False)
     values = {name: str(value) for name, value in loader.root_context.resolve_dict["arg"].items()}
     for included in _files_with_all_arguments(path):
-        # roslaunch cannot read a value that has an assignment in it
-        given = [f"{name}:={value}" for name, value in values.items() if ":=" not in value]
-        values = argument_values(included, given) | values
+        # roslaunch cannot read a value that contains ":="
+        passed_arguments = [f"{name}:={value}" for name, value in values.items() if ":=" not in value]
+        values = argument_values(included, passed_arguments) | values
     return values
 
 
 def known_arguments(path: str) -> dict[str, tuple[str, str | None]]:
-    """Returns documentation and default of every argument of a launch file, and of the files it passes all of them to.
-
-    Args:
-        path: Launch file.
-    """
+    """Returns (documentation, default) of the arguments of a launch file and of files included with `pass_all_args`."""
     known = dict(roslaunch.arg_dump.get_args([path]))
     for included in _files_with_all_arguments(path):
         known = known_arguments(included) | known
@@ -50,7 +46,7 @@ def known_arguments(path: str) -> dict[str, tuple[str, str | None]]:
 
 
 def _files_with_all_arguments(path: str) -> list[str]:
-    """Returns the launch files that a launch file includes with all its arguments."""
+    """Returns the launch files that a launch file includes with `pass_all_args`."""
     try:
         launch = xml_text.read(Path(path))
     except xml_text.XmlError as error:
@@ -65,33 +61,33 @@ def _files_with_all_arguments(path: str) -> list[str]:
 def check_arguments(
     path: str, arguments: list[str], faults_of: Callable[[Mapping[str, str]], list[str]] = value_faults
 ) -> None:
-    """Refuses arguments that the launch file does not have, and values that it cannot use.
+    """Checks that the launch file has the given arguments and that their values are allowed.
 
     Args:
         path: Launch file.
-        arguments: What is given, `name:=value`.
-        faults_of: Returns what is wrong with the values of all arguments.
+        arguments: Given arguments, `name:=value`.
+        faults_of: Function that returns the faults in the values of all arguments.
 
     Raises:
-        roslaunch.core.RLException: It names every wrong argument and what was probably meant.
+        roslaunch.core.RLException: Arguments are unknown or invalid; the message names all of them.
     """
     known = known_arguments(path)
     faults = []
     for argument in arguments:
         name, assignment, value = argument.partition(":=")
         if not assignment:
-            start, sign, rest = argument.partition("=")
-            meant = f"; did you mean '{start}:={rest}'" if sign and start in known else ""
-            faults.append(f"argument '{argument}' is not of the form name:=value{meant}")
+            start, sign, end = argument.partition("=")
+            hint = f"; did you mean '{start}:={end}'" if sign and start in known else ""
+            faults.append(f"argument '{argument}' is not of the form name:=value{hint}")
         elif name not in known:
             faults.append(f"unknown argument '{name}'{nearest(name, known)}; allowed: {', '.join(sorted(known))}")
         elif ":=" in value:
             faults.append(
-                f"argument '{name}' is '{value}'; roslaunch takes no value with ':='; make it the default of the "
-                "argument in a launch file of your own that includes this one"
+                f"argument '{name}' is '{value}'; roslaunch does not support values with ':='; make it the default of "
+                "the argument in a launch file of your own that includes this file"
             )
         elif str(known[name][1]).lower() in BOOLEANS[:2] and value.lower() not in BOOLEANS:
-            faults.append(f"argument '{name}' is '{value}', allowed are true and false; correct it")
+            faults.append(f"argument '{name}' is '{value}'; it must be true or false")
     if not faults:
         faults = faults_of(argument_values(path, arguments))
     if faults:

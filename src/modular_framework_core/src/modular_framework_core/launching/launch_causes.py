@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds in the log file of a node why it ended."""
+"""Finds the reason for the end of a node in its log file."""
 
 from __future__ import annotations
 
@@ -10,14 +10,7 @@ _RECORD = re.compile(r"^\[[\w.]+\]\[(\w+)\] [\d-]+ [\d:,]+: ")
 
 
 def cause_of_death(log_file: Path) -> str:
-    """Returns the last fatal message of a node's log file.
-
-    Args:
-        log_file: As rospy writes it.
-
-    Returns:
-        The message; empty when there is none, or no such file.
-    """
+    """Returns the last fatal message in a log file of rospy, or "" without a message or file."""
     try:
         lines = log_file.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs a launch file to its end and reports how it ended, which roslaunch itself does not.
+"""Runs a launch file and exits with the task's exit code or names the node that died.
 
-roslaunch always exits with 0. Whoever starts a task from a script needs the task's own exit code, and the name of the
-node when a node died instead.
+roslaunch itself always exits with 0, but scripts need the result of the task.
 """
 
 from __future__ import annotations
@@ -28,20 +27,21 @@ from modular_framework_core.launching.launch_causes import cause_of_death
 EXIT_NODE_DIED = 3
 EXIT_BAD_LAUNCH = 2
 ENDINGS = {0: "the task succeeded", 1: "the task did not succeed", 2: "the task could not be run"}
-"""By exit code of the task."""
+"""Results by exit code of the task."""
 
 
 @dataclass
 class EndWatcher(roslaunch.pmon.ProcessListener):
-    """Stores the first process that failed, and how the task ended.
+    """Process listener that ends the launch with the task or with the first node that dies.
 
     Attributes:
-        task_name: Name of the node whose exit code is the launch's own.
+        task_name: Name of the task's node.
         ends_with_task: Whether the end of the task ends the launch.
-        task_exit_code: Exit code of that node; None while it runs.
-        dead_node: Name and exit code of the first other node that died; None if none did.
+        task_exit_code: Exit code of the task's node; None while running.
+        dead_node: Name and exit code of the first other node that died, or None.
         last_process: roslaunch's name of the process that ended the launch.
-        at_end: Called in place of stopping the other nodes when the launch ends; None: they are stopped.
+        parent: roslaunch's parent process; None before the launch starts.
+        at_end: Function called at the end of the launch instead of stopping the other nodes, or None.
     """
 
     task_name: str
@@ -53,7 +53,7 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
     at_end: Callable[[], None] | None = field(default=None, repr=False)
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
-        """Called by roslaunch's process monitor, with a name such as `move_group-5`."""
+        """Handles the end of a process; called by roslaunch with a name such as `move_group-5`."""
         name = process_name.rpartition("-")[0] or process_name
         if self.task_exit_code is not None or self.dead_node is not None:
             return
@@ -61,18 +61,18 @@ class EndWatcher(roslaunch.pmon.ProcessListener):
             self.task_exit_code = exit_code
             if not self.ends_with_task:
                 return
-        elif self._is_missed(name, exit_code):
+        elif self._ends_launch(name, exit_code):
             self.dead_node = (name, exit_code)
         else:
             return
         self.last_process = process_name
         self._end_launch()
 
-    def _is_missed(self, name: str, exit_code: int | None) -> bool:
-        """Returns whether the launch ends with a node: it failed or is required, and is not started again."""
+    def _ends_launch(self, name: str, exit_code: int | None) -> bool:
+        """Returns whether the end of a node ends the launch: it failed or is required, and is not respawned."""
         nodes = self.parent.config.nodes if self.parent is not None and self.parent.config is not None else []
-        named = [node for node in nodes if node.name == name]
-        return not any(node.respawn for node in named) and (exit_code != 0 or any(node.required for node in named))
+        matches = [node for node in nodes if node.name == name]
+        return not any(node.respawn for node in matches) and (exit_code != 0 or any(node.required for node in matches))
 
     def _end_launch(self) -> None:
         if self.at_end is not None:
@@ -90,51 +90,52 @@ def run_launch_file(
     leaves_nodes: bool = False,
     faults: Callable[[str, list[str]], Sequence[str]] = lambda path, arguments: (),
 ) -> int:
-    """Runs a launch file until its task or one of its nodes ends, and prints last why it ended.
+    """Runs a launch file until its task ends or a node dies, and prints the reason at the end.
 
     Args:
-        package: ROS package of the launch file; empty for a path.
-        launch_file: Name of the file in the package's folder `launch`, or its path.
-        arguments: Launch arguments, `name:=value`; the launch file has `end_with_task`.
+        package: ROS package of the launch file; "" for a path.
+        launch_file: File name in the package's folder `launch`, or path.
+        arguments: Launch arguments, `name:=value`. The launch file must have the argument `end_with_task`.
         task_name: Name of the node that runs the task; "" if the end of every node ends the launch.
-        later_files: Launch files read after it: their parameters replace those of the launch file.
-        faults: Returns what is wrong with the names in the launch file and its arguments; nothing starts then.
-        leaves_nodes: Whether this process exits at once when a node died, and leaves the others to the caller.
+        later_files: Launch files loaded afterwards, whose parameters override those of the launch file.
+        leaves_nodes: Whether to exit at once at the end, so that the caller must stop the remaining nodes.
+        faults: Function that returns the faults of the names in a launch file and its arguments. Faults prevent the
+            start.
 
     Returns:
-        The task's exit code; EXIT_NODE_DIED when another node died first; EXIT_BAD_LAUNCH when the launch file or an
-        argument is wrong.
+        The task's exit code, EXIT_NODE_DIED if another node died first, or EXIT_BAD_LAUNCH for an invalid launch file
+        or argument.
     """
     path = ""
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (package, launch_file))])[0]
         check_arguments(path, arguments)
-        found = faults(path, arguments)
-        if found:
-            raise roslaunch.core.RLException(f"{path}: {len(found)} faults:" + "".join(f"\n  {text}" for text in found))
+        texts = faults(path, arguments)
+        if texts:
+            raise roslaunch.core.RLException(f"{path}: {len(texts)} faults:" + "".join(f"\n  {text}" for text in texts))
         ends_with_task = argument_values(path, arguments)["end_with_task"]
         watcher = EndWatcher(task_name, bool(roslaunch.loader.convert_value(ends_with_task, "bool")))
         uuid = roslaunch.rlutil.get_or_generate_uuid(None, False)
         if leaves_nodes:
-            watcher.at_end = lambda: _exit_with(_tell_end(watcher, uuid))
+            watcher.at_end = lambda: _exit_with(_report_end(watcher, uuid))
         roslaunch.configure_logging(uuid)
-        # The task is not a required node here: the watcher ends the launch, without roslaunch's banner of a death.
-        given = [*arguments, "end_with_task:=false"]
-        files = [(path, given), *((str(file), []) for file in later_files)]
+        # The watcher ends the launch with the task; a required node would make roslaunch print its error banner.
+        launch_arguments = [*arguments, "end_with_task:=false"]
+        files = [(path, launch_arguments), *((str(file), []) for file in later_files)]
         parent = roslaunch.parent.ROSLaunchParent(
             uuid, files, process_listeners=[watcher], port=_master_port(), show_summary=False
         )
         watcher.parent = parent
         parent.start()
         parent.spin()
-    except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError) as error:  # ValueError: of a value
+    except (roslaunch.core.RLException, rospkg.ResourceNotFound, ValueError) as error:  # ValueError: invalid value
         print(f"run_framework: {_reason(error, path, arguments)}", file=sys.stderr)
         return EXIT_BAD_LAUNCH
-    return _tell_end(watcher, uuid)
+    return _report_end(watcher, uuid)
 
 
 def _reason(error: Exception, path: str, arguments: list[str]) -> str:
-    """Returns why a launch could not start; of the robot's description roslaunch names the command only."""
+    """Returns why a launch could not start. For the robot description, roslaunch names only the command."""
     if "command parameter [robot_description]" not in str(error):
         return str(error)
     values = argument_values(path, arguments)
@@ -144,13 +145,13 @@ def _reason(error: Exception, path: str, arguments: list[str]) -> str:
     )
 
 
-def _tell_end(watcher: EndWatcher, uuid: str) -> int:
+def _report_end(watcher: EndWatcher, uuid: str) -> int:
     log_file = Path(rospkg.get_log_dir()) / uuid / f"{watcher.last_process}.log"
     return verdict(watcher, cause_of_death(log_file))
 
 
 def _exit_with(code: int) -> None:
-    """Ends this process at once: stopping the nodes, one after the other, takes seconds."""
+    """Exits at once, because stopping the nodes one by one takes seconds."""
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
@@ -161,18 +162,23 @@ def _master_port() -> int | None:
 
 
 def verdict(watcher: EndWatcher, cause: str) -> int:
-    """Prints how the launch ended, after roslaunch's messages about the nodes; returns the exit code."""
+    """Prints the result of the launch and returns the exit code.
+
+    Args:
+        watcher: Watcher of the launch.
+        cause: Reason for the end of the last process; "" if unknown.
+    """
     because = f": {cause.removeprefix('The task could not be run: ')}" if cause else ""
     if watcher.dead_node is not None:
         name, exit_code = watcher.dead_node
         killed = exit_code is not None and exit_code < 0
-        how = f"was killed by signal {-exit_code}" if killed else f"exited with {exit_code}"
-        print(f"run_framework: node '{name}' died ({how}), and everything was stopped{because}", file=sys.stderr)
+        ending = f"was killed by signal {-exit_code}" if killed else f"exited with {exit_code}"
+        print(f"run_framework: node '{name}' died ({ending}), and everything was stopped{because}", file=sys.stderr)
         return EXIT_NODE_DIED
     if watcher.task_exit_code is None:
         print("run_framework: stopped before the task ended", file=sys.stderr)
         return 1
-    ending = ENDINGS.get(watcher.task_exit_code, f"the task's node ended with exit code {watcher.task_exit_code}")
+    result = ENDINGS.get(watcher.task_exit_code, f"the task's node ended with exit code {watcher.task_exit_code}")
     failed = watcher.task_exit_code != 0
-    print(f"run_framework: {ending}{because if failed else ''}", file=sys.stderr if failed else sys.stdout, flush=True)
+    print(f"run_framework: {result}{because if failed else ''}", file=sys.stderr if failed else sys.stdout, flush=True)
     return watcher.task_exit_code

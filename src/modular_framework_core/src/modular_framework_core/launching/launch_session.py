@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launches on a ROS master of their own, beside a user's master and beside other sessions, stopped without a trace."""
+"""Runs launches on a separate ROS master, isolated from other masters, and stops all of their processes."""
 
 from __future__ import annotations
 
@@ -16,72 +16,72 @@ from pathlib import Path
 from urllib.parse import urlparse
 
 STOP_TIMEOUT_S = 15.0
-"""How long a launch has to stop [s] before it is killed."""
+"""Timeout of a stopping launch before it is killed [s]."""
 
 KILL_POLL_S = 0.01
-"""Time between two looks for processes that are left [s]."""
+"""Polling period for remaining processes [s]."""
 
 
 def free_port() -> int:
-    """Returns a TCP port of the loopback interface that nobody listens on."""
+    """Returns a free TCP port of the loopback interface."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def processes_with(variable: str, value: str, prefix: bool = False) -> list[int]:
-    """Returns the other processes that were started with a variable of the environment at a value.
+    """Returns the IDs of all other processes with an environment variable of a given value.
 
     Args:
-        variable: Name of the variable.
-        value: Its value.
-        prefix: Whether the value may go on after `value`.
+        variable: Name of the environment variable.
+        value: Value of the variable.
+        prefix: Whether `value` is a prefix of the variable's value.
     """
-    mark, found = f"{variable}={value}".encode(), []
+    mark, process_ids = f"{variable}={value}".encode(), []
     for folder in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):  # ended meanwhile, or another user's
+        with contextlib.suppress(OSError):  # process ended or belongs to another user
             entries = (folder / "environ").read_bytes().split(b"\0")
             marked = any(entry.startswith(mark) for entry in entries) if prefix else mark in entries
             if marked and int(folder.name) != os.getpid():
-                found.append(int(folder.name))
-    return found
+                process_ids.append(int(folder.name))
+    return process_ids
 
 
 def kill_processes_with(variable: str, value: str, prefix: bool = False, timeout_s: float = math.inf) -> int:
-    """Kills those that `processes_with` returns until there are none: one may start another meanwhile.
+    """Kills the processes of `processes_with` repeatedly until none remains, including newly started processes.
 
     Args:
-        variable: Name of the variable.
-        value: Its value.
-        prefix: Whether the value may go on after `value`.
-        timeout_s: Longest time until they are gone [s].
+        variable: Name of the environment variable.
+        value: Value of the variable.
+        prefix: Whether `value` is a prefix of the variable's value.
+        timeout_s: Timeout [s].
 
     Returns:
-        How many there were.
+        The number of killed processes.
 
     Raises:
-        TimeoutError: Some are still there.
+        TimeoutError: Some processes remain.
     """
     killed: set[int] = set()
     end_s = time.monotonic() + timeout_s
-    while left := processes_with(variable, value, prefix):
+    while remaining := processes_with(variable, value, prefix):
         if time.monotonic() > end_s:
             raise TimeoutError(
-                f"processes {left} with {variable}={value} do not end within {timeout_s:g} s; end them by hand"
+                f"processes {remaining} with {variable}={value} do not end within {timeout_s:g} s; end them by hand"
             )
-        for process in left:
+        for process in remaining:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
-        killed.update(left)
+        killed.update(remaining)
         time.sleep(KILL_POLL_S)
     return len(killed)
 
 
 class Launch:
-    """A running launch on a given master, in a process group of its own; stopped as a user would, with SIGINT.
+    """A running launch in its own process group, stopped by SIGINT.
 
     Attributes:
-        process: The process of the launch.
+        process: Process of the launch.
     """
 
     def __init__(self, command: Sequence[str], env: Mapping[str, str], log_path: Path) -> None:
@@ -89,8 +89,8 @@ class Launch:
 
         Args:
             command: Program and arguments.
-            env: Environment.
-            log_path: File for what it prints.
+            env: Environment variables.
+            log_path: File for the output.
         """
         self._log_path = log_path
         with log_path.open("w") as log_file:
@@ -99,18 +99,18 @@ class Launch:
             )
 
     def alive(self) -> bool:
-        """Returns whether it still runs."""
+        """Returns whether the launch is running."""
         return self.process.poll() is None
 
     def log(self) -> str:
-        """Returns everything it has printed so far."""
+        """Returns the output so far."""
         return self._log_path.read_text(errors="replace")
 
     def wait(self, timeout_s: float) -> int:
-        """Waits until it ends by itself, and returns its exit code.
+        """Waits for the end of the launch and returns its exit code.
 
         Raises:
-            TimeoutError: It still ran after `timeout_s` [s]; the text has what it printed.
+            TimeoutError: The launch still runs after `timeout_s` [s]; the message contains the output.
         """
         try:
             return self.process.wait(timeout_s)
@@ -118,10 +118,10 @@ class Launch:
             raise TimeoutError(f"the launch still ran after {timeout_s} s; its log:\n{self.log()}") from None
 
     def stop(self, timeout_s: float = STOP_TIMEOUT_S) -> None:
-        """Stops it and everything it started. May be called twice.
+        """Stops the launch and its process group. May be called twice.
 
         Args:
-            timeout_s: How long it has to stop [s] before it is killed.
+            timeout_s: Timeout before the launch is killed [s].
         """
         with contextlib.suppress(ProcessLookupError):
             if self.alive():
@@ -134,20 +134,20 @@ class Launch:
 
 
 class LaunchSession:
-    """A ROS master's port and the launches on it.
+    """A ROS master and its launches.
 
     Attributes:
         port: TCP port of the master.
-        folder: Folder of the session's files, removed with it.
-        env: Environment for processes of the session.
+        folder: Folder of the session's files, deleted with the session.
+        env: Environment variables for processes of the session.
     """
 
     def __init__(self, master_uri: str | None = None, log_folder: Path | None = None) -> None:
-        """Chooses a port and makes the folder; starts nothing.
+        """Chooses a port and creates the folder; starts no process.
 
         Args:
-            master_uri: URI of a master that runs already; None: a launch of the session starts its own.
-            log_folder: Folder for the logs of the nodes; None: in the session's folder.
+            master_uri: URI of a running master; None if a launch of the session starts a master.
+            log_folder: Folder for the nodes' logs; None for the session's folder.
         """
         self.port = (urlparse(master_uri).port if master_uri else None) or free_port()
         self._folder = tempfile.TemporaryDirectory(prefix="ros_session_")
@@ -161,7 +161,7 @@ class LaunchSession:
             "PYTHONUNBUFFERED": "1",
         }
         self.env.pop("ROS_HOSTNAME", None)
-        # of two nodes that make it at the same time, rospy's logging leaves one without any log
+        # if two nodes create the folder at the same time, rospy's logging leaves one node without a log
         Path(self.env["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
         self._launches: list[Launch] = []
 
@@ -170,29 +170,29 @@ class LaunchSession:
 
         Args:
             command: Program and arguments.
-            log_path: File for what it prints; None: one in the session's folder.
+            log_path: File for the output; None for a file in the session's folder.
         """
-        started = Launch(command, self.env, log_path or self.folder / f"launch_{len(self._launches)}.txt")
-        self._launches.append(started)
-        return started
+        launch = Launch(command, self.env, log_path or self.folder / f"launch_{len(self._launches)}.txt")
+        self._launches.append(launch)
+        return launch
 
     def alive(self) -> bool:
-        """Returns whether every launch still runs."""
+        """Returns whether all launches are running."""
         return all(launch.alive() for launch in self._launches)
 
     def processes(self) -> list[int]:
-        """Returns the processes of the session that run now, whoever started them."""
+        """Returns the IDs of all running processes of the session."""
         return processes_with("ROS_HOME", self.env["ROS_HOME"])
 
     def stop(self) -> None:
-        """Stops the launches, the last first, then whatever of them is left. May be called twice."""
+        """Stops the launches in reverse order and then kills remaining processes. May be called twice."""
         for launch in reversed(self._launches):
             launch.stop()
-        # roslaunch starts master and nodes in sessions of their own: they outlive one that had to be killed.
+        # roslaunch starts master and nodes in separate sessions, which survive a killed roslaunch
         self.kill()
 
     def kill(self) -> None:
-        """Kills everything at once: for a stack in simulation, which loses nothing by it. May be called twice."""
+        """Kills all processes at once, which is safe for a simulated stack. May be called twice."""
         kill_processes_with("ROS_HOME", self.env["ROS_HOME"])
         for launch in self._launches:
             launch.process.wait()

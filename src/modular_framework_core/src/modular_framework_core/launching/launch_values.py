@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks the values of the framework's launch arguments: packages, files and numbers.
 
-roslaunch finds these faults too, node by node, and names neither the argument nor what is allowed.
+roslaunch reports such faults one node at a time, without the argument and the allowed values.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from modular_framework_urdf import xml_text
 
 METHOD, CONFIGURATION = "method_launch_file", "config_directory"
 NO_METHOD = ("", "none")
-"""Values of METHOD that start no method; roslaunch passes over an argument that is given an empty value."""
+"""Values of METHOD that start no method; roslaunch ignores an argument with an empty value."""
 PACKAGES = ("description_package", "robot_package", "moveit_config_package")
 ROBOT_FILES = (("robot_urdf_file", "robot_package", "urdf"), ("controller_file", "robot_package", "controllers"))
 WORLD_FILE, SCENE_FILE = (
@@ -35,18 +35,18 @@ CONFIGURATION_FILES = (
     "generative_methods_config.yaml",
     "manipulator_controller_parameters.yaml",
 )
-"""Files of the configuration folder without which nothing starts."""
+"""Required files of the configuration folder."""
 NAMES_FILES = ("named_joint_states.yaml", "named_trajectories.yaml", "named_poses.yaml")
-"""Files of the configuration folder that may be left out."""
+"""Optional files of the configuration folder."""
 SCRIPT, MACHINE = "task_constructor_script", "state_machine_to_load"
 ROSLAUNCH_NOTE = "Nothing was started. The error of roslaunch that follows only says that this check failed."
 
 
 def value_faults(values: Mapping[str, str]) -> list[str]:
-    """Returns what is wrong with the values of launch arguments, one sentence each.
+    """Returns the faults in the values of launch arguments, one sentence each.
 
     Args:
-        values: By name. The files of packages are looked up for launch files with the argument robot_package only.
+        values: Values by argument name. Packages, their files and numbers are checked only if `robot_package` is given.
     """
     return [
         *_truth_faults(values),
@@ -56,13 +56,13 @@ def value_faults(values: Mapping[str, str]) -> list[str]:
 
 
 def file_faults(values: Mapping[str, str]) -> list[str]:
-    """Returns the packages and files that are not there or cannot be read; as `value_faults`."""
+    """Returns the faults of missing or unreadable packages, files and tasks; see `value_faults`."""
     faults = [*_method_faults(values.get(METHOD, "")), *_folder_faults(values), *_task_faults(values)]
     return [*faults, *(_package_faults(values) if "robot_package" in values else ())]
 
 
 def main(arguments: list[str]) -> int:
-    """Prints what is wrong with `NAME:=VALUE ...`; returns 1 if anything is, with which roslaunch gives up."""
+    """Prints the faults in `NAME:=VALUE ...` and returns 1 if there are any, which makes roslaunch stop."""
     faults = value_faults(dict(argument.split(":=", 1) for argument in arguments))
     for fault in faults:
         print(fault, file=sys.stderr)
@@ -72,14 +72,14 @@ def main(arguments: list[str]) -> int:
 
 
 def _truth_faults(values: Mapping[str, str]) -> Iterator[str]:
-    """Yields what roslaunch cannot read as true or false."""
+    """Yields a fault if roslaunch cannot read `simulation` as a bool."""
     value = values.get("simulation", "true")
     if value.lower() not in ("true", "false", "1", "0"):
-        yield f"argument 'simulation' is '{value}', allowed are true and false; correct it"
+        yield f"argument 'simulation' is '{value}'; it must be true or false"
 
 
 def _number_faults(values: Mapping[str, str]) -> Iterator[str]:
-    """Yields numbers and choices that the simulation, or every node, does not take."""
+    """Yields faults of numbers and choices that the simulation does not accept."""
     declared = node_declaration("modular_framework_simulation", "simulation")
     for name, item in (declared.parameters if declared else {}).items():
         argument = name.lstrip("~/")
@@ -102,8 +102,8 @@ def _package_faults(values: Mapping[str, str]) -> Iterator[str]:
                 f"workspace with the package{nearest(package, finder.list())}"
             )
     simulated = values.get("simulation", "").lower() in ("true", "1")
-    surroundings = (WORLD_FILE,) if simulated else (SCENE_FILE,) if values.get("scene_file") else ()
-    for name, package, folder in (*ROBOT_FILES, *surroundings):
+    environment = (WORLD_FILE,) if simulated else (SCENE_FILE,) if values.get("scene_file") else ()
+    for name, package, folder in (*ROBOT_FILES, *environment):
         if package in folders:
             yield from _file_faults(name, Path(folders[package], folder), values.get(name, ""))
     configuration = Path(values.get(CONFIGURATION) or finder.get_path("modular_framework_api") + "/config")
@@ -115,12 +115,12 @@ def _package_faults(values: Mapping[str, str]) -> Iterator[str]:
 
 
 def _file_faults(argument: str, folder: Path, name: str) -> Iterator[str]:
-    """Yields why a file in a folder cannot be used: it is not there, or no XML."""
+    """Yields the fault of a file in a folder that is missing or not valid XML."""
     path = Path(f"{folder}/{name}")
     if not path.is_file():
-        there = sorted(entry.name for entry in folder.glob("*") if entry.is_file())
-        allowed = listing(there, "the folder is empty")
-        yield f"argument '{argument}' is '{name}', and {folder} has no such file; {allowed}{nearest(name, there)}"
+        file_names = sorted(entry.name for entry in folder.glob("*") if entry.is_file())
+        allowed = listing(file_names, "the folder is empty")
+        yield f"argument '{argument}' is '{name}', and {folder} has no such file; {allowed}{nearest(name, file_names)}"
     elif path.suffix in (".world", ".xacro", ".urdf"):
         try:
             xml_text.read(path)
@@ -129,26 +129,26 @@ def _file_faults(argument: str, folder: Path, name: str) -> Iterator[str]:
 
 
 def _method_faults(value: str) -> Iterator[str]:
-    """Yields what is wrong with the launch file of a method."""
+    """Yields the faults of a method's launch file."""
     if value in NO_METHOD or Path(value).is_absolute() and Path(value).is_file():
         return
     allowed = "PACKAGE/FILE with a file in the package's folder launch, the path of a launch file from /, or none"
     fault, package, file = f"argument '{METHOD}' is '{value}', ", *value.partition("/")[::2]
     if Path(value).is_absolute() or not file:
-        reason = f"and there is no such file{_path_hint(Path(value))}" if file else "which is no launch file"
-        yield f"{fault}{reason}; allowed is {allowed}; correct it"
+        reason = f"and there is no such file{_path_hint(Path(value))}" if file else "which is not a launch file"
+        yield f"{fault}{reason}; it must be {allowed}"
         return
     finder = rospkg.RosPack()
     try:
         folder = Path(finder.get_path(package)) / "launch"
     except rospkg.ResourceNotFound:
         yield (
-            f"{fault}and there is no package '{package}'; allowed is {allowed}; correct it, or build and source the "
+            f"{fault}and there is no package '{package}'; it must be {allowed}; correct it, or build and source the "
             f"workspace with the package{nearest(package, finder.list())}"
         )
         return
     if not (folder / file).is_file():
-        files = sorted(f"{package}/{found.name}" for found in folder.glob("*.launch"))
+        files = sorted(f"{package}/{path.name}" for path in folder.glob("*.launch"))
         yield (
             f"{fault}and the package has no such file; "
             f"{listing(files, 'its folder launch is empty')}{nearest(value, files)}"
@@ -156,15 +156,15 @@ def _method_faults(value: str) -> Iterator[str]:
 
 
 def _folder_faults(values: Mapping[str, str]) -> Iterator[str]:
-    """Yields what is wrong with the folder of the configuration files, and with the files that roslaunch loads."""
+    """Yields the faults of the configuration folder and of its files that roslaunch loads."""
     value = values.get(CONFIGURATION, "")
     folder = Path(value)
     if not value:
         return
     if not folder.is_absolute() or not folder.is_dir():
         yield (
-            f"argument '{CONFIGURATION}' is '{value}', allowed is the path of a folder from /, such as a copy of the "
-            f"folder config of modular_framework_api; correct it{_path_hint(folder)}"
+            f"argument '{CONFIGURATION}' is '{value}'; it must be the path of a folder from /, such as a copy of the "
+            f"folder config of modular_framework_api{_path_hint(folder)}"
         )
         return
     for name in CONFIGURATION_FILES if "robot_package" in values else ():
@@ -185,7 +185,7 @@ def _folder_faults(values: Mapping[str, str]) -> Iterator[str]:
 
 
 def _task_faults(values: Mapping[str, str]) -> Iterator[str]:
-    """Yields why the file of the task cannot be read; what it says is checked when the task starts."""
+    """Yields the fault of an unreadable task file. The content is checked at the start of the task."""
     value = values.get(SCRIPT, "")
     if not value or values.get(MACHINE, "").strip():
         return
@@ -196,9 +196,9 @@ def _task_faults(values: Mapping[str, str]) -> Iterator[str]:
 
 
 def _path_hint(path: Path) -> str:
-    """Returns a hint at the path beside a missing one whose name is most like it; empty when there is none."""
-    beside = [str(entry) for entry in path.parent.iterdir()] if path.is_absolute() and path.parent.is_dir() else []
-    return nearest(str(path), beside)
+    """Returns a hint with the most similar path in the same folder, or ""."""
+    siblings = [str(entry) for entry in path.parent.iterdir()] if path.is_absolute() and path.parent.is_dir() else []
+    return nearest(str(path), siblings)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads controller files, and plans which of their controllers have to be loaded and started."""
+"""Reads controller files and plans which controllers to load and start."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ JOINT_STATES_RATE_HZ = 50.0
 
 
 class ControllerFileError(Exception):
-    """A controller file cannot be used; the message lists everything that is wrong with it."""
+    """A controller file is invalid; the message lists all faults."""
 
 
 @dataclass(frozen=True, slots=True)
 class ControllerFile:
-    """A controller file, read and checked.
+    """A checked controller file.
 
     Attributes:
-        path: Where it was read from.
-        parameters: The whole mapping, for the parameter server.
-        controllers: Names of the controllers, in the order of the file: the keys whose mapping has a `type`.
+        path: Path of the file.
+        parameters: Content of the file, for the parameter server.
+        controllers: Controller names in file order, which are the keys whose mapping has a `type`.
     """
 
     path: Path
@@ -36,11 +36,11 @@ class ControllerFile:
 
 @dataclass(frozen=True, slots=True)
 class SpawnPlan:
-    """The loads and starts that are needed until all controllers run.
+    """Controllers to load and to start.
 
     Attributes:
-        load: Controllers that are not loaded yet.
-        start: Controllers that are not running yet.
+        load: Names of controllers that are not loaded.
+        start: Names of controllers that are not running.
     """
 
     load: tuple[str, ...]
@@ -51,14 +51,14 @@ def read_controller_file(path: Path) -> ControllerFile:
     """Reads `<robot package>/controllers/<file>`.
 
     Raises:
-        ControllerFileError: No such file, not YAML, not a mapping, or no controller in it.
+        ControllerFileError: The file does not exist, is not a YAML mapping, or contains no valid controller.
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
-        present = ", ".join(sorted(file.name for file in path.parent.glob("*.yaml"))) or "none"
+        file_names = ", ".join(sorted(file.name for file in path.parent.glob("*.yaml"))) or "none"
         raise ControllerFileError(
-            f"controller file {path}: {error.strerror}; controller files beside it: {present}"
+            f"controller file {path}: {error.strerror}; controller files beside it: {file_names}"
         ) from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ControllerFileError(f"controller file {path}: not valid YAML: {error}") from error
@@ -75,21 +75,21 @@ def read_controller_file(path: Path) -> ControllerFile:
     ]
     names = tuple(name for name, entry in content.items() if isinstance(entry, dict) and "type" in entry)
     if not names:
-        faults.append(f"none of its keys ({', '.join(map(str, content))}) has a 'type': there is no controller in it")
+        faults.append(f"none of its keys ({', '.join(map(str, content))}) has a 'type'; add a controller")
     if faults:
         raise ControllerFileError(f"controller file {path}: {'; '.join(faults)}")
     return ControllerFile(path, content, names)
 
 
-def with_joint_states(file: ControllerFile, running_types: Iterable[str]) -> ControllerFile:
-    """Returns the file with a joint state controller, where neither it nor the controller manager has one.
+def with_joint_states(file: ControllerFile, loaded_types: Iterable[str]) -> ControllerFile:
+    """Returns the file with an added joint state controller, unless the file or the controller manager has one.
 
     Args:
-        file: What was read.
-        running_types: Types of the controllers that are loaded already.
+        file: Controller file.
+        loaded_types: Types of the loaded controllers.
     """
     types = [file.parameters[name]["type"] for name in file.controllers]
-    if any(kind.rpartition("/")[2] == JOINT_STATES_TYPE.rpartition("/")[2] for kind in (*types, *running_types)):
+    if any(kind.rpartition("/")[2] == JOINT_STATES_TYPE.rpartition("/")[2] for kind in (*types, *loaded_types)):
         return file
     settings = {"type": JOINT_STATES_TYPE, "publish_rate": JOINT_STATES_RATE_HZ}
     return ControllerFile(
@@ -101,14 +101,14 @@ def _is_type(value: object) -> bool:
     return isinstance(value, str) and value.count("/") == 1 and not value.startswith("/") and not value.endswith("/")
 
 
-def plan_spawn(wanted: Sequence[str], states: Mapping[str, str]) -> SpawnPlan:
-    """Plans what is to do for the controllers `wanted`, given the state of those the manager has loaded.
+def plan_spawn(names: Sequence[str], states: Mapping[str, str]) -> SpawnPlan:
+    """Plans which controllers to load and start so that all requested controllers run.
 
     Args:
-        wanted: Controller names.
-        states: State by name, as list_controllers reports them.
+        names: Names of the requested controllers.
+        states: State of each loaded controller by name, as reported by list_controllers.
     """
     return SpawnPlan(
-        load=tuple(name for name in wanted if name not in states),
-        start=tuple(name for name in wanted if states.get(name) != "running"),
+        load=tuple(name for name in names if name not in states),
+        start=tuple(name for name in names if states.get(name) != "running"),
     )

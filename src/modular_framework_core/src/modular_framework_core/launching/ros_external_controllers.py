@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Starts the node that drives the manipulator, and ends with an error when that node dies."""
+"""Runs the node that drives the manipulator, and exits with an error if that node dies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from modular_framework_ros.node_handle import ParameterError
 POLL_PERIOD_S = 0.2
 STOP_TIMEOUT_S = 5.0
 END_WITH_SPAWNER = ("setpriv", "--pdeathsig", "TERM")
-"""Prefix of the node's command: the node gets SIGTERM also when the spawner is killed and cannot stop it."""
+"""Command prefix that sends SIGTERM to the node if the spawner is killed."""
 
 
 def main() -> int:
@@ -33,9 +33,9 @@ def main() -> int:
     ``manipulator_controller_action_server_type``.
 
     Returns:
-        0 when ROS shuts down, 1 when the node died, 2 when the parameters are incomplete.
+        Exit code: 0 at shutdown of ROS, 1 if the node died, 2 for incomplete parameters.
     """
-    rospy.init_node("external_controllers_spawner", anonymous=True, disable_rostime=True)  # it needs no /clock
+    rospy.init_node("external_controllers_spawner", anonymous=True, disable_rostime=True)  # does not need /clock
     try:
         keys = (PACKAGE_KEY, TYPE_KEY, NAME_KEY)
         node = controller_node({key: rospy.get_param(key) for key in keys if rospy.has_param(key)})
@@ -44,27 +44,27 @@ def main() -> int:
         return 2
     if node is None:
         rospy.loginfo("No external controller to start: '%s' is empty.", PACKAGE_KEY)
-        rospy.spin()  # a launch that requires this node goes on without one
+        rospy.spin()  # launch files may require this node, so it keeps running
         return 0
-    return run_until_it_ends(node)
+    return run_node(node)
 
 
-def run_until_it_ends(node: ControllerNode) -> int:
-    """Runs a node; 0 when ROS shuts down first, 1 when the node cannot start or dies."""
-    what = f"Node '{node.name}' ({node.package}/{node.node_type})"
+def run_node(node: ControllerNode) -> int:
+    """Runs a node and returns the exit code: 0 at shutdown of ROS, 1 if the node cannot start or dies."""
+    label = f"Node '{node.name}' ({node.package}/{node.node_type})"
     try:
-        found = roslib.packages.find_node(node.package, node.node_type)
-        if not found:
+        executables = roslib.packages.find_node(node.package, node.node_type)
+        if not executables:
             raise OSError(f"package '{node.package}' has no executable '{node.node_type}'")
-        process = subprocess.Popen([*END_WITH_SPAWNER, found[0], f"__name:={node.name}"])
+        process = subprocess.Popen([*END_WITH_SPAWNER, executables[0], f"__name:={node.name}"])
     except (OSError, rospkg.ResourceNotFound) as error:
-        rospy.logfatal("%s cannot be started: %s; correct %s and %s", what, error, PACKAGE_KEY, TYPE_KEY)
+        rospy.logfatal("%s cannot be started: %s; correct %s and %s", label, error, PACKAGE_KEY, TYPE_KEY)
         return 1
     try:
         while not rospy.is_shutdown():
             if process.poll() is not None:
                 rospy.logfatal(
-                    "%s ended with exit code %s; the manipulator cannot be driven any more.", what, process.returncode
+                    "%s ended with exit code %s; the manipulator can no longer be driven.", label, process.returncode
                 )
                 return 1
             rospy.rostime.wallsleep(POLL_PERIOD_S)
@@ -74,9 +74,9 @@ def run_until_it_ends(node: ControllerNode) -> int:
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+    for stop_signal in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
         if process.poll() is not None:
             return
-        process.send_signal(number)
+        process.send_signal(stop_signal)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(STOP_TIMEOUT_S)

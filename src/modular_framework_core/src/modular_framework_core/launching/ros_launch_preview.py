@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads a launch file without starting anything: which nodes it would start, and with which parameters."""
+"""Reads the nodes and parameters of a launch file without starting anything."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from modular_framework_ros.node_handle import ParameterError
 
 CONTROLLERS_SPAWNER = "external_controllers_spawner"
 CHECKED_ARGUMENTS = "checked_arguments"
-"""Parameter whose command checks the arguments when roslaunch loads the file."""
+"""Parameter whose command checks the launch arguments while roslaunch loads the file."""
 
 
 @dataclass(frozen=True, slots=True)
 class LaunchedNode:
-    """A node that a launch starts.
+    """A node of a launch.
 
     Attributes:
-        package: Its package.
-        executable: Its executable.
-        name: Its whole name, from /.
-        namespace: Its namespace, with / at the end.
-        arguments: Its arguments.
+        package: ROS package.
+        executable: Executable in the package.
+        name: Resolved name, from /.
+        namespace: Namespace, with a trailing /.
+        arguments: Command-line arguments.
     """
 
     package: str
@@ -40,58 +40,63 @@ class LaunchedNode:
 
 @dataclass(frozen=True, slots=True)
 class LaunchPreview:
-    """What a launch starts.
+    """Nodes and parameters of a launch.
 
     Attributes:
-        nodes: The nodes.
-        parameters: Values by whole name.
+        nodes: Nodes of the launch.
+        parameters: Parameter values by resolved name.
     """
 
     nodes: tuple[LaunchedNode, ...]
     parameters: Mapping[str, Any]
 
-    def with_parameters(self, given: Mapping[str, Any]) -> LaunchPreview:
-        """Returns the preview with parameters that replace those of the launch file; mappings count by their leaves."""
-        return replace(self, parameters={**self.parameters, **leaves(given)})
+    def with_parameters(self, overrides: Mapping[str, Any]) -> LaunchPreview:
+        """Returns a copy with overridden parameters; nested mappings are flattened."""
+        return replace(self, parameters={**self.parameters, **leaves(overrides)})
 
     def below(self, name: str) -> dict[str, Any]:
-        """Returns the parameters below a whole name, nested."""
+        """Returns the parameters below a resolved name as nested dicts."""
         result: dict[str, Any] = {}
         for key, value in self.parameters.items():
             if key.startswith(f"{name}/"):
                 *path, last = key.removeprefix(f"{name}/").split("/")
-                inner = result
+                branch = result
                 for part in path:
-                    inner = inner.setdefault(part, {})
-                inner[last] = value
+                    branch = branch.setdefault(part, {})
+                branch[last] = value
         return result
 
 
-def leaves(parameters: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """Returns parameters by whole name, those of mappings one by one."""
+def leaves(parameters: Mapping[str, Any], parent: str = "") -> dict[str, Any]:
+    """Returns the leaves of nested parameters by full name.
+
+    Args:
+        parameters: Nested parameters.
+        parent: Name of the parent; "" at the top level.
+    """
     result: dict[str, Any] = {}
     for key, value in parameters.items():
-        name = f"{above}/{key}" if above else str(key)
+        name = f"{parent}/{key}" if parent else str(key)
         result |= leaves(value, name) if isinstance(value, Mapping) and value else {name: value}
     return result
 
 
 class _PreviewLoader(roslaunch.xmlloader.XmlLoader):  # type: ignore[misc]
-    """Loads a launch file without the check of its arguments, so that faults of parameters are found beside theirs."""
+    """XML loader without the check of the launch arguments, so that parameters are checked despite argument faults."""
 
     def param_value(self, verbose: bool, name: str, *source: Any) -> Any:
         return "" if name == CHECKED_ARGUMENTS else super().param_value(verbose, name, *source)
 
 
 def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
-    """Returns what a launch file would start; equal for equal files, so names of anonymous nodes are as in the file.
+    """Returns the nodes and parameters of a launch file. Names of anonymous nodes are not resolved.
 
     Args:
-        path: The launch file.
+        path: Launch file.
         arguments: Launch arguments, `name:=value`.
 
     Raises:
-        roslaunch.core.RLException: The launch file or something that it reads cannot be used.
+        roslaunch.core.RLException: The launch file or a file that it loads is invalid.
     """
     loader = _PreviewLoader(resolve_anon=False)
     config = roslaunch.config.load_config_default(
@@ -104,9 +109,9 @@ def preview_launch(path: str, arguments: Sequence[str]) -> LaunchPreview:
     parameters = leaves({name: item.value for name, item in config.params.items()})
     if any(node.executable == CONTROLLERS_SPAWNER for node in nodes):
         try:
-            own = controller_node({name.removeprefix("/"): value for name, value in parameters.items()})
+            spawned = controller_node({name.removeprefix("/"): value for name, value in parameters.items()})
         except ParameterError as error:
             raise roslaunch.core.RLException(f"{path}: {error}") from error
-        if own is not None:
-            nodes.append(LaunchedNode(own.package, own.node_type, f"/{own.name}", "/"))
+        if spawned is not None:
+            nodes.append(LaunchedNode(spawned.package, spawned.node_type, f"/{spawned.name}", "/"))
     return LaunchPreview(tuple(nodes), parameters)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads and starts the controllers of a robot as soon as its hardware says that it is ready."""
+"""Loads and starts the controllers of a robot as soon as its hardware is ready."""
 
 from __future__ import annotations
 
@@ -36,35 +36,35 @@ from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.start_up import start_timeout
 
 LOOP_STATUS = ": control loop"
-"""End of the name of a control loop's status in `/diagnostics`."""
+"""Suffix of the control loop's status name in `/diagnostics`."""
 CALL_TIMEOUT_S = 30.0
-"""Longest wait for the controller manager's answer [s]; the manager itself waits 10 s for a stopped loop."""
+"""Timeout of calls to the controller manager [s]; the manager itself waits 10 s for a stopped loop."""
 
 
 class SpawnError(Exception):
-    """The controllers could not be spawned; the message names the cause."""
+    """The controllers could not be spawned."""
 
 
 class RobotControllersSpawner:
     """Node `custom_controller_spawner`.
 
     Parameters: see `parameters/robot_controllers_spawner.yaml`; `/<hardware>/topic_to_wait_for`.
-    Subscribes those topics (std_msgs/Bool), and `/diagnostics` for the faults that keep hardware from being ready.
-    Calls `controller_manager/{list_controllers, load_controller, switch_controller}`.
-    Uploads the controller file to the parameter server's root.
+    Subscribers: `topic_to_wait_for` of each hardware (std_msgs/Bool), and `/diagnostics` for hardware faults.
+    Services called: `controller_manager/{list_controllers, load_controller, switch_controller}`.
+    Uploads the controller file to the root of the parameter server.
 
     Args:
         robot_package: ROS package with a folder `controllers`.
         controller_file: File in that folder.
 
     Attributes:
-        stays: Whether the node stays after success, for launch files that require it.
+        stay_alive: Whether the node keeps running after success, for launch files that require it.
     """
 
     def __init__(self, robot_package: str, controller_file: str) -> None:
         self._faults: dict[str, str] = {}
         read = DeclaredParameters("modular_framework_core", "robot_controllers_spawner").values
-        self._warn_after_s, give_up_after_s, self.stays, self._hardware = read(
+        self._warn_after_s, give_up_after_s, self.stay_alive, self._hardware = read(
             "~timeout", "~give_up_after", "~stay_alive", "/robot_hardware"
         )
         self._give_up_after_s = give_up_after_s or start_timeout()
@@ -78,17 +78,17 @@ class RobotControllersSpawner:
             raise SpawnError(str(error)) from error
 
     def run(self) -> None:
-        """Uploads the parameters, waits for the hardware, loads and starts the controllers, checks that they run.
+        """Uploads the parameters, waits for the hardware, starts the controllers and checks that they run.
 
         Raises:
-            SpawnError: Something is missing or refused.
+            SpawnError: Hardware or a service is missing, or a controller does not run.
         """
         for name, value in self._file.parameters.items():
             rospy.set_param(f"/{name}", value)
         self._wait_for_hardware()
         self._add_joint_states()
         plan = plan_spawn(self._file.controllers, self._states())
-        self._carry_out(plan)
+        self._execute(plan)
         states = self._states()
         idle = [
             f"'{name}' is {states.get(name, 'not loaded')}"
@@ -97,8 +97,7 @@ class RobotControllersSpawner:
         ]
         if idle:
             raise SpawnError(
-                f"controllers of {self._file.path} do not run: {', '.join(idle)}; the log of the "
-                "controller manager says why"
+                f"controllers of {self._file.path} do not run: {', '.join(idle)}; see the log of the controller manager"
             )
         rospy.loginfo(
             "controllers running: %s (loaded now: %s)",
@@ -107,27 +106,27 @@ class RobotControllersSpawner:
         )
 
     def _add_joint_states(self) -> None:
-        """Adds a joint state controller where there is none: without one the joint positions are not published."""
+        """Adds a joint state controller if none is loaded or listed, so that joint positions are published."""
         loaded = self._call("list_controllers", ListControllers).controller
-        completed = with_joint_states(self._file, [entry.type for entry in loaded])
-        if completed is not self._file:
-            self._file = completed
-            rospy.set_param(f"/{JOINT_STATES_NAME}", completed.parameters[JOINT_STATES_NAME])
+        file = with_joint_states(self._file, [entry.type for entry in loaded])
+        if file is not self._file:
+            self._file = file
+            rospy.set_param(f"/{JOINT_STATES_NAME}", file.parameters[JOINT_STATES_NAME])
             rospy.loginfo(
-                "%s lists no joint state controller; '%s' (%s, %.0f Hz) is started, so that the joints' "
+                "%s lists no joint state controller; '%s' (%s, %.0f Hz) is started, so that the joint "
                 "positions are published",
-                completed.path,
+                file.path,
                 JOINT_STATES_NAME,
                 JOINT_STATES_TYPE,
                 JOINT_STATES_RATE_HZ,
             )
 
-    def _carry_out(self, plan: SpawnPlan) -> None:
+    def _execute(self, plan: SpawnPlan) -> None:
         for name in plan.load:
             if not self._call("load_controller", LoadController, name).ok:
                 raise SpawnError(
-                    f"controller '{name}' of {self._file.path} could not be loaded; the log of the "
-                    "controller manager says why"
+                    f"controller '{name}' of {self._file.path} could not be loaded; see the log of "
+                    "the controller manager"
                 )
         if plan.start:
             self._call(
@@ -177,7 +176,7 @@ class RobotControllersSpawner:
 
         def missing() -> str:
             return ", ".join(
-                f"topic {rospy.resolve_name(topics[name])} of hardware '{name}' to say True"
+                f"True on topic {rospy.resolve_name(topics[name])} of hardware '{name}'"
                 for name, event in ready.items()
                 if not event.is_set()
             )
@@ -193,7 +192,13 @@ class RobotControllersSpawner:
                 self._faults[status.name] = next((value.value for value in status.values if value.key == "fault"), "")
 
     def _wait(self, done: Callable[[], bool], what: Callable[[], str], advice: str) -> None:
-        """Polls `done` in real time; warns every `~timeout`, gives up after `~give_up_after`."""
+        """Polls a condition in wall time, warns every `~timeout` and gives up after `~give_up_after`.
+
+        Args:
+            done: Condition.
+            what: Function that returns the awaited event in words.
+            advice: Advice to the user if no hardware fault is known.
+        """
         started = warned = time.monotonic()
         while not done():
             now, cause = time.monotonic(), "; ".join(filter(None, self._faults.values()))
@@ -213,8 +218,8 @@ def _set_when_true(message: Bool, event: threading.Event) -> None:
 
 
 def main() -> int:
-    """Runs the node: 0 when all controllers run, 1 when not, 2 for a wrong call."""
-    rospy.init_node("custom_controller_spawner", disable_rostime=True)  # it needs no /clock
+    """Runs the node and returns the exit code: 0 if all controllers run, 1 if not, 2 for a wrong command line."""
+    rospy.init_node("custom_controller_spawner", disable_rostime=True)  # does not need /clock
     arguments = rospy.myargv(sys.argv)[1:]
     if len(arguments) != 2:
         rospy.logfatal("usage: robot_controllers_spawner ROBOT_PACKAGE CONTROLLER_FILE; got %s", arguments)
@@ -225,6 +230,6 @@ def main() -> int:
     except SpawnError as error:
         (rospy.loginfo if rospy.is_shutdown() else rospy.logfatal)("controllers not spawned: %s", error)
         return 1
-    if spawner.stays:
+    if spawner.stay_alive:
         rospy.spin()
     return 0

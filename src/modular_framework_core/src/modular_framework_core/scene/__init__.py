@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The surroundings of the robot: sensor frames, text scenes, objects of the simulation."""
+"""The robot's environment: sensor frames, text scenes and simulated objects."""

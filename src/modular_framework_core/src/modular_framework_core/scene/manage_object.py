@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parses the command line that adds an object to the simulation or removes it."""
+"""Parses the command line that spawns or deletes a simulated object."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NUMBERS = re.compile(r"[-+0-9.eE,\s]+")
 
 
 class ObjectRequestError(ValueError):
-    """The request cannot be served; the text says what is missing or wrong."""
+    """A request to spawn or delete an object is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,13 +23,13 @@ class ObjectRequest:
     """A request to spawn or delete an object.
 
     Attributes:
-        delete: True to delete the object, False to spawn it.
+        delete: Whether to delete the object instead of spawning it.
         name: Name of the object in the simulation.
-        object_type: Model's folder, or the path of the SDF file.
-        sdf_file: SDF file to spawn; None when deleting.
-        position_m: x, y, z in the reference frame [m].
+        object_type: Folder of the model, or path of the SDF file.
+        sdf_file: SDF file to spawn; None to delete.
+        position_m: Position x, y, z in the reference frame [m].
         rpy_rad: Roll, pitch, yaw in the reference frame [rad].
-        reference_frame: Frame of the pose.
+        reference_frame: Reference frame of the pose.
     """
 
     delete: bool
@@ -42,17 +42,14 @@ class ObjectRequest:
 
 
 def parse_request(arguments: Sequence[str], model_path: str) -> ObjectRequest:
-    """Turns command line arguments into a request.
+    """Returns the request in command-line arguments.
 
     Args:
-        arguments: Arguments without the program's name; triplets may be separated by spaces or commas.
-        model_path: Folder of the models; needed only to spawn by type.
-
-    Returns:
-        The request.
+        arguments: Arguments without the program name; triplets may be separated by spaces or commas.
+        model_path: Folder of the models, required to spawn by type.
 
     Raises:
-        ObjectRequestError: Something is missing or wrong.
+        ObjectRequestError: An argument is missing or invalid.
     """
     options = _parser().parse_args(_split_triplets(arguments))
     delete = options.delete.lower() == "true"
@@ -90,18 +87,18 @@ def request_to_spawn(
     reference_frame: str,
     model_path: str,
 ) -> ObjectRequest:
-    """Makes a request to spawn an object by its type.
+    """Returns a request to spawn an object by type.
 
     Args:
         name: Name of the object.
         object_type: Folder of the model.
-        position_m: x, y, z in the reference frame [m].
+        position_m: Position x, y, z in the reference frame [m].
         rpy_rad: Roll, pitch, yaw in the reference frame [rad].
-        reference_frame: Frame of the pose.
+        reference_frame: Reference frame of the pose.
         model_path: Folder of the models.
 
     Raises:
-        ObjectRequestError: There is no such model, or the pose has not three numbers each.
+        ObjectRequestError: The model does not exist, or the pose is not three finite numbers each.
     """
     file = _model_file(object_type, model_path)
     if not file.is_file():
@@ -120,13 +117,13 @@ def request_to_spawn(
 
 
 def request_to_delete(name: str) -> ObjectRequest:
-    """Makes a request to delete an object."""
+    """Returns a request to delete an object."""
     return ObjectRequest(True, name, name, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "world")
 
 
 def _model_file(object_type: str, model_path: str) -> Path:
     if not object_type:
-        raise ObjectRequestError("neither a type (-t) nor a file (-f) is given; one of them says what to spawn")
+        raise ObjectRequestError("neither a type (-t) nor a file (-f) is given; give one of them")
     if not model_path:
         raise ObjectRequestError(
             "parameter 'gazebo_model_path' is not set, so the type cannot be found; set it to the "
@@ -136,7 +133,7 @@ def _model_file(object_type: str, model_path: str) -> Path:
 
 
 def _split_triplets(arguments: Sequence[str]) -> list[str]:
-    """Splits every argument of several numbers into one argument a number; drops empty ones after options."""
+    """Splits arguments with several numbers into one argument per number."""
     result: list[str] = []
     for argument in arguments:
         if argument and _NUMBERS.fullmatch(argument):
@@ -173,6 +170,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-t", "--type", nargs="?", const="", default="", help="folder of the model")
     parser.add_argument("-p", "--position", nargs="*", default=["0", "0", "0"], help="x y z [m]")
     parser.add_argument("-o", "--orientation", nargs="*", default=["0", "0", "0"], help="roll pitch yaw [rad]")
-    parser.add_argument("-r", "--reference", nargs="?", const="world", default="world", help="frame of the pose")
+    parser.add_argument("-r", "--reference", nargs="?", const="world", default="world", help="reference frame")
     parser.add_argument("-f", "--file", nargs="?", const="", default="", help="SDF file; overrides the type")
     return parser

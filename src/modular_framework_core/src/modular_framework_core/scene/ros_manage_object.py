@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Adds an object to the simulation or removes it, in all places or in none.
+"""Spawns or deletes an object in the simulation, the object types and the collision matrix, atomically.
 
-The simulation, the map of object types and the collision matrix must agree on which objects exist. When one of them
-refuses, what was done before is undone, and the exit code says so.
+If one of them refuses, the earlier steps are undone and the exit code is nonzero.
 """
 
 from __future__ import annotations
@@ -24,36 +23,38 @@ SERVICE_TIMEOUT_S = 15.0
 
 
 class RefusedError(RuntimeError):
-    """A service refused; the text says which and why."""
+    """A service is missing, failed or refused a request."""
 
 
 def call(name: str, service_type: Any, request: Any, refusal: str = "its node logged the reason") -> Any:
-    """Calls a service.
+    """Calls a service and returns the response.
 
     Args:
         name: Name of the service.
-        service_type: Its type.
-        request: Its request.
-        refusal: What it means when the service refuses without a reason.
-
-    Returns:
-        The answer.
+        service_type: Service type.
+        request: Service request.
+        refusal: Error message for a refusal without a reason.
 
     Raises:
-        RefusedError: It is absent, fails, or answers without success.
+        RefusedError: The service is missing, fails, or returns without success.
     """
-    answer = ask(name, service_type, request)
-    if not answer.success:
-        text = getattr(answer, "status_message", "") or refusal
+    response = call_without_check(name, service_type, request)
+    if not response.success:
+        text = getattr(response, "status_message", "") or refusal
         raise RefusedError(f"service '{rospy.resolve_name(name)}' refused: {text}")
-    return answer
+    return response
 
 
-def ask(name: str, service_type: Any, request: Any) -> Any:
-    """Calls a service whose refusal is no error.
+def call_without_check(name: str, service_type: Any, request: Any) -> Any:
+    """Calls a service whose refusal is not an error, and returns the response.
+
+    Args:
+        name: Name of the service.
+        service_type: Service type.
+        request: Service request.
 
     Raises:
-        RefusedError: It is absent or fails.
+        RefusedError: The service is missing or fails.
     """
     try:
         return request_service(name, service_type, request, SERVICE_TIMEOUT_S)
@@ -62,7 +63,7 @@ def ask(name: str, service_type: Any, request: Any) -> Any:
 
 
 def spawn(request: ObjectRequest) -> None:
-    """Spawns an object, or leaves everything as it was.
+    """Spawns an object. On failure, all changes are undone.
 
     Raises:
         RefusedError: A service refused, or the file cannot be read.
@@ -86,7 +87,7 @@ def spawn(request: ObjectRequest) -> None:
         "add_gazebo_mapping",
         srv.AddGazeboMapping,
         srv.AddGazeboMappingRequest(object_name=request.name, object_type=request.object_type),
-        f"there is an object '{request.name}' already; choose another name (-n), or delete that one first",
+        f"an object '{request.name}' exists already; choose a different name (-n), or delete that object first",
     )
     try:
         call(
@@ -97,8 +98,8 @@ def spawn(request: ObjectRequest) -> None:
             ),
         )
         try:
-            # The map of types learns that the simulation has the object, and forgets it when it is deleted there.
-            ask("get_object_type", srv.GetGazeboType, srv.GetGazeboTypeRequest(object_name=request.name))
+            # After this request, the map of types notices the deletion of the object in the simulation.
+            call_without_check("get_object_type", srv.GetGazeboType, srv.GetGazeboTypeRequest(object_name=request.name))
             call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.ADD_ENTRY, request.name))
         except RefusedError:
             _undo("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
@@ -111,13 +112,13 @@ def spawn(request: ObjectRequest) -> None:
 
 
 def delete(request: ObjectRequest) -> None:
-    """Deletes an object, also one that came with the world file; or leaves everything as it was.
+    """Deletes an object, including an object of the world file.
 
-    The simulation decides whether the object exists: only objects that were spawned here are in the map of types. What
-    was deleted there cannot be put back as it was, so all services have to be there before.
+    A deletion in the simulation cannot be undone; therefore all services must exist before the first step. Objects of
+    the world file are not in the map of types.
 
     Raises:
-        RefusedError: A service is absent or refused.
+        RefusedError: A service is missing or refused.
     """
     _require(
         {
@@ -127,15 +128,17 @@ def delete(request: ObjectRequest) -> None:
         }
     )
     mapping = srv.GetGazeboTypeRequest(object_name=request.name)
-    was_spawned_here = ask("get_object_type", srv.GetGazeboType, mapping).success
+    was_spawned_here = call_without_check("get_object_type", srv.GetGazeboType, mapping).success
     call("gazebo/delete_model", DeleteModel, DeleteModelRequest(model_name=request.name))
-    if was_spawned_here:  # the map may have noticed by itself that the object is gone
-        ask("delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name))
+    if was_spawned_here:  # the map may have removed the object already
+        call_without_check(
+            "delete_gazebo_mapping", srv.DeleteGazeboMapping, srv.DeleteGazeboMappingRequest(object_name=request.name)
+        )
     call("update_acm_entry", srv.UpdateACMEntry, _acm(srv.UpdateACMEntryRequest.DELETE_ENTRY, request.name))
 
 
 def _require(services: Mapping[str, Any]) -> None:
-    """Waits for services, given with their types; raises RefusedError where one is absent."""
+    """Waits for services, name -> type; raises RefusedError if a service is missing."""
     for name, service_type in services.items():
         try:
             wait_for_service(rospy.ServiceProxy(name, service_type), SERVICE_TIMEOUT_S)
@@ -151,17 +154,17 @@ def _undo(name: str, service_type: Any, request: Any) -> None:
     try:
         call(name, service_type, request)
     except RefusedError as error:
-        rospy.logerr("manage_object: could not take back what was done: %s", error)
+        rospy.logerr("manage_object: could not undo the earlier changes: %s", error)
 
 
 def main() -> int:
-    """Runs once.
+    """Runs the node ``manage_object``.
 
     Parameters: ``gazebo_model_path``. Services called: ``add_gazebo_mapping``, ``get_object_type``,
     ``delete_gazebo_mapping``, ``gazebo/spawn_sdf_model``, ``gazebo/delete_model``, ``update_acm_entry``.
 
     Returns:
-        0 when done, 1 when a service refused, 2 when the arguments make no sense.
+        Exit code: 0 for success, 1 if a service refused, 2 for invalid arguments.
     """
     rospy.init_node("manage_object", anonymous=True)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts the objects of a text scene into the planning scene, and writes those it has to a file."""
+"""Loads a text scene into the planning scene, and saves the planning scene as a text scene."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ PRIMITIVES = {
 }
 
 
-def collision_object(thing: SceneObject) -> CollisionObject:
-    """Converts an object; without a frame, which stands for the planning frame."""
-    message = CollisionObject(id=thing.name, operation=CollisionObject.ADD)
-    message.pose = _pose(thing.position, thing.quaternion_xyzw)
-    message.subframe_names = [name for name, _, _ in thing.subframes]
-    message.subframe_poses = [_pose(position, quaternion) for _, position, quaternion in thing.subframes]
-    for shape in thing.shapes:
+def collision_object(scene_object: SceneObject) -> CollisionObject:
+    """Returns an object as a message. An empty frame stands for the planning frame."""
+    message = CollisionObject(id=scene_object.name, operation=CollisionObject.ADD)
+    message.pose = _pose(scene_object.position, scene_object.quaternion_xyzw)
+    message.subframe_names = [name for name, _, _ in scene_object.subframes]
+    message.subframe_poses = [_pose(position, quaternion) for _, position, quaternion in scene_object.subframes]
+    for shape in scene_object.shapes:
         pose = _pose(shape.position, shape.quaternion_xyzw)
         match shape.kind:
             case "plane":
@@ -76,8 +76,8 @@ def _pose(position: Vector, quaternion_xyzw: Vector) -> Pose:
     return Pose(Point(*position), Quaternion(*quaternion_xyzw))
 
 
-def scene_of(message: PlanningScene) -> Scene:
-    """Converts the world of a planning scene; the octomap and attached objects have no place in a file."""
+def scene_from_message(message: PlanningScene) -> Scene:
+    """Returns the world objects of a planning scene. The octomap and attached objects are not part of a text scene."""
     colors = {item.id: (item.color.r, item.color.g, item.color.b, item.color.a) for item in message.object_colors}
     return Scene(
         message.name or "(noname)",
@@ -96,7 +96,7 @@ def scene_of(message: PlanningScene) -> Scene:
 
 
 def _shapes(message: CollisionObject, color: Vector) -> tuple[SceneShape, ...]:
-    kinds = {number: kind for kind, number in PRIMITIVES.items()}
+    kinds = {primitive_type: kind for kind, primitive_type in PRIMITIVES.items()}
     shapes = [
         SceneShape(
             kinds[solid.type],
@@ -132,7 +132,7 @@ def _vectors(pose: Pose) -> tuple[Vector, Vector]:
 
 
 class _Arguments(argparse.ArgumentParser):
-    """Command-line arguments whose faults are those of the file."""
+    """Argument parser that raises SceneFileError instead of exiting."""
 
     def error(self, message: str) -> NoReturn:
         raise SceneFileError(f"arguments: {message}")
@@ -153,25 +153,25 @@ def _call(service: str, kind: Any, request: Any) -> Any:
 
 
 def planning_scene(scene: Scene, replace: bool) -> PlanningScene:
-    """Converts a scene: objects that are added to those there are, or that replace them."""
+    """Returns a scene as a message that adds the objects to the planning scene, or replaces the whole scene."""
     message = PlanningScene(is_diff=not replace, name=scene.name if replace else "")
     message.robot_state.is_diff = True
-    message.world.collision_objects = [collision_object(thing) for thing in scene.objects]
-    for thing in scene.objects:
-        if thing.color != NO_COLOR:
-            color = ObjectColor(id=thing.name)
-            color.color.r, color.color.g, color.color.b, color.color.a = thing.color
+    message.world.collision_objects = [collision_object(scene_object) for scene_object in scene.objects]
+    for scene_object in scene.objects:
+        if scene_object.color != NO_COLOR:
+            color = ObjectColor(id=scene_object.name)
+            color.color.r, color.color.g, color.color.b, color.color.a = scene_object.color
             message.object_colors.append(color)
     return message
 
 
 def main() -> int:
-    """Runs once: node ``moveit_publish_scene_from_text [--scene] FILE``. Service: ``apply_planning_scene``.
+    """Runs the node ``moveit_publish_scene_from_text [--scene] FILE``. Service called: ``apply_planning_scene``.
 
-    The objects are added to the planning scene; with ``--scene`` they replace all that is in it.
+    The objects are added to the planning scene; with ``--scene`` they replace the whole scene.
 
     Returns:
-        0 when the planning scene has the objects, 1 when move_group is missing or refuses, 2 when the file is wrong.
+        Exit code: 0 for success, 1 if move_group is missing or refuses, 2 for an invalid file.
     """
     rospy.init_node("moveit_publish_scene_from_text")
     try:
@@ -198,19 +198,23 @@ def main() -> int:
 
 
 def export_main() -> int:
-    """Runs once: node ``moveit_export_scene_to_text [--old] FILE``. Service: ``get_planning_scene``.
+    """Runs the node ``moveit_export_scene_to_text [--old] FILE``. Service called: ``get_planning_scene``.
 
-    ``--old`` writes the layout without poses of objects and subframes.
+    ``--old`` writes the old layout, without object poses and subframes.
 
     Returns:
-        0 when the file has the world's objects, 1 when move_group is missing, 2 when the file cannot be written.
+        Exit code: 0 for success, 1 if move_group is missing, 2 if the file cannot be written.
     """
     rospy.init_node("moveit_export_scene_to_text", anonymous=True)
     parts = PlanningSceneComponents
-    wanted = parts(parts.SCENE_SETTINGS | parts.WORLD_OBJECT_NAMES | parts.WORLD_OBJECT_GEOMETRY | parts.OBJECT_COLORS)
+    components = parts(
+        parts.SCENE_SETTINGS | parts.WORLD_OBJECT_NAMES | parts.WORLD_OBJECT_GEOMETRY | parts.OBJECT_COLORS
+    )
     try:
-        arguments = _arguments(("--old", "the older layout"))
-        scene = scene_of(_call("get_planning_scene", GetPlanningScene, GetPlanningSceneRequest(wanted)).scene)
+        arguments = _arguments(("--old", "write the old layout"))
+        scene = scene_from_message(
+            _call("get_planning_scene", GetPlanningScene, GetPlanningSceneRequest(components)).scene
+        )
         write_atomically(arguments.file, scene_text(scene, arguments.old))
     except CallError as error:
         rospy.logfatal("moveit_export_scene_to_text: %s", error)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the frames of the sensors on /tf_static."""
+"""Publishes sensor frames on /tf_static."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from modular_framework_ros.start_up import start_timeout
 
 
 def transform_message(frame: SensorFrame) -> TransformStamped:
-    """Converts a frame to a transform from its parent to itself, stamped now."""
+    """Returns the transform from the parent frame to a sensor frame, stamped with the current time."""
     message = TransformStamped()
     message.header.stamp = rospy.Time.now()
     message.header.frame_id = frame.parent_frame
@@ -30,32 +30,32 @@ def transform_message(frame: SensorFrame) -> TransformStamped:
 
 
 def stored_pose(name: str) -> NamedPose | None:
-    """Asks the pose manager for a pose; None when it has none of that name, or does not answer (which is logged)."""
+    """Returns a pose from the pose manager, or None if the name is unknown or the manager does not answer."""
     get_pose = rospy.ServiceProxy("get_pose", GetPoseStamped)
     try:
         wait_for_service(get_pose, start_timeout())
-        answer = get_pose(name)
+        response = get_pose(name)
     except (CallError, rospy.ROSException, rospy.ServiceException) as error:
-        rospy.logerr("Service '%s' did not give the pose '%s': %s", get_pose.resolved_name, name, error)
+        rospy.logerr("Service '%s' did not return the pose '%s': %s", get_pose.resolved_name, name, error)
         return None
-    if not answer.success:
+    if not response.success:
         return None
-    position, rotation = answer.pose_stamped.pose.position, answer.pose_stamped.pose.orientation
+    position, rotation = response.pose_stamped.pose.position, response.pose_stamped.pose.orientation
     placement = Placement((position.x, position.y, position.z), (rotation.x, rotation.y, rotation.z, rotation.w))
-    return NamedPose(name, answer.pose_stamped.header.frame_id, {"": placement})
+    return NamedPose(name, response.pose_stamped.header.frame_id, {"": placement})
 
 
 class SensorFrames:
-    """The frames of one file of sensors.
+    """Sensor frames of a file.
 
     Publishers:
-        ``/tf_static`` (tf2_msgs/TFMessage): one transform a sensor.
+        ``/tf_static`` (tf2_msgs/TFMessage): One transform per sensor.
     Services:
-        ``reload_sensor_frames`` (std_srvs/Trigger): reads the file again.
+        ``reload_sensor_frames`` (std_srvs/Trigger): Reads the file again.
     """
 
     def __init__(self, path: Path) -> None:
-        """Nothing is read or advertised before :meth:`connect`."""
+        """Stores the path of the file; :meth:`connect` reads and publishes it."""
         self._path = path
         self._broadcaster: tf2_ros.StaticTransformBroadcaster | None = None
         self._published: set[str] = set()
@@ -73,12 +73,12 @@ class SensorFrames:
         if frames and self._broadcaster is not None:
             self._broadcaster.sendTransform([transform_message(frame) for frame in frames])
             rospy.loginfo("Sensor frames: %s.", ", ".join(f"{frame.frame} in {frame.parent_frame}" for frame in frames))
-        gone = sorted(self._published - {frame.frame for frame in frames})
+        removed = sorted(self._published - {frame.frame for frame in frames})
         self._published |= {frame.frame for frame in frames}
-        stay = [
-            f"frame '{name}' is not in the file any more; TF keeps it until this node is started again" for name in gone
+        warnings = [
+            f"frame '{name}' was removed from the file; TF keeps it until this node is restarted" for name in removed
         ]
-        return [*map(str, faults), *stay]
+        return [*map(str, faults), *warnings]
 
     def _reload(self, request: object) -> TriggerResponse:
         problems = self._load()
@@ -86,10 +86,10 @@ class SensorFrames:
 
 
 def main() -> int:
-    """Runs the node ``sensors_tf2_broadcaster``; argument: the file of sensors.
+    """Runs the node ``sensors_tf2_broadcaster``; argument: path of the sensors' YAML file.
 
     Returns:
-        Exit code: 2 when the argument is missing.
+        Exit code: 0 for success, 2 if the argument is missing.
     """
     rospy.init_node("sensors_tf2_broadcaster")
     arguments = rospy.myargv(sys.argv)[1:]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads and writes MoveIt's text scenes, the collision objects around a real robot.
+"""Reads and writes MoveIt's text scenes, which describe collision objects.
 
-A scene is a name, then objects, then a line with a single dot. Two layouts are in use: the older one begins an object
-with the number of its shapes, the newer one with the pose of the object, and ends it with named subframes.
+A text scene consists of a name, objects and a line with a single dot. In the old layout, an object begins with its
+number of shapes; in the new layout, an object begins with its pose and ends with named subframes.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ from pathlib import Path
 from modular_framework_urdf.rotations import multiply_quaternions, rotate_vector
 
 SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "cone": 2, "plane": 4}
-"""Numbers of each kind of shape: sides; radius; radius and length; radius and length; a, b, c and d. All [m] or 1."""
+"""Number of size parameters: box sides; sphere radius; cylinder and cone radius and length [m]; plane a, b, c, d."""
 
 Vector = tuple[float, ...]
 NO_COLOR: Vector = (0.0, 0.0, 0.0, 0.0)
 
 
 class SceneFileError(ValueError):
-    """A scene file cannot be read; the text names file and line, what is there and what is expected."""
+    """A scene file is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
 class SceneShape:
-    """One shape of an object.
+    """A shape of an object.
 
     Attributes:
         kind: box, sphere, cylinder, cone, plane or mesh.
-        size: Numbers of the shape as in ``SIZES``; empty for a mesh.
-        position: x, y, z in the frame of the object [m].
-        quaternion_xyzw: Orientation in the frame of the object.
-        vertices: Corners of a mesh, each x, y, z [m].
-        triangles: Each three indices into ``vertices``.
-        color: Red, green, blue, alpha in 0..1; all 0 for none.
+        size: Size parameters, see ``SIZES``; empty for a mesh.
+        position: Position x, y, z in the object frame [m].
+        quaternion_xyzw: Orientation in the object frame.
+        vertices: Mesh vertices x, y, z [m].
+        triangles: Mesh triangles, three indices into ``vertices`` each.
+        color: Red, green, blue, alpha in [0, 1]; all 0 for no color.
     """
 
     kind: str
@@ -49,14 +49,14 @@ class SceneShape:
 
 @dataclass(frozen=True, slots=True)
 class SceneObject:
-    """One object of a scene.
+    """An object of a scene.
 
     Attributes:
-        name: Id of the object.
-        position: x, y, z in the planning frame [m].
+        name: ID of the object.
+        position: Position x, y, z in the planning frame [m].
         quaternion_xyzw: Orientation in the planning frame.
-        shapes: What it is made of.
-        subframes: (name, position, quaternion_xyzw) of named frames on the object, in its frame.
+        shapes: Shapes of the object.
+        subframes: (name, position [m], quaternion_xyzw) of each subframe in the object frame.
     """
 
     name: str
@@ -67,24 +67,24 @@ class SceneObject:
 
     @property
     def color(self) -> Vector:
-        """The colour of the first shape that has one."""
+        """Color of the first colored shape."""
         return next((shape.color for shape in self.shapes if shape.color != NO_COLOR), NO_COLOR)
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Contents of a scene file: its name and its objects in file order."""
+    """A scene with its name and its objects in file order."""
 
     name: str
     objects: tuple[SceneObject, ...]
 
 
 class _Lines:
-    """The lines of a file, empty ones left out, with their numbers."""
+    """Nonempty lines of a file with their line numbers."""
 
     def __init__(self, path: Path, text: str) -> None:
         self._path = path
-        self._lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+        self._lines = [(index, line.strip()) for index, line in enumerate(text.splitlines(), 1) if line.strip()]
         self._next = 0
 
     def peek(self) -> str:
@@ -97,8 +97,8 @@ class _Lines:
         return self._lines[self._next - 1][1]
 
     def fault(self, expected: str) -> SceneFileError:
-        number, line = self._lines[self._next - 1]
-        return SceneFileError(f"{self._path}:{number}: got '{line[:60]}', expected {expected}")
+        line_number, line = self._lines[self._next - 1]
+        return SceneFileError(f"{self._path}:{line_number}: got '{line[:60]}', expected {expected}")
 
     def numbers(self, count: int, what: str) -> Vector:
         expected = f"{what} ({count} finite number{'s' if count > 1 else ''})"
@@ -114,34 +114,28 @@ class _Lines:
     def counts(self, count: int, what: str) -> tuple[int, ...]:
         values = self.numbers(count, what)
         if any(value < 0 or value != int(value) for value in values):
-            raise self.fault(f"{what}, whole and not negative")
+            raise self.fault(f"{what} (nonnegative integers)")
         return tuple(int(value) for value in values)
 
     def quaternion(self, what: str) -> Vector:
         values = self.numbers(4, what)
-        length = math.hypot(*values)
-        if abs(length - 1.0) > 1e-2:
-            raise self.fault(f"{what} as a unit quaternion x y z w, this one has the length {length:.4g}")
-        return tuple(value / length for value in values)
+        norm = math.hypot(*values)
+        if abs(norm - 1.0) > 1e-2:
+            raise self.fault(f"{what} as a unit quaternion x y z w; the norm is {norm:.4g}")
+        return tuple(value / norm for value in values)
 
 
 def read_scene_file(path: Path) -> Scene:
     """Reads a scene file.
 
-    Args:
-        path: The file.
-
-    Returns:
-        Its name and its objects.
-
     Raises:
-        SceneFileError: The file cannot be read or is no scene.
+        SceneFileError: The file cannot be read or is not a text scene.
     """
     try:
         lines = _Lines(path, path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        present = ", ".join(sorted(file.name for file in path.parent.glob("*.scene"))) or "none"
-        raise SceneFileError(f"{path}: cannot be read ({error}); scenes in its folder: {present}") from error
+        scene_names = ", ".join(sorted(file.name for file in path.parent.glob("*.scene"))) or "none"
+        raise SceneFileError(f"{path}: cannot be read ({error}); scenes in its folder: {scene_names}") from error
     name = lines.next_line("the name of the scene")
     objects: list[SceneObject] = []
     while (line := lines.next_line("an object ('* name') or the end ('.')")) != ".":
@@ -149,7 +143,7 @@ def read_scene_file(path: Path) -> Scene:
             raise lines.fault("an object ('* name') or the end ('.')")
         body = line[2:].strip()
         if body in {known.name for known in objects}:
-            raise lines.fault("a name that no object above has")
+            raise lines.fault("a name that no earlier object has")
         objects.append(_read_object(body, lines))
     return Scene(name, tuple(objects))
 
@@ -183,76 +177,73 @@ def _read_shape(lines: _Lines) -> SceneShape:
     triangles: tuple[tuple[int, ...], ...] = ()
     size: Vector = ()
     if kind == "mesh":
-        corners, faces = lines.counts(2, "the numbers of vertices and triangles")
-        vertices = tuple(lines.numbers(3, "a vertex") for _ in range(corners))
-        triangles = tuple(_triangle(lines, corners) for _ in range(faces))
+        vertex_count, triangle_count = lines.counts(2, "the numbers of vertices and triangles")
+        vertices = tuple(lines.numbers(3, "a vertex") for _ in range(vertex_count))
+        triangles = tuple(_triangle(lines, vertex_count) for _ in range(triangle_count))
     elif kind in SIZES:
         size = lines.numbers(SIZES[kind], f"the size of a {kind}")
         if kind != "plane" and min(size) <= 0.0:
-            raise lines.fault(f"the size of a {kind}, more than 0")
+            raise lines.fault(f"the size of a {kind}, greater than 0")
     else:
         raise lines.fault(f"a kind of shape: {', '.join((*SIZES, 'mesh'))}")
     position = lines.numbers(3, f"the position of a {kind}")
     quaternion = lines.quaternion(f"the orientation of a {kind}")
     color = lines.numbers(4, f"the colour of a {kind}")
-    if not all(0.0 <= share <= 1.0 for share in color):
+    if not all(0.0 <= component <= 1.0 for component in color):
         raise lines.fault(f"the colour of a {kind}, red, green, blue and alpha in 0..1")
     return SceneShape(kind, size, position, quaternion, vertices, triangles, color)
 
 
-def _triangle(lines: _Lines, corners: int) -> tuple[int, ...]:
+def _triangle(lines: _Lines, vertex_count: int) -> tuple[int, ...]:
     indices = lines.counts(3, "a triangle")
-    if max(indices) >= corners:
-        raise lines.fault(f"a triangle of indices below {corners}")
+    if max(indices) >= vertex_count:
+        raise lines.fault(f"a triangle of indices below {vertex_count}")
     return indices
 
 
 def scene_text(scene: Scene, old_layout: bool = False) -> str:
-    """Writes a scene.
+    """Returns a scene as the text of a scene file.
 
     Args:
-        scene: What to write.
-        old_layout: Without poses of objects, which are put into the poses of the shapes, and without subframes.
-
-    Returns:
-        The text of a scene file.
+        scene: Scene to write.
+        old_layout: Whether to write the old layout, without subframes and with object poses merged into shape poses.
 
     Raises:
-        SceneFileError: A name does not fit on a line of its own, or the old layout has no place for a subframe.
+        SceneFileError: A name is empty or spans several lines, or the old layout is requested for subframes.
     """
     lines = [_name(scene.name, "scene")]
-    for thing in scene.objects:
-        lines.append(f"* {_name(thing.name, 'object')}")
-        if old_layout and thing.subframes:
+    for scene_object in scene.objects:
+        lines.append(f"* {_name(scene_object.name, 'object')}")
+        if old_layout and scene_object.subframes:
             raise SceneFileError(
-                f"object '{thing.name}': got {len(thing.subframes)} subframes, the older layout has "
-                "none; write the newer layout"
+                f"object '{scene_object.name}': got {len(scene_object.subframes)} subframes, the old layout has "
+                "none; write the new layout"
             )
         if not old_layout:
-            lines += _pose_lines(thing.position, thing.quaternion_xyzw)
-        lines.append(str(len(thing.shapes)))
-        for shape in thing.shapes:
-            lines += _shape_lines(shape, thing if old_layout else None)
+            lines += _pose_lines(scene_object.position, scene_object.quaternion_xyzw)
+        lines.append(str(len(scene_object.shapes)))
+        for shape in scene_object.shapes:
+            lines += _shape_lines(shape, scene_object if old_layout else None)
         if not old_layout:
-            lines.append(str(len(thing.subframes)))
-            for name, position, quaternion in thing.subframes:
+            lines.append(str(len(scene_object.subframes)))
+            for name, position, quaternion in scene_object.subframes:
                 lines += [_name(name, "subframe"), *_pose_lines(position, quaternion)]
     return "\n".join([*lines, ".", ""])
 
 
 def _name(name: str, what: str) -> str:
     if not name.strip() or len(name.splitlines()) != 1:
-        raise SceneFileError(f"name of the {what}: got '{name}', expected one line that is not empty; rename it")
+        raise SceneFileError(f"name of the {what}: got '{name}', expected one nonempty line; rename it")
     return name
 
 
-def _shape_lines(shape: SceneShape, thing: SceneObject | None) -> list[str]:
-    """Lines of a shape; its pose is combined with that of the object, if one is given."""
+def _shape_lines(shape: SceneShape, scene_object: SceneObject | None) -> list[str]:
+    """Returns the lines of a shape. If an object is given, the shape's pose is transformed by the object's pose."""
     position, quaternion = shape.position, shape.quaternion_xyzw
-    if thing is not None:
-        turned = rotate_vector(thing.quaternion_xyzw, position)
-        position = tuple(a + b for a, b in zip(thing.position, turned, strict=True))
-        quaternion = multiply_quaternions(thing.quaternion_xyzw, quaternion)
+    if scene_object is not None:
+        rotated = rotate_vector(scene_object.quaternion_xyzw, position)
+        position = tuple(a + b for a, b in zip(scene_object.position, rotated, strict=True))
+        quaternion = multiply_quaternions(scene_object.quaternion_xyzw, quaternion)
     sizes = [_numbers(shape.size)]
     if shape.kind == "mesh":
         sizes = [

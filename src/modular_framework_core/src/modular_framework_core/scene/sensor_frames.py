@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the poses of sensors, as fixed transforms between frames."""
+"""Reads sensor poses as fixed transforms between frames."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ FRAME_KEYS = ("frame_id", "origin_frame_id", "frame_x", "frame_y", "frame_z", "f
 
 @dataclass(frozen=True, slots=True)
 class SensorFrame:
-    """A sensor's frame, fixed in another frame.
+    """A sensor frame, fixed in a parent frame.
 
     Attributes:
         sensor: Name of the sensor in the file.
-        parent_frame: Frame the pose is given in.
-        frame: Frame of the sensor.
-        placement: Pose of the sensor in the parent frame.
+        parent_frame: Parent frame.
+        frame: Sensor frame.
+        placement: Pose of the sensor frame in the parent frame.
     """
 
     sensor: str
@@ -37,15 +37,12 @@ PoseLookup = Callable[[str], "NamedPose | None"]
 
 
 def parse_sensor(entry: Entry, lookup: PoseLookup) -> SensorFrame:
-    """Turns one entry of the file into a frame.
+    """Returns the sensor frame of an entry.
 
     Args:
-        entry: Mapping with the eight ``FRAME_KEYS``, or with ``frame_id`` and ``initial_pose``: a pose written
-            there, or the name of one.
-        lookup: Gives the pose of a name, None when there is none.
-
-    Returns:
-        The frame.
+        entry: Mapping with the eight ``FRAME_KEYS``, or with ``frame_id`` and ``initial_pose``, which is a pose or the
+            name of a stored pose.
+        lookup: Function that returns a named pose, or None if unknown.
 
     Raises:
         EntryError: Keys are missing, or a value has the wrong type.
@@ -68,10 +65,10 @@ def parse_sensor(entry: Entry, lookup: PoseLookup) -> SensorFrame:
 def _from_initial_pose(entry: Entry, fields: dict[str, Entry], lookup: PoseLookup) -> SensorFrame:
     if "frame_id" not in fields:
         raise entry.fault("the key 'frame_id' is missing; name the frame of the sensor")
-    given = fields["initial_pose"]
-    pose = lookup(given.text()) if isinstance(given.node, yaml.ScalarNode) else parse_pose(given)
+    field = fields["initial_pose"]
+    pose = lookup(field.text()) if isinstance(field.node, yaml.ScalarNode) else parse_pose(field)
     if pose is None:
-        raise given.fault(f"no pose named '{given.text()}' is stored; add it to the named poses or correct the name")
+        raise field.fault(f"no pose named '{field.text()}' is stored; add it to the named poses or correct the name")
     if pose.is_robot_pose:
         raise fields["initial_pose"].fault(
             "the keys ['position', 'orientation'] are missing; a pose needs reference_frame, position, orientation"
@@ -85,23 +82,23 @@ def load_sensor_frames(
     """Reads a file of sensors.
 
     Args:
-        path: YAML file; top-level mappings are sensors, single values (topic names and the like) are left alone.
-        lookup: Gives the pose of a name, None when there is none.
+        path: YAML file. Top-level mappings are sensors; single values such as topic names are ignored.
+        lookup: Function that returns a named pose, or None if unknown.
 
     Returns:
-        The usable frames in file order, and one error for each sensor (or for the file) that is not usable.
+        The valid frames in file order, and one error per invalid sensor or for an unreadable file.
     """
     frames: dict[str, SensorFrame] = {}
 
-    def take(entry: Entry) -> None:
+    def add_frame(entry: Entry) -> None:
         if isinstance(entry.node, yaml.ScalarNode):
             return
         frame = parse_sensor(entry, lookup)
         if frame.frame in frames:
-            raise entry.fault(f"frame '{frame.frame}' belongs to sensor '{frames[frame.frame].sensor}' already")
+            raise entry.fault(f"frame '{frame.frame}' already belongs to sensor '{frames[frame.frame].sensor}'")
         if frame.frame == frame.parent_frame:
-            raise entry.fault(f"frame '{frame.frame}' is its own origin; name another origin frame")
+            raise entry.fault(f"frame '{frame.frame}' is its own origin; name a different origin frame")
         frames[frame.frame] = frame
 
-    faults = read_each_entry(path, take)
+    faults = read_each_entry(path, add_frame)
     return list(frames.values()), faults
