@@ -110,8 +110,8 @@ def test_another_group_is_planned_for_with_settings_of_its_own(commander) -> Non
     assert [item.joint_name for item in request.goal_constraints[0].joint_constraints] == ["f"]
     assert commander.plan_to_joint_value_target({"jx": 0.4}).success
     assert commander.fake.requests[-1].allowed_planning_time != 9.0
-    assert "group 'hand' is no chain" in hand.plan_to_pose_target(pose(0.3)).reason
-    assert "group 'hand' is no chain" in hand.solve_ik(pose(0.3)).reason
+    assert "group 'hand' is not a chain" in hand.plan_to_pose_target(pose(0.3)).reason
+    assert "group 'hand' is not a chain" in hand.solve_ik(pose(0.3)).reason
     assert set(commander.positions_of(["jx", "f", "nobody"])) == {"jx", "f"}
     with pytest.raises(CommanderError, match="no planning group 'leg'"):
         commander.of_group("leg")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans and executes arm motions through move_group, so that several states may share one commander.
+"""Plans and executes arm motions through move_group.
 
-Every call carries its own start state and target; only the planner's settings are kept between calls.
+Several states may share one commander: every call has its own start state and target, and only the planner settings
+persist between calls.
 """
 
 from __future__ import annotations
@@ -70,19 +71,20 @@ SEEDED_TIMEOUT_FACTOR = 10.0
 
 
 class CommanderError(RuntimeError):
-    """The commander cannot be used; the text names what is missing."""
+    """The commander cannot be used."""
 
 
 class ArmCommander:
-    """Client of move_group for one planning group; safe to use from several threads.
+    """Thread-safe client of move_group for one planning group.
 
-    Parameters read: ``robot_description``, ``robot_description_semantic``.
-    Subscribers: those of :class:`JointMonitor` and :class:`PlanningReports`.
-    Services called: ``plan_kinematic_path``, ``compute_ik``, ``check_state_validity``. Action: ``execute_trajectory``.
+    Parameters: ``robot_description``, ``robot_description_semantic``.
+    Subscribers: see :class:`JointMonitor` and :class:`PlanningReports`.
+    Services called: ``plan_kinematic_path``, ``compute_ik``, ``check_state_validity``, ``query_planner_interface``.
+    Actions called: ``execute_trajectory``.
 
     Args:
         name: Planning group.
-        set_ground: Accepted for compatibility; the planning scene has its own supports, so True is refused.
+        set_ground: Compatibility argument, which must be False; the planning scene contains the ground.
 
     Raises:
         CommanderError: ``set_ground`` is True.
@@ -102,17 +104,17 @@ class ArmCommander:
         self._group: Group | None = None
         self._joints = JointMonitor()
         self._reports = PlanningReports()
-        self._others: dict[str, ArmCommander] = {}
-        self._others_lock = threading.Lock()
+        self._other_commanders: dict[str, ArmCommander] = {}
+        self._other_commanders_lock = threading.Lock()
 
     def connect(self, timeout_s: float | None = None) -> None:
-        """Reads the robot model and waits for move_group; does nothing when connected already.
+        """Reads the robot model and waits for move_group. Repeated calls have no effect.
 
         Args:
-            timeout_s: Longest wait for each thing needed [s]; None takes the parameter ``/start_timeout``.
+            timeout_s: Timeout of each wait [s]; None for the parameter ``/start_timeout``.
 
         Raises:
-            CommanderError: Something needed is missing; the text names it.
+            CommanderError: A parameter, service, action or joint is missing; the message names it.
         """
         with self._connect_lock:
             if self._group is not None:
@@ -145,94 +147,94 @@ class ArmCommander:
 
     @property
     def group(self) -> Group:
-        """The planning group; connects when that was not done yet."""
+        """Planning group; connects on first use."""
         self.connect()
         if self._group is None:
             raise CommanderError(f"Arm commander of group '{self.group_name}' is not connected.")
         return self._group
 
     def of_group(self, name: str) -> ArmCommander:
-        """Returns the commander of another planning group.
+        """Returns the commander of a different planning group.
 
-        It begins with the settings this one has when it is asked for first, and keeps its own from then on.
+        On first use, the new commander copies the settings of this commander; later changes are independent.
 
         Args:
-            name: Planning group; empty for this commander.
+            name: Planning group; "" for this commander.
 
         Raises:
-            CommanderError: There is no such group, or something needed is missing.
+            CommanderError: The group is unknown, or the commander cannot connect.
         """
         if not name or name == self.group_name:
             return self
-        with self._others_lock:
-            other = self._others.get(name)
+        with self._other_commanders_lock:
+            other = self._other_commanders.get(name)
             if other is None:
                 other = ArmCommander(name)
                 other._velocity_scaling, other._attempts = self._velocity_scaling, self._attempts
                 other._pipeline_id, other._planner_id = self._pipeline_id, self._planner_id
                 other._planning_time_s = self._planning_time_s
                 other.connect()
-                self._others[name] = other
+                self._other_commanders[name] = other
         return other
 
     def set_max_velocity_scaling_factor(self, factor: float) -> None:
-        """Sets the share of the joints' velocity and acceleration limits to use, in (0, 1].
+        """Sets the scaling factor of the joints' velocity and acceleration limits, in (0, 1].
 
         Raises:
             CommanderError: The factor is out of range.
         """
         if not 0.0 < float(factor) <= 1.0:
-            raise CommanderError(f"The velocity scaling factor is {factor}, allowed is 0 < factor <= 1.")
+            raise CommanderError(f"The velocity scaling factor is {factor}; it must be above 0 and at most 1.")
         self._velocity_scaling = float(factor)
 
     def set_planner_id(self, planner_id: str) -> None:
-        """Sets the planner by the name move_group knows it by, or ``pipeline/planner``; empty for the default.
+        """Sets the planner as ``planner`` or ``pipeline/planner``; "" for the default.
 
-        A name without pipeline stands for the only pipeline that has the planner.
+        Without pipeline, the pipeline is set if exactly one pipeline has the planner.
 
         Raises:
-            CommanderError: move_group has no such planner, or does not answer.
+            CommanderError: The planner or pipeline is unknown, or move_group does not answer.
         """
         pipeline, _, planner = str(planner_id).rpartition("/")
-        offered = self._planners() if planner_id else {}
-        if pipeline and pipeline not in offered:
-            known = listing(sorted(offered))
-            raise CommanderError(f"There is no pipeline '{pipeline}'; {known}{nearest(pipeline, offered)}")
-        having = [name for name, planners in offered.items() if planner in planners or (pipeline and not planners)]
-        if planner_id and not (pipeline in having if pipeline else having):
+        available = self._planners() if planner_id else {}
+        if pipeline and pipeline not in available:
+            known = listing(sorted(available))
+            raise CommanderError(f"There is no pipeline '{pipeline}'; {known}{nearest(pipeline, available)}")
+        matches = [name for name, planners in available.items() if planner in planners or (pipeline and not planners)]
+        if planner_id and not (pipeline in matches if pipeline else matches):
             known = self.planner_names()
             raise CommanderError(
                 f"There is no planner '{planner_id}'; {listing(known)}{nearest(str(planner_id), known)}"
             )
-        self._pipeline_id = pipeline or (having[0] if len(having) == 1 else "")
+        self._pipeline_id = pipeline or (matches[0] if len(matches) == 1 else "")
         self._planner_id = planner
 
     def planner_names(self) -> list[str]:
-        """Returns the planners move_group offers: all by their names alone, and as ``pipeline/planner``.
+        """Returns the available planners, each as ``planner`` and as ``pipeline/planner``.
 
         Raises:
             CommanderError: move_group does not answer.
         """
-        offered = self._planners().items()
+        available = self._planners().items()
         return sorted(
-            {name for item, planners in offered for planner in planners for name in (planner, f"{item}/{planner}")}
+            {name for item, planners in available for planner in planners for name in (planner, f"{item}/{planner}")}
         )
 
     def _planners(self) -> dict[str, set[str]]:
-        """Returns the planners of each pipeline that this group may ask for."""
+        """Returns the planners available to this group, by pipeline."""
         request = QueryPlannerInterfacesRequest()
         try:
-            answer = request_service(PLANNERS_SERVICE, QueryPlannerInterfaces, request, SERVICE_TIMEOUT_S)
+            response = request_service(PLANNERS_SERVICE, QueryPlannerInterfaces, request, SERVICE_TIMEOUT_S)
         except CallError as error:
             raise CommanderError(str(error)) from error
-        own = f"{self.group_name}["
+        group_prefix = f"{self.group_name}["
         return {
             item.pipeline_id: {
-                name.removeprefix(own).removesuffix("]")
+                name.removeprefix(group_prefix).removesuffix("]")
                 for name in item.planner_ids
-                if name.startswith(own) or not name.endswith("]")
+                if name.startswith(group_prefix) or not name.endswith("]")
             }
-            for item in answer.planner_interfaces
+            for item in response.planner_interfaces
         }
 
     def set_num_planning_attempts(self, attempts: int) -> None:
@@ -242,30 +244,30 @@ class ArmCommander:
             CommanderError: The number is below 1.
         """
         if int(attempts) < 1:
-            raise CommanderError(f"The number of planning attempts is {attempts}, allowed is 1 or more.")
+            raise CommanderError(f"The number of planning attempts is {attempts}; it must be 1 or more.")
         self._attempts = int(attempts)
 
     def set_planning_time(self, seconds: float) -> None:
-        """Sets the time a plan may take [s].
+        """Sets the planning time [s].
 
         Raises:
             CommanderError: The time is not positive.
         """
         if not float(seconds) > 0.0:
-            raise CommanderError(f"The planning time is {seconds} s, allowed is more than 0.")
+            raise CommanderError(f"The planning time is {seconds} s; it must be more than 0.")
         self._planning_time_s = float(seconds)
 
     def current_joints(self) -> dict[str, float]:
         """Returns the latest positions of the group's joints [rad or m].
 
-        Joints outside the group are left out on purpose: a seed that names them would pin fingers that follow others.
+        Joints outside of the group are omitted, because a seed with mimic joints would fix their positions.
         """
         names = self.group.joint_names
         self._joints.catch_up()
         return self._joints.positions(names)
 
     def positions_of(self, joints: Iterable[str]) -> dict[str, float]:
-        """Returns the latest positions of some joints of the robot [rad or m]; joints without one are left out."""
+        """Returns the latest positions of joints [rad or m]. Joints without a received position are omitted."""
         self._joints.catch_up()
         return self._joints.positions(joints)
 
@@ -273,14 +275,14 @@ class ArmCommander:
         """Plans to a pose of the group's tip link.
 
         Args:
-            pose: Target of the tip link.
-            custom_start_state: Where to start; None starts from the current state.
+            pose: Target pose of the tip link.
+            custom_start_state: Start state; None for the current state.
 
         Returns:
-            The plan, or the reason why there is none.
+            The plan, or the reason of the failure.
         """
-        if self._no_tip():
-            return _no_plan(MoveItErrorCodes.INVALID_GROUP_NAME, self._no_tip())
+        if self._tip_fault():
+            return _no_plan(MoveItErrorCodes.INVALID_GROUP_NAME, self._tip_fault())
         return self._plan(lambda name: pose_goal(pose, self.group.tip_link, name), custom_start_state)
 
     def plan_to_joint_value_target(
@@ -289,11 +291,11 @@ class ArmCommander:
         """Plans to joint positions.
 
         Args:
-            joints: {joint: position} [rad or m]; joints outside the group are left out.
-            custom_start_state: Where to start; None starts from the current state.
+            joints: Target {joint: position} [rad or m]. Joints outside of the group are ignored.
+            custom_start_state: Start state; None for the current state.
 
         Returns:
-            The plan, or the reason why there is none.
+            The plan, or the reason of the failure.
         """
         values = dict(zip(joints.name, joints.position, strict=False)) if isinstance(joints, JointState) else joints
         target = {name: values[name] for name in self.group.joint_names if name in values}
@@ -301,47 +303,49 @@ class ArmCommander:
             return _no_plan(
                 MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS,
                 f"the target names the joints {sorted(values)}, group '{self.group_name}' has "
-                f"{list(self.group.joint_names)}; none of them is the same",
+                f"{list(self.group.joint_names)}; name joints of the group",
             )
         return self._plan(lambda name: joint_goal(target, name), custom_start_state)
 
     def get_ik(self, pose: PoseStamped, seed: StartState = None) -> dict[str, float] | None:
-        """Returns joint positions that bring the tip link to a pose, None when there are none."""
+        """Returns joint positions [rad or m] for a pose of the tip link, or None without a solution."""
         return self.solve_ik(pose, seed).joints or None
 
     def solve_ik(self, pose: PoseStamped, seed: StartState = None) -> IkResult:
-        """Finds collision-free joint positions that bring the tip link to a pose.
+        """Solves the collision-free inverse kinematics of the tip link.
 
         Args:
-            pose: Target of the tip link.
-            seed: Positions to stay near, and those of joints outside the group; None for the current state.
+            pose: Target pose of the tip link.
+            seed: Seed state, which also sets the joints outside of the group; None for the current state.
 
         Returns:
-            The solution nearest to the seed, or the reason why there is none.
+            The solution nearest to the seed, or the reason of the failure.
         """
-        if self._no_tip():
-            return IkResult({}, MoveItErrorCodes.INVALID_GROUP_NAME, self._no_tip())
+        if self._tip_fault():
+            return IkResult({}, MoveItErrorCodes.INVALID_GROUP_NAME, self._tip_fault())
         try:
             result = self._ik(pose, seed, avoid_collisions=True)
             if result:
                 return result
-            touching = self._ik(pose, seed, avoid_collisions=False)
-            what = f"link '{self.group.tip_link}' cannot get to {describe_pose(pose)}: "
-            if touching:
-                return IkResult({}, result.error_code, what + (self.contacts(touching.joints, seed) or result.reason))
-            return IkResult({}, result.error_code, what + f"the pose is out of reach ({result.reason})")
+            in_collision = self._ik(pose, seed, avoid_collisions=False)
+            prefix = f"link '{self.group.tip_link}' cannot reach {describe_pose(pose)}: "
+            if in_collision:
+                return IkResult(
+                    {}, result.error_code, prefix + (self.contacts(in_collision.joints, seed) or result.reason)
+                )
+            return IkResult({}, result.error_code, prefix + f"the pose is out of reach ({result.reason})")
         except CallError as error:
             return IkResult({}, MoveItErrorCodes.COMMUNICATION_FAILURE, str(error))
 
     def contacts(self, joints: Mapping[str, float], start: StartState = None) -> str:
-        """Returns what collides with the arm at given joint positions.
+        """Returns the collisions at given joint positions, in words.
 
         Args:
             joints: {joint: position} [rad or m].
-            start: Positions of all other joints; None for the current state.
+            start: State of all other joints; None for the current state.
 
         Returns:
-            The pairs that are in collision; empty when the state is valid.
+            The colliding pairs; "" if the state is valid.
 
         Raises:
             CallError: move_group does not answer.
@@ -361,14 +365,14 @@ class ArmCommander:
     def execute_plan(
         self, plan: RobotTrajectory | PlanResult, stop_requested: Callable[[], bool] = stop_requested
     ) -> ExecutionResult:
-        """Executes a plan and waits for its end.
+        """Executes a plan and waits for the end of the motion.
 
         Args:
-            plan: What to execute.
-            stop_requested: Evaluated during the motion; True stops it.
+            plan: Plan or trajectory to execute.
+            stop_requested: Function polled during the motion; True stops the motion.
 
         Returns:
-            Success, or the reason why the motion failed.
+            Success, or the reason of the failure.
         """
         trajectory = plan.trajectory if isinstance(plan, PlanResult) else plan
         points = trajectory.joint_trajectory.points
@@ -424,7 +428,9 @@ class ArmCommander:
         message.start_state = robot_state(start)
         message.goal_constraints = [goal(name)]
         timeout_s = SERVICE_TIMEOUT_S + 3.0 * self._attempts * self._planning_time_s
-        if seed_parameter() is not None:  # iterations bound the search then, on a slow machine as on a fast one
+        if (
+            seed_parameter() is not None
+        ):  # seeded searches are bounded by iterations, which take longer on slow machines
             timeout_s *= SEEDED_TIMEOUT_FACTOR
         try:
             proxy = rospy.ServiceProxy("plan_kinematic_path", GetMotionPlan)
@@ -466,14 +472,14 @@ class ArmCommander:
             raise RobotModelError(f"group '{self.group_name}' has no active joint; choose one that has")
         return group
 
-    def _no_tip(self) -> str:
-        """Returns why no pose can be a target if the group has no tip link; "" when it has one."""
+    def _tip_fault(self) -> str:
+        """Returns the fault of a pose target for a group without a tip link; "" for a group with a tip link."""
         return (
             ""
             if self.group.tip_link
             else (
-                f"group '{self.group_name}' is no chain, so no link of it can be "
-                "brought to a pose; choose a group that is, or a target of joints"
+                f"group '{self.group_name}' is not a chain and has no tip link for a pose; "
+                "choose a group that is a chain, or a joint target"
             )
         )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Builds the messages move_group understands, and names its error codes."""
+"""Builds messages for move_group and names its error codes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ StartState = RobotState | JointState | Mapping[str, float] | None
 
 
 def error_name(code: int) -> str:
-    """Returns the constant's name of an error code, or the number of an unknown one."""
+    """Returns the name of an error code, or its number if unknown."""
     for name, value in vars(MoveItErrorCodes).items():
         if name.isupper() and isinstance(value, int) and value == code:
             return name
@@ -34,21 +34,18 @@ def error_name(code: int) -> str:
 
 
 def robot_state(state: StartState) -> RobotState:
-    """Makes a robot state on top of the current one.
+    """Returns a robot state as a difference to the current state: other joints and attached objects stay unchanged.
 
     Args:
-        state: {joint: position}, a joint state or a robot state; None for the current state.
-
-    Returns:
-        A robot state that leaves every joint it does not name, and attached objects, as they are.
+        state: {joint: position [rad or m]}, joint state or robot state; None for the current state.
     """
     match state:
         case None:
             return RobotState(is_diff=True)
         case RobotState():
-            kept = copy.copy(state)  # the caller's message stays as it is
-            kept.is_diff = True
-            return kept
+            difference = copy.copy(state)  # the caller's message stays unchanged
+            difference.is_diff = True
+            return difference
         case JointState():
             return RobotState(joint_state=state, is_diff=True)
         case _:
@@ -57,7 +54,12 @@ def robot_state(state: StartState) -> RobotState:
 
 
 def joint_goal(joints: Mapping[str, float], name: str = "") -> Constraints:
-    """Makes a goal in joint space [rad or m]."""
+    """Returns a joint-space goal.
+
+    Args:
+        joints: {joint: position} [rad or m].
+        name: Name of the constraints.
+    """
     constraints = [
         JointConstraint(
             joint_name=joint,
@@ -72,7 +74,13 @@ def joint_goal(joints: Mapping[str, float], name: str = "") -> Constraints:
 
 
 def pose_goal(pose: PoseStamped, link: str, name: str = "") -> Constraints:
-    """Makes a goal for the pose of a link."""
+    """Returns a goal for the pose of a link.
+
+    Args:
+        pose: Target pose.
+        link: Name of the link.
+        name: Name of the constraints.
+    """
     region = PositionConstraint(header=pose.header, link_name=link, weight=1.0)
     region.constraint_region.primitives = [
         SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[POSITION_TOLERANCE_M])
@@ -80,7 +88,7 @@ def pose_goal(pose: PoseStamped, link: str, name: str = "") -> Constraints:
     centre = Pose(position=pose.pose.position)
     centre.orientation.w = 1.0
     region.constraint_region.primitive_poses = [centre]
-    turn = OrientationConstraint(
+    orientation = OrientationConstraint(
         header=pose.header,
         link_name=link,
         orientation=pose.pose.orientation,
@@ -89,16 +97,16 @@ def pose_goal(pose: PoseStamped, link: str, name: str = "") -> Constraints:
         absolute_y_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
         absolute_z_axis_tolerance=ORIENTATION_TOLERANCE_RAD,
     )
-    return Constraints(name=name, position_constraints=[region], orientation_constraints=[turn])
+    return Constraints(name=name, position_constraints=[region], orientation_constraints=[orientation])
 
 
-def joints_of(state: JointState, wanted: Sequence[str]) -> dict[str, float]:
-    """Picks joints out of a joint state; joints it lacks are left out."""
+def joints_of(state: JointState, names: Sequence[str]) -> dict[str, float]:
+    """Returns the positions of the named joints in a joint state. Missing joints are omitted."""
     positions = dict(zip(state.name, state.position, strict=False))
-    return {name: positions[name] for name in wanted if name in positions}
+    return {name: positions[name] for name in names if name in positions}
 
 
 def describe_pose(pose: PoseStamped) -> str:
-    """Writes a pose for an error text."""
+    """Returns a position in words, for error messages."""
     p = pose.pose.position
     return f"({p.x:.3f}, {p.y:.3f}, {p.z:.3f}) m in frame '{pose.header.frame_id}'"

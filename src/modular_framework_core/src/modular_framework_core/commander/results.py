@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Results of the arm commander: each is true only on success, and has the reason otherwise."""
+"""Results of the arm commander. A result is true only on success and contains the reason of a failure."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 
 
 class PlanResult(NamedTuple):
-    """Outcome of planning; true only for a plan.
+    """Result of planning; true only for a plan.
 
     Attributes:
-        trajectory: The plan; without joint names when there is none.
-        success: True when ``trajectory`` leads to the target.
+        trajectory: Planned trajectory; empty after a failure.
+        success: Whether ``trajectory`` leads to the target.
         error_code: Value of moveit_msgs/MoveItErrorCodes.
-        reason: Why there is no plan; empty with one.
+        reason: Reason of a failure; "" on success.
     """
 
     trajectory: RobotTrajectory
@@ -30,12 +30,12 @@ class PlanResult(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class IkResult:
-    """Outcome of inverse kinematics; true only with a solution.
+    """Result of inverse kinematics; true only with a solution.
 
     Attributes:
-        joints: {joint: position} of the group; empty without a solution.
+        joints: {joint: position [rad or m]} of the group; empty without a solution.
         error_code: Value of moveit_msgs/MoveItErrorCodes.
-        reason: Why there is no solution; empty with one.
+        reason: Reason of a failure; "" on success.
     """
 
     joints: dict[str, float]
@@ -48,12 +48,12 @@ class IkResult:
 
 @dataclass(frozen=True, slots=True)
 class ExecutionResult:
-    """Outcome of a motion; true only when move_group reports success.
+    """Result of a motion; true only if move_group reports success.
 
     Attributes:
-        success: True when the trajectory was executed.
+        success: Whether the trajectory was executed.
         error_code: Value of moveit_msgs/MoveItErrorCodes.
-        reason: Why it was not; empty on success.
+        reason: Reason of a failure; "" on success.
     """
 
     success: bool

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads which joints and which tip link a planning group has, from the robot's URDF and SRDF texts."""
+"""Reads the joints and the tip link of a planning group from URDF and SRDF texts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from modular_framework_urdf.xml_text import XmlError
 
 
 class RobotModelError(ValueError):
-    """A robot description lacks what is asked of it; the text says what was found and what is allowed."""
+    """A robot description is invalid or lacks the requested group or joint."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +27,11 @@ class Joint:
         kind: URDF type.
         parent: Parent link.
         child: Child link.
-        lower: Lowest position [rad or m]; minus infinity without a limit.
-        upper: Highest position [rad or m]; infinity without a limit.
-        effort: Greatest effort [N m or N]; infinity without a limit.
-        mimics: Joint it follows; empty for an independent joint.
-        velocity: Greatest velocity [rad/s or m/s]; infinity without a limit.
+        lower: Lower position limit [rad or m]; minus infinity without a limit.
+        upper: Upper position limit [rad or m]; infinity without a limit.
+        effort: Effort limit [N m or N]; infinity without a limit.
+        mimics: Leading joint of a mimic joint; "" for an independent joint.
+        velocity: Velocity limit [rad/s or m/s]; infinity without a limit.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Joint:
 
     @property
     def is_active(self) -> bool:
-        """True when the joint moves and follows no other."""
+        """Whether the joint is movable and not a mimic joint."""
         return self.kind in MOVABLE_KINDS and not self.mimics
 
 
@@ -57,8 +57,8 @@ class Group:
     Attributes:
         name: Name of the group.
         joints: Active joints, in the order of the kinematic chain or of the SRDF.
-        tip_link: Last link of the chain; empty when the group is no chain.
-        states: Named states: {state: {joint: position}}.
+        tip_link: Last link of the chain; "" if the group is not a chain.
+        states: Named states, {state: {joint: position [rad or m]}}.
     """
 
     name: str
@@ -67,10 +67,10 @@ class Group:
     states: dict[str, dict[str, float]]
 
     def joint(self, name: str) -> Joint:
-        """Returns a joint of the group.
+        """Returns an active joint of the group.
 
         Raises:
-            RobotModelError: The group has no such active joint.
+            RobotModelError: The group has no active joint of this name.
         """
         for joint in self.joints:
             if joint.name == name:
@@ -86,13 +86,10 @@ class Group:
 
 
 def read_joints(urdf: str) -> dict[str, Joint]:
-    """Reads the joints of a URDF text.
-
-    Returns:
-        {name: joint} in file order.
+    """Returns the joints of a URDF text by name, in file order.
 
     Raises:
-        RobotModelError: The text is no URDF.
+        RobotModelError: The text is not a URDF.
     """
     try:
         robot = read_urdf(urdf, "robot_description (URDF)")
@@ -118,18 +115,15 @@ def _joint(joint: UrdfJoint) -> Joint:
 
 
 def read_group(urdf: str, srdf: str, name: str) -> Group:
-    """Reads one planning group.
+    """Returns a planning group with its subgroups merged.
 
     Args:
-        urdf: Text of the robot description.
-        srdf: Text of the semantic description.
+        urdf: URDF text.
+        srdf: SRDF text.
         name: Name of the group.
 
-    Returns:
-        The group with its subgroups merged.
-
     Raises:
-        RobotModelError: A text cannot be read, or there is no such group, or the group names what is not there.
+        RobotModelError: A text is invalid, the group is unknown, or it refers to an unknown group, joint or link.
     """
     joints = read_joints(urdf)
     try:
@@ -143,12 +137,12 @@ def read_group(urdf: str, srdf: str, name: str) -> Group:
 
 
 def _collect(
-    name: str, groups: Mapping[str, GroupSpec], joints: dict[str, Joint], above: tuple[str, ...]
+    name: str, groups: Mapping[str, GroupSpec], joints: dict[str, Joint], parents: tuple[str, ...]
 ) -> tuple[list[str], str]:
     if name not in groups:
         raise RobotModelError(f"There is no planning group '{name}'; the SRDF has {sorted(groups)}.")
-    if name in above:
-        raise RobotModelError(f"Planning group '{name}' contains itself through {list(above)}.")
+    if name in parents:
+        raise RobotModelError(f"Planning group '{name}' contains itself through {list(parents)}.")
     by_child = {joint.child: joint for joint in joints.values()}
     names: list[str] = []
     tip = ""
@@ -167,9 +161,9 @@ def _collect(
                 parent = by_child.get(member.name)
                 names += [parent.name] if parent is not None else []
             case "group":
-                inner, inner_tip = _collect(member.name, groups, joints, (*above, name))
-                names += inner
-                tip = tip or inner_tip
+                subgroup_names, subgroup_tip = _collect(member.name, groups, joints, (*parents, name))
+                names += subgroup_names
+                tip = tip or subgroup_tip
     return names, tip
 
 

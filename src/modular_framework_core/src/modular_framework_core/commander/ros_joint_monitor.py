@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The latest positions and velocities of the robot's joints."""
+"""Monitors the positions and velocities of the robot's joints."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from modular_framework_ros.simulated_time import SimulatedTime
 
 REST_SPEED = 0.02  # [rad/s or m/s]
 REST_TIMEOUT_S = 1.0
-REST_PERIOD_S = 0.02  # of simulated time, where that is held
+REST_PERIOD_S = 0.02  # polling period in held simulated time
 
 
 class JointMonitor:
-    """Keeps the latest joint positions and velocities; safe to use from several threads.
+    """Thread-safe store of the latest joint positions and velocities.
 
     Subscribers: ``joint_states`` (sensor_msgs/JointState).
 
     Args:
-        queue_size: Length of the subscriber's queue. Above 1 where one node publishes its joints in several messages
-            and none may be missed; 1 where a queued, old message must not count as new.
+        queue_size: Queue length of the subscriber: above 1 if the joints arrive in several messages, 1 if an old queued
+            message must not count as new.
     """
 
     def __init__(self, queue_size: int = 10) -> None:
@@ -45,55 +45,55 @@ class JointMonitor:
         )
 
     def catch_up(self) -> None:
-        """Where simulated time is held: waits until the joints are known as they are at the time that it stands at.
+        """In held simulated time, waits for the joint states of the current time.
 
         Raises:
-            CallError: they are not received.
+            CallError: The joint states do not arrive.
         """
         self._time.catch_up(lambda: self._latest)
 
     def positions(self, names: Iterable[str]) -> dict[str, float]:
-        """Returns the positions of joints [rad or m]; joints that have not been received are left out."""
+        """Returns the latest positions of joints [rad or m]. Joints without a received position are omitted."""
         with self._lock:
             return {name: self._positions[name] for name in names if name in self._positions}
 
     def wait_for_rest(self, names: Iterable[str], stop_requested: Callable[[], bool]) -> bool:
-        """Waits until a new state of every joint was received and all are slow; False when that takes too long.
+        """Waits until new states of all joints arrive and all joints are at rest; returns False on timeout.
 
-        A controller ends a goal some milliseconds before the joints' last positions arrive, and a finger may still
-        move within the goal's tolerance. A joint without a velocity counts as resting.
+        A controller ends a goal some milliseconds before the last joint states arrive, and a finger may still move
+        within the goal tolerance. A joint without velocity counts as at rest.
 
         Args:
-            names: Joints.
-            stop_requested: Evaluated during the wait; True ends it.
+            names: Joint names.
+            stop_requested: Function polled during the wait; True ends the wait.
         """
-        joints, begun_s = tuple(names), time.monotonic()
+        joints, start_s = tuple(names), time.monotonic()
         if self._time.enabled:
-            return self._rests_in_held_time(joints, stop_requested)
-        wait_until(lambda: stop_requested() or self._at_rest_since(joints, begun_s), REST_TIMEOUT_S)
-        return self._at_rest_since(joints, begun_s)
+            return self._wait_for_rest_in_held_time(joints, stop_requested)
+        wait_until(lambda: stop_requested() or self._at_rest_since(joints, start_s), REST_TIMEOUT_S)
+        return self._at_rest_since(joints, start_s)
 
-    def _rests_in_held_time(self, joints: tuple[str, ...], stop_requested: Callable[[], bool]) -> bool:
-        """As `wait_for_rest`, asking for simulated time to pass, so that the same states are looked at every time."""
+    def _wait_for_rest_in_held_time(self, joints: tuple[str, ...], stop_requested: Callable[[], bool]) -> bool:
+        """Waits as `wait_for_rest` while stepping simulated time, so that repeated runs check the same states."""
 
-        def rests() -> bool:
+        def is_done() -> bool:
             self.catch_up()
             return stop_requested() or self._at_rest_since(joints, 0.0)
 
-        return self._time.wait_until(rests, REST_TIMEOUT_S, REST_PERIOD_S)
+        return self._time.wait_until(is_done, REST_TIMEOUT_S, REST_PERIOD_S)
 
     def message(self, names: Iterable[str]) -> JointState:
-        """Makes a joint state message of some joints, as they are now."""
+        """Returns the current state of joints as a message."""
         self.catch_up()
         positions = self.positions(names)
         state = JointState(name=list(positions), position=list(positions.values()))
         state.header.stamp = rospy.Time.now()
         return state
 
-    def _at_rest_since(self, names: Iterable[str], begun_s: float) -> bool:
+    def _at_rest_since(self, names: Iterable[str], start_s: float) -> bool:
         with self._lock:
             return all(
-                self._received.get(name, 0.0) > begun_s and abs(self._velocities.get(name, 0.0)) < REST_SPEED
+                self._received.get(name, 0.0) > start_s and abs(self._velocities.get(name, 0.0)) < REST_SPEED
                 for name in names
             )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reasons for failed plans, which move_group publishes beside its error codes."""
+"""Receives the reasons of failed plans, which move_group publishes in addition to its error codes."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from std_msgs.msg import String
 from modular_framework_ros.calls import wait_until
 
 REPORT_TOPIC = "move_group/planning_report"
-REPORT_WAIT_S = 2.0  # for the report of a move_group that publishes them, on a busy machine
-UNKNOWN_REPORTER_WAIT_S = 0.3  # where no publisher of reports is known
+REPORT_WAIT_S = 2.0  # for a report on a busy machine, if a publisher of reports is connected
+UNKNOWN_REPORTER_WAIT_S = 0.3  # if no publisher of reports is connected
 MAX_REPORTS = 64
 
 
@@ -32,10 +32,10 @@ class PlanningReports:
         self._subscriber = rospy.Subscriber(REPORT_TOPIC, String, self._on_report, queue_size=10)
 
     def reason_of(self, request: str) -> str:
-        """Returns why a plan failed; empty when move_group does not report it in time.
+        """Returns the reason of a failed plan, or "" if move_group does not report it in time.
 
         Args:
-            request: Name of the request for the plan.
+            request: Name of the planning request.
         """
         is_published = self._subscriber is not None and self._subscriber.get_num_connections() > 0
         wait_until(lambda: request in self._reports, REPORT_WAIT_S if is_published else UNKNOWN_REPORTER_WAIT_S)
