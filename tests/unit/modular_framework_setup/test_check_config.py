@@ -43,7 +43,7 @@ EDITS = {
         SRDF,
         'base_link="base" tip_link="palm"',
         'base_link="palm" tip_link="base"',
-        ("'base' does not hang below", "finger_1"),
+        ("'base' is not a descendant of", "finger_1"),
     ),
     "unknown group of a state": Edit(SRDF, 'name="home" group="arm"', 'name="home" group="arms"', ("'arms'", "'arm'")),
     "state out of its group": Edit(
@@ -71,7 +71,7 @@ EDITS = {
     "kinematics of no group": Edit(IK, "arm:", "arn:", ("group 'arn'", "did you mean 'arm'")),
     "solver": Edit(IK, "KDLKinematicsPlugin", "KDLKinematicPlugin", ("kinematics_solver", "KDLKinematicsPlugin'?")),
     "limits of no joint": Edit(LIMITS, "pan:", "pn:", ("joint 'pn'", "did you mean 'pan'")),
-    "no velocity": Edit(LIMITS, "true\n    max_velocity: 1.5", "true", ("is true and there is no max_velocity",)),
+    "no velocity": Edit(LIMITS, "true\n    max_velocity: 1.5", "true", ("is true, but max_velocity is missing",)),
     "wider than the URDF": Edit(
         LIMITS,
         "pan:\n    has_velocity_limits: true\n    max_velocity: 1.5",
@@ -94,14 +94,14 @@ EDITS = {
         HARDWARE,
         "arm_controller:",
         "arms_controller:",
-        ("'arm_controller' is none", "'arms_controller'"),
+        ("'arm_controller' is not a hardware", "'arms_controller'"),
         file=MOVEIT,
         lower=-1,
     ),  # fmt: skip
     "joints of the hardware's": Edit(
-        HARDWARE, "    - elbow\n", "", ("other joints", "only here: elbow"), file=MOVEIT, lower=-6
+        HARDWARE, "    - elbow\n", "", ("different joints", "only here: elbow"), file=MOVEIT, lower=-6
     ),
-    "action of the hardware's": Edit(MOVEIT, "gripper_cmd", "gripper_action", ("offers gripper_cmd",)),
+    "action of the hardware's": Edit(MOVEIT, "gripper_cmd", "gripper_action", ("has the action gripper_cmd",)),
     "planner": Edit(OMPL, "    - RRTConnect", "    - RRTConect", ("planner configuration 'RRTConect'", "'RRTConnect'")),
     "planner's type": Edit(OMPL, "geometric::RRTConnect", "geometric::RTConnect", ("'geometric::RRTConnect'",)),
     "planners of no group": Edit(OMPL, "arm:", "arn:", ("group 'arn'", "did you mean 'arm'")),
@@ -227,7 +227,7 @@ def test_a_posture_in_collision_is_a_fault_at_the_state_or_the_robot(small: Smal
     small.path(SRDF).write_text(re.sub("<group_state .*?</group_state>", "", srdf, flags=re.DOTALL))
     (fault,) = small.faults()
     assert fault.location.line == 2
-    for words in ("no state is named", "the default posture is in collision", "'turret'", "'stick'"):
+    for words in ("there is no named state", "the default state is in collision", "'turret'", "'stick'"):
         assert words in fault.message
 
 

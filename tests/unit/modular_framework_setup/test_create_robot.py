@@ -328,7 +328,7 @@ def test_nothing_is_overwritten(package_path: Path, capsys: pytest.CaptureFixtur
         (
             CRANE.replace("</robot>", '<link name="alone"/></robot>'),
             (),
-            "2 links have no joint above them (base, alone)",
+            "2 links have no parent joint (base, alone)",
         ),
         (CRANE.replace('<parent link="boom"', '<parent link="bom"'), (), "link 'bom' is unknown; allowed: base, "),
         (CRANE.replace('<axis xyz="0 0 1"', '<axis xyz="0 0 0"'), (), "joint 'pan': its axis is 0 0 0; give it a"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks controllers against the robot, against the groups, and those of MoveIt against those of the hardware."""
+"""Checks controllers against the robot and the groups, and MoveIt's controllers against the hardware's."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ from modular_framework_setup.config_files.yaml_files import is_open, plain_text
 
 KINDS = (*ACTION_KINDS, "ParallelGripperCommand")
 ACTIONS = ("follow_joint_trajectory", "gripper_cmd", "gripper_action", "joint_trajectory_action")
-# end of a hardware controller's type: types and action of the MoveIt side
-OFFERS = {
+# suffix of a hardware controller's type: matching types and action in MoveIt
+MATCHES = {
     "JointTrajectoryController": ((TRAJECTORY,), "follow_joint_trajectory"),
     "GripperActionController": ((GRIPPER, "ParallelGripperCommand"), "gripper_cmd"),
 }
 
 
 class ControllerChecker:
-    """Checks the controllers of all files together.
+    """Checks the controllers of all files.
 
     Args:
-        tree: of the robot.
-        semantics: of the SRDF; None where it cannot be read.
-        faults: where faults are noted.
+        tree: Kinematic tree of the robot.
+        semantics: Groups and states of the SRDF; None if unreadable.
+        faults: Receives the faults.
     """
 
     def __init__(self, tree: RobotTree, semantics: Semantics | None, faults: FaultList) -> None:
         self._tree, self._semantics, self._faults = tree, semantics, faults
-        self._listed: list[list[MoveItController]] = []
+        self._moveit_files: list[list[MoveItController]] = []
         self._hardware: list[HardwareController] = []
 
     def add_file(self, file_name: str, top: Mapping) -> None:
-        """Checks what one file says by itself."""
+        """Checks one file on its own."""
         is_fake = file_name.startswith("fake")
         if names_moveit_controllers(top):
-            found = moveit_controllers(top, self._faults)
-            self._check_listed(found, FAKE_KINDS if is_fake else KINDS, is_fake)
+            controllers = moveit_controllers(top, self._faults)
+            self._check_listed(controllers, FAKE_KINDS if is_fake else KINDS, is_fake)
             if is_fake:
                 self._check_initial(top)
             else:
-                self._listed.append(found)
+                self._moveit_files.append(controllers)
         else:
             hardware = hardware_controllers(top)
             for item in hardware:
@@ -60,9 +60,9 @@ class ControllerChecker:
             self._hardware += hardware
 
     def check_together(self) -> None:
-        """Checks what the files say together."""
+        """Checks that all files agree."""
         moving = [item for item in self._hardware if item.moves]
-        for controllers in self._listed:
+        for controllers in self._moveit_files:
             for controller in controllers:
                 if moving and not is_open(controller.name):
                     self._check_hardware(controller, moving)
@@ -77,9 +77,9 @@ class ControllerChecker:
                 movable = [joint.name for joint in self._tree.robot.movable_joints()]
                 self._faults.add_unknown(where, f"{owner}: joint", name, movable)
             elif self._tree.joints[name].kind == "fixed":
-                self._faults.add(where, f"{owner}: joint '{name}' is a fixed one, which nothing moves; remove it")
+                self._faults.add(where, f"{owner}: joint '{name}' is fixed and cannot move; remove it")
             if name in seen:
-                self._faults.add(where, f"{owner}: joint '{name}' is listed twice; remove it once")
+                self._faults.add(where, f"{owner}: joint '{name}' is listed twice; remove one entry")
             seen.add(name)
 
     def _check_listed(self, controllers: Sequence[MoveItController], kinds: Sequence[str], is_fake: bool) -> None:
@@ -91,18 +91,18 @@ class ControllerChecker:
             if not is_open(kind) and kind not in kinds and not (is_fake and not kind):
                 self._faults.add_unknown(where, f"{owner}: type", kind, kinds)
             self._check_action(item)
-            for joint, at in item.joints if item.is_default else ():
+            for joint, location in item.joints if item.is_default else ():
                 other = claims.setdefault(joint, item)
                 if other is not item and not is_open(joint):
                     self._faults.add(
-                        at,
-                        f"{owner}: joint '{joint}' belongs to default controller '{other.name}' "
-                        f"(line {other.location.line}) too; one default controller may move a joint; write "
+                        location,
+                        f"{owner}: joint '{joint}' also belongs to default controller '{other.name}' "
+                        f"(line {other.location.line}); a joint may have only one default controller; write "
                         "default: false for one of them",
                     )
 
     def _check_action(self, item: MoveItController) -> None:
-        """Any name may be right; one that is nearly a usual one is not."""
+        """Reports an action name that is similar to a usual name; other names may be intended."""
         if item.action_ns is None:
             return
         action, where = item.action_ns
@@ -110,7 +110,7 @@ class ControllerChecker:
             self._faults.add_unknown(where, f"controller '{item.name}': action_ns", action, ACTIONS)
 
     def _check_initial(self, top: Mapping) -> None:
-        """Checks the states that fake controllers begin in."""
+        """Checks the initial states of fake controllers."""
         initial = top.entries.get("initial")
         if self._semantics is None or not isinstance(initial, YamlSequence):
             return
@@ -129,59 +129,68 @@ class ControllerChecker:
         if not controller.name:
             return
         names = [item.name for item in moving]
-        found = next((item for item in moving if item.name == controller.name.rsplit("/", 1)[-1]), None)
-        if found is None:
+        hardware = next((item for item in moving if item.name == controller.name.rsplit("/", 1)[-1]), None)
+        if hardware is None:
             files = ", ".join(dict.fromkeys(item.location.file for item in moving))
             self._faults.add(
                 controller.location,
-                f"controller '{controller.name}' is none of the hardware's ({files}); {listing(names)}"
-                f"{nearest(controller.name, names)}; name the same controllers on both sides",
+                f"controller '{controller.name}' is not a hardware controller ({files}); {listing(names)}"
+                f"{nearest(controller.name, names)}; use the same names on both sides",
             )
             return
-        where = f"{found.location.file}:{found.location.line}"
-        kinds, action = next(offer for ending, offer in OFFERS.items() if found.kind.endswith(ending))
+        where = f"{hardware.location.file}:{hardware.location.line}"
+        kinds, action = next(match for suffix, match in MATCHES.items() if hardware.kind.endswith(suffix))
         if controller.kind[0] in KINDS and controller.kind[0] not in kinds:
             self._faults.add(
                 controller.kind[1],
-                f"controller '{controller.name}' has type {controller.kind[0]}, and the hardware's ({where}) is a "
-                f"{found.kind}; allowed for it: {' or '.join(kinds)}; correct one of them",
+                f"controller '{controller.name}' has type {controller.kind[0]}, but the hardware's ({where}) is a "
+                f"{hardware.kind}, which requires {' or '.join(kinds)}; correct one of them",
             )
         elif controller.action_ns and controller.action_ns[0] in ACTIONS and controller.action_ns[0] != action:
             self._faults.add(
                 controller.action_ns[1],
-                f"controller '{controller.name}' has action_ns {controller.action_ns[0]}, and the hardware's "
-                f"({where}), a {found.kind}, offers {action}; correct it",
+                f"controller '{controller.name}' has action_ns {controller.action_ns[0]}, but the hardware's "
+                f"({where}), a {hardware.kind}, has the action {action}; correct it",
             )
-        if found.joints and {name for name, _ in controller.joints} != {name for name, _ in found.joints}:
-            self._check_same_joints(controller, found)
+        if hardware.joints and {name for name, _ in controller.joints} != {name for name, _ in hardware.joints}:
+            self._check_same_joints(controller, hardware)
 
-    def _check_same_joints(self, controller: MoveItController, found: HardwareController) -> None:
-        ours, theirs = ({name for name, _ in item.joints} for item in (controller, found))
-        if any(map(is_open, ours)) or (controller.kind[0] != TRAJECTORY and theirs <= ours):
+    def _check_same_joints(self, controller: MoveItController, hardware: HardwareController) -> None:
+        moveit_joints, hardware_joints = ({name for name, _ in item.joints} for item in (controller, hardware))
+        if any(map(is_open, moveit_joints)) or (controller.kind[0] != TRAJECTORY and hardware_joints <= moveit_joints):
             return  # a gripper is commanded by one of its joints
-        only = [f"only here: {', '.join(sorted(ours - theirs))}"] if ours - theirs else []
-        only += [f"only there: {', '.join(sorted(theirs - ours))}"] if theirs - ours else []
+        only = (
+            [f"only here: {', '.join(sorted(moveit_joints - hardware_joints))}"]
+            if moveit_joints - hardware_joints
+            else []
+        )
+        only += (
+            [f"only there: {', '.join(sorted(hardware_joints - moveit_joints))}"]
+            if hardware_joints - moveit_joints
+            else []
+        )
         self._faults.add(
             controller.location,
-            f"controller '{controller.name}' moves other joints than the hardware's of this name "
-            f"({found.location.file}:{found.location.line}); {'; '.join(only)}; list the same joints",
+            f"controller '{controller.name}' and the hardware controller of this name "
+            f"({hardware.location.file}:{hardware.location.line}) move different joints; {'; '.join(only)}; "
+            "list the same joints",
         )
 
     def _check_groups(self) -> None:
-        """Notes groups whose joints are moved in part; one that no controller moves may be meant so."""
+        """Reports groups of which controllers move only a part; a group without controllers may be intended."""
         if self._semantics is None:
             return
         for group in self._semantics.groups.values():
-            moved = [self._moved(controllers) & set(group.active) for controllers in self._listed]
+            moved = [self._moved(controllers) & set(group.active) for controllers in self._moveit_files]
             best = max(moved, key=len, default=set())
             if not best or len(best) == len(group.active):
                 continue
             missing = [joint for joint in group.active if joint not in best]
-            first = self._listed[moved.index(best)][0].location
+            first = self._moveit_files[moved.index(best)][0].location
             self._faults.add(
                 first,
-                f"no controller in this file moves {', '.join(missing)} of group '{group.name}', while others of its "
-                f"joints are moved; add {'it' if len(missing) == 1 else 'them'} to a controller",
+                f"no controller in this file moves {', '.join(missing)} of group '{group.name}', but controllers move "
+                f"its other joints; add {'it' if len(missing) == 1 else 'them'} to a controller",
             )
 
     @staticmethod

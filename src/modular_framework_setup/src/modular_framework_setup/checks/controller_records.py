@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The controllers that a config package names: those MoveIt sends goals to, and those of the hardware."""
+"""Reads the controllers in a config package: MoveIt's and the hardware's."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ MOTION_TYPES = ("JointTrajectoryController", "GripperActionController", "Paralle
 
 @dataclass(frozen=True, slots=True)
 class NamedController:
-    """A controller that a file names.
+    """A controller in a file.
 
     Attributes:
-        location: of its entry in the file.
-        joints: it moves, each where the file names it.
+        name: Name of the controller.
+        location: Location of the file entry.
+        joints: Joint names with their locations.
     """
 
     name: str
@@ -31,12 +32,12 @@ class NamedController:
 
 @dataclass(frozen=True, slots=True)
 class MoveItController(NamedController):
-    """A controller that motions are sent to.
+    """A controller that receives motions from MoveIt.
 
     Attributes:
-        kind: its type; empty when none is given.
-        action_ns: name of its action; None when none is given.
-        is_default: whether MoveIt prefers it to others of the same joints.
+        kind: Type and its location; "" without a type.
+        action_ns: Name of the action and its location, or None.
+        is_default: Whether MoveIt prefers this controller for its joints.
     """
 
     kind: Located
@@ -46,23 +47,27 @@ class MoveItController(NamedController):
 
 @dataclass(frozen=True, slots=True)
 class HardwareController(NamedController):
-    """A controller of ros_control or ros2_control; `kind` is its type."""
+    """A controller of ros_control or ros2_control.
+
+    Attributes:
+        kind: Controller type.
+    """
 
     kind: str
 
     @property
     def moves(self) -> bool:
-        """Whether it executes motions."""
+        """Whether the controller executes motions."""
         return self.kind.endswith(MOTION_TYPES)
 
 
 def names_moveit_controllers(top: Mapping) -> bool:
-    """Whether a file lists controllers for MoveIt."""
+    """Returns whether a file lists MoveIt controllers."""
     return "controller_list" in top.entries or SIMPLE in top.entries
 
 
 def moveit_controllers(top: Mapping, faults: FaultList) -> list[MoveItController]:
-    """Returns the controllers of a file of MoveIt 1 (controller_list) or MoveIt 2 (controller_names)."""
+    """Returns the controllers in a file of MoveIt 1 (controller_list) or MoveIt 2 (controller_names)."""
     if "controller_list" in top.entries:
         return list(_of_list(top.entries["controller_list"], faults))
     section = top.entries[SIMPLE]
@@ -73,24 +78,24 @@ def _of_list(node: Node, faults: FaultList) -> Iterator[MoveItController]:
     if not isinstance(node, Sequence):
         faults.add(node.location, f"controller_list is {kind_of(node)}; expected a list with name, joints and type")
         return
-    for number, entry in enumerate(node.items):
-        if isinstance(entry, Mapping) and "name" in entry.entries:  # "" stands for a controller of the root namespace
+    for index, entry in enumerate(node.items):
+        if isinstance(entry, Mapping) and "name" in entry.entries:  # "" is a controller in the root namespace
             yield _controller(plain_text(entry.entries["name"]), entry.location, entry, faults)
         else:
-            faults.add(entry.location, f"controller_list[{number}] has no name; add it")
+            faults.add(entry.location, f"controller_list[{index}] has no name; add it")
 
 
 def _of_names(section: Mapping, faults: FaultList) -> Iterator[MoveItController]:
-    found = {key: value for key, _, value in mappings(section)}
-    named = texts(section.entries.get("controller_names"))
-    for name, where in named:
-        if name in found:
-            yield _controller(name, section.keys[name], found[name], faults)
+    entries = {key: value for key, _, value in mappings(section)}
+    listed = texts(section.entries.get("controller_names"))
+    for name, where in listed:
+        if name in entries:
+            yield _controller(name, section.keys[name], entries[name], faults)
         else:
-            faults.add_unknown(where, "controller_names: controller", name, found)
-    for name in found.keys() - {name for name, _ in named}:
+            faults.add_unknown(where, "controller_names: controller", name, entries)
+    for name in entries.keys() - {name for name, _ in listed}:
         faults.add_unknown(
-            section.keys[name], "controller_names leaves out this controller:", name, [item for item, _ in named]
+            section.keys[name], "controller_names omits this controller:", name, [item for item, _ in listed]
         )
 
 
@@ -111,7 +116,7 @@ def _controller(name: str, where: SourceLocation, entry: Mapping, faults: FaultL
 
 
 def hardware_controllers(top: Mapping) -> list[HardwareController]:
-    """Returns the controllers of a file of ros_control, or of ros2_control (ros__parameters)."""
+    """Returns the controllers in a file of ros_control, or of ros2_control (ros__parameters)."""
     manager = top.entries.get("controller_manager")
     parameters = manager.entries.get("ros__parameters") if isinstance(manager, Mapping) else None
     if isinstance(parameters, Mapping):
@@ -120,27 +125,27 @@ def hardware_controllers(top: Mapping) -> list[HardwareController]:
             for name, where, entry in mappings(parameters)
             if "type" in entry.entries
         ]
-    found = []
+    controllers = []
     for name, where, entry in mappings(top):
         if "/" in plain_text(entry.entries.get("type")):
-            found.append(HardwareController(name, where, _joints(entry), plain_text(entry.entries["type"])))
-        else:  # controllers in the namespace of a robot
-            found += [
-                HardwareController(inner, at, _joints(below), plain_text(below.entries["type"]))
-                for inner, at, below in mappings(entry)
-                if "/" in plain_text(below.entries.get("type"))
+            controllers.append(HardwareController(name, where, _joints(entry), plain_text(entry.entries["type"])))
+        else:  # controllers in a robot's namespace
+            controllers += [
+                HardwareController(key, location, _joints(settings), plain_text(settings.entries["type"]))
+                for key, location, settings in mappings(entry)
+                if "/" in plain_text(settings.entries.get("type"))
             ]
-    return found
+    return controllers
 
 
 def _settings(top: Mapping, name: str) -> Mapping | None:
     entry = top.entries.get(name)
-    below = entry.entries.get("ros__parameters") if isinstance(entry, Mapping) else None
-    return below if isinstance(below, Mapping) else None
+    parameters = entry.entries.get("ros__parameters") if isinstance(entry, Mapping) else None
+    return parameters if isinstance(parameters, Mapping) else None
 
 
 def _joints(entry: Mapping | None) -> tuple[Located, ...]:
     if entry is None:
         return ()
-    found = texts(entry.entries.get("joints")) + texts(entry.entries.get("joint"))
-    return tuple((name, where) for name, where in found if not is_open(name))
+    joints = texts(entry.entries.get("joints")) + texts(entry.entries.get("joint"))
+    return tuple((name, where) for name, where in joints if not is_open(name))

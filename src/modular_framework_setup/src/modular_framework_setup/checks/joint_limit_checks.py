@@ -9,7 +9,7 @@ from modular_framework_setup.config_files.robot_tree import END_M, RobotTree
 from modular_framework_setup.config_files.yaml_files import is_open, read_number, read_truth
 from modular_framework_urdf.robot import Joint
 
-# flag: what it needs
+# flag: required keys
 LIMITS = {
     "has_position_limits": ("min_position", "max_position"),
     "has_velocity_limits": ("max_velocity",),
@@ -21,23 +21,29 @@ LIMITS = {
 }
 OTHER_KEYS = ("angle_wraparound", "has_deceleration", "min_velocity", "min_acceleration")
 KEYS = (*LIMITS, *(key for keys in LIMITS.values() for key in keys), *OTHER_KEYS)
-ABOVE_0 = ("max_velocity", "max_acceleration", "max_jerk", "max_effort")
+POSITIVE_KEYS = ("max_velocity", "max_acceleration", "max_jerk", "max_effort")
 TOP_KEYS = (
     "joint_limits", "cartesian_limits", "default_velocity_scaling_factor", "default_acceleration_scaling_factor",
 )  # fmt: skip
 CARTESIAN_KEYS = ("max_trans_vel", "max_trans_acc", "max_trans_dec", "max_rot_vel", "max_rot_acc", "max_rot_dec")
-VELOCITY_SHARE = 1.0e-3  # a velocity this share above the URDF's is that velocity, rounded
+VELOCITY_TOLERANCE = 1.0e-3  # relative; covers rounded values of the URDF's velocity
 
 
 def check_joint_limits(top: Mapping, tree: RobotTree, faults: FaultList) -> None:
-    """Checks the contents of joint_limits.yaml."""
+    """Checks the content of joint_limits.yaml.
+
+    Args:
+        top: Content of the file.
+        tree: Kinematic tree of the robot.
+        faults: Receives the faults.
+    """
     for key, node in top.entries.items():
         if key not in TOP_KEYS:
             faults.add_unknown(top.keys[key], "key", key, TOP_KEYS)
         elif key.startswith("default_"):
             value = read_number(node, key, faults)
             if value is not None and not 0.0 < value <= 1.0:
-                faults.add(node.location, f"{key} is {value:g}; allowed: above 0, at most 1; correct it")
+                faults.add(node.location, f"{key} is {value:g}; it must be above 0 and at most 1")
     limits = top.entries.get("joint_limits")
     if not isinstance(limits, Mapping):
         return
@@ -49,7 +55,7 @@ def check_joint_limits(top: Mapping, tree: RobotTree, faults: FaultList) -> None
         if name not in tree.joints:
             faults.add_unknown(where, "joint_limits: joint", name, movable)
         elif not isinstance(node, Mapping):
-            faults.add(where, f"joint_limits: '{name}' is {kind_of(node)}; expected its limits, as max_velocity: 1.0")
+            faults.add(where, f"joint_limits: '{name}' is {kind_of(node)}; expected limits such as max_velocity: 1.0")
         else:
             _JointChecker(tree.joints[name], node, faults).check()
 
@@ -80,13 +86,13 @@ class _JointChecker:
         if node is None:
             if flag in self._entry.entries:
                 where = self._entry.keys[flag]
-                self._faults.add(where, f"{self._what}: {flag} is true and there is no {key}; add it, or write false")
+                self._faults.add(where, f"{self._what}: {flag} is true, but {key} is missing; add it, or write false")
             return
         value = read_number(node, f"{self._what}: {key}", self._faults)
         if value is None:
             return
         where = self._entry.keys[key]
-        if key in ABOVE_0 and value <= 0.0:
+        if key in POSITIVE_KEYS and value <= 0.0:
             self._faults.add(where, f"{self._what}: {key} is {value:g}; it must be above 0")
         elif key == "max_deceleration" and value >= 0.0:
             self._faults.add(where, f"{self._what}: {key} is {value:g}; it must be below 0")
@@ -98,8 +104,8 @@ class _JointChecker:
         if limit is None:
             return
         wider = f"{self._what}: {key} {value:g} is wider than the URDF's"
-        rule = "this file counts, and the robot may not follow"
-        if key == "max_velocity" and limit.velocity and value > limit.velocity * (1.0 + VELOCITY_SHARE):
+        rule = "MoveIt uses this value, and the robot may not follow"
+        if key == "max_velocity" and limit.velocity and value > limit.velocity * (1.0 + VELOCITY_TOLERANCE):
             self._faults.add(where, f"{wider} {limit.velocity:g}; {rule}; allowed: at most {limit.velocity:g}")
         if self._joint.kind not in ("revolute", "prismatic"):
             return
@@ -111,7 +117,7 @@ class _JointChecker:
         if is_outside:
             self._faults.add(
                 where,
-                f"{self._what}: {key} {value:g} leaves no room; allowed by the URDF: {limit.lower:g} to "
+                f"{self._what}: {key} {value:g} leaves no range; allowed by the URDF: {limit.lower:g} to "
                 f"{limit.upper:g}; correct it",
             )
 
@@ -120,8 +126,8 @@ def check_cartesian_limits(top: Mapping, faults: FaultList) -> None:
     """Checks `cartesian_limits` of cartesian_limits.yaml or pilz_cartesian_limits.yaml."""
     limits = top.entries.get("cartesian_limits")
     if not isinstance(limits, Mapping):
-        found = ", ".join(top) or "nothing"
-        faults.add(top.location, f"there is no mapping 'cartesian_limits'; found: {found}; add it")
+        keys = ", ".join(top) or "nothing"
+        faults.add(top.location, f"there is no mapping 'cartesian_limits'; found: {keys}; add it")
         return
     for key, node in limits.entries.items():
         if key not in CARTESIAN_KEYS:

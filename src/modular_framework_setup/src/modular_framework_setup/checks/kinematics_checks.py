@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks kinematics.yaml: its groups, solvers and their settings."""
+"""Checks the groups, solvers and settings of kinematics.yaml."""
 
 from __future__ import annotations
 
@@ -31,11 +31,17 @@ _PLUGIN = re.compile(r"\w+/\w+")
 
 
 def check_kinematics(top: Mapping, semantics: Semantics, faults: FaultList) -> None:
-    """Checks the contents of kinematics.yaml."""
+    """Checks the content of kinematics.yaml.
+
+    Args:
+        top: Content of the file.
+        semantics: Groups of the SRDF.
+        faults: Receives the faults.
+    """
     top = parameters_of(top)
-    inner = top.entries.get("robot_description_kinematics")
-    for group, node in (inner if isinstance(inner, Mapping) else top).entries.items():
-        where = (inner if isinstance(inner, Mapping) else top).keys[group]
+    nested = top.entries.get("robot_description_kinematics")
+    for group, node in (nested if isinstance(nested, Mapping) else top).entries.items():
+        where = (nested if isinstance(nested, Mapping) else top).keys[group]
         if is_open(group):
             continue
         if group not in semantics.groups:
@@ -62,7 +68,7 @@ def _check_group(group: str, entry: Mapping, faults: FaultList) -> None:
 
 
 def _check_solver(group: str, entry: Mapping, faults: FaultList) -> None:
-    """Other plugins than those known here are allowed where they look like none of them."""
+    """Checks the solver plugin. An unknown plugin is allowed unless it resembles a known plugin."""
     solver, where = plain_text(entry.entries["kinematics_solver"]), entry.keys["kinematics_solver"]
     if solver in SOLVERS or is_open(solver):
         return
@@ -70,11 +76,11 @@ def _check_solver(group: str, entry: Mapping, faults: FaultList) -> None:
     is_of_known_package = any(package == known.partition("/")[0] for known in SOLVERS)
     is_plugin = _PLUGIN.fullmatch(solver) is not None
     is_ikfast = solver.endswith("IKFastKinematicsPlugin")
-    if not is_plugin or is_of_known_package or (not is_ikfast and closest(solver, SOLVERS) in _alike(solver)):
+    if not is_plugin or is_of_known_package or (not is_ikfast and closest(solver, SOLVERS) in _same_class(solver)):
         faults.add_unknown(where, f"group '{group}': kinematics_solver", solver, SOLVERS)
 
 
-def _alike(solver: str) -> list[str]:
-    """Returns the known solvers whose class has the same name: then the package is misspelt."""
+def _same_class(solver: str) -> list[str]:
+    """Returns the known solvers of the same class name, in which case the package is misspelt."""
     name = solver.partition("/")[2]
     return [known for known in SOLVERS if known.partition("/")[2] == name]

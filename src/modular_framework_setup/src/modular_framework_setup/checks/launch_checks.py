@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that the files which the launch files of a config package name are there."""
+"""Checks that the launch files of a config package refer to existing files."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _OWN_FILE = re.compile(r"^\$\((?P<base>find [\w-]+|dirname)\)(?P<path>/[^$\s]+)$
 
 
 def check_launch_files(package: ConfigPackage, faults: FaultList) -> None:
-    """Notes launch files that are not XML, and files of this package that they name and that are not there.
+    """Reports launch files that are not XML, and references to missing files of the package.
 
-    Paths with an argument in them, and other packages' files, are left to roslaunch.
+    Paths with arguments and files of other packages are not checked.
     """
     for path in package.launch_files():
         try:
@@ -29,18 +29,18 @@ def check_launch_files(package: ConfigPackage, faults: FaultList) -> None:
             continue
         for element in root.iter():
             for key, value in element.attrib.items():
-                named = _named_file(value, path, package) if _names_input(key, value) else None
-                if named is not None and not named.exists():
-                    there = sorted(item.name for item in named.parent.glob("*")) if named.parent.is_dir() else []
+                file = _named_file(value, path, package) if _names_input(key, value) else None
+                if file is not None and not file.exists():
+                    names = sorted(item.name for item in file.parent.glob("*")) if file.parent.is_dir() else []
                     faults.add(
                         SourceLocation(str(path), element.sourceline, 1),
-                        f"<{element.tag}> names {value}, and there is no such file{nearest(named.name, there)}; "
+                        f"<{element.tag}> names {value}, but there is no such file{nearest(file.name, names)}; "
                         "correct the name, or add the file",
                     )
 
 
 def _names_input(key: str, value: str) -> bool:
-    """Whether an attribute names a file to read; an argument may name one that is written, or a folder."""
+    """Returns whether an attribute names an input file; arguments may also name output files and folders."""
     return key in ("file", "textfile") or (key in ("default", "value") and value.endswith(INPUTS))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks a whole config package, and returns everything that is inconsistent at once."""
+"""Checks a whole config package and returns all faults at once."""
 
 from __future__ import annotations
 
@@ -34,14 +34,15 @@ from modular_framework_urdf.xml_text import XmlError
 
 @dataclass(frozen=True, slots=True)
 class CheckedPackage:
-    """A config package, as far as it could be read.
+    """A config package with its faults.
 
     Attributes:
-        tree: of its robot; None without a readable URDF.
-        semantics: groups of its SRDF; None without a readable one.
-        srdf: the whole SRDF; None without a readable one.
-        files: the YAML files, by the name of the file without its ending.
-        faults: all that is inconsistent, by file and line.
+        package: Files of the package.
+        tree: Kinematic tree of the robot; None if the URDF is unreadable.
+        semantics: Groups and states of the SRDF; None if unreadable.
+        srdf: Content of the SRDF; None if unreadable.
+        files: Contents of the YAML files, by file name without suffix.
+        faults: Faults sorted by file and line.
     """
 
     package: ConfigPackage
@@ -53,19 +54,16 @@ class CheckedPackage:
 
 
 def check_package(folder: Path) -> tuple[Fault, ...]:
-    """Checks a config package.
+    """Returns the faults of a config package, sorted by file and line.
 
     Args:
-        folder: of the package; it need not be built.
-
-    Returns:
-        All its faults by file and line; none when it is consistent.
+        folder: Folder of the package, which need not be built.
     """
     return read_and_check(folder).faults
 
 
 def read_and_check(folder: Path) -> CheckedPackage:
-    """Reads and checks a config package in a folder; it need not be built."""
+    """Reads and checks the config package in a folder, which need not be built."""
     faults = FaultList()
     with packages_beside(folder):
         package = read_config_package(folder, faults)
@@ -78,11 +76,11 @@ def read_and_check(folder: Path) -> CheckedPackage:
             check_postures(urdf, document, root, lambda uri: str(mesh_path(uri, find_package)), faults)
         files = _check_yaml_files(package, tree, semantics, faults)
         check_launch_files(package, faults)
-    return CheckedPackage(package, tree, semantics, _contents(document), files, faults.sorted())
+    return CheckedPackage(package, tree, semantics, _semantic_description(document), files, faults.sorted())
 
 
-def _contents(document: XmlDocument | None) -> SemanticDescription | None:
-    """Returns what the reader of the run time finds; None where it refuses the file, which a fault has said."""
+def _semantic_description(document: XmlDocument | None) -> SemanticDescription | None:
+    """Returns the SRDF as read at run time, or None if invalid, which is reported elsewhere."""
     try:
         return read_srdf(document.text, document.where) if document else None
     except XmlError:
@@ -92,7 +90,7 @@ def _contents(document: XmlDocument | None) -> SemanticDescription | None:
 def _check_yaml_files(
     package: ConfigPackage, tree: RobotTree | None, semantics: Semantics | None, faults: FaultList
 ) -> dict[str, Mapping]:
-    """Checks each file by what its name says it is; files of other names must be YAML, that is all."""
+    """Checks each YAML file according to its name. Files of unknown names only need valid YAML."""
     files = {}
     arguments = {**package.launch_arguments(), **package.xacro_arguments}
     controllers = ControllerChecker(tree, semantics, faults) if tree else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks the YAML files of planning pipelines: groups, planner configurations and projections."""
+"""Checks the groups, planner configurations and projections in the YAML files of planning pipelines."""
 
 from __future__ import annotations
 
@@ -18,14 +18,21 @@ PLANNER_TYPES = tuple(
         "EIRMstar  EITstar EST FMT InformedRRTstar KPIECE KPIECE1 LBKPIECE LBKPIECE1 LBTRRT LazyLBTRRT "
         "LazyPRM LazyPRMstar LazyRRT  PDST PRM PRMstar ProjEST QRRT RLRT BiRLRT RRT RRTConnect RRTXstatic "
         "RRTsharp RRTstar SBL SORRTstar SPARS SPARStwo  SST STRIDE SyCLoP TRRT TSRRT VFRRT pRRT pSBL SPARSdb "
-        "TrajOpt"  # the last: MoveIt's Setup Assistant writes it
+        "TrajOpt"  # written by MoveIt's Setup Assistant
     ).split()
 )
 _PROJECTION = re.compile(r"(joints|link)\((.*)\)")
 
 
 def check_planners(top: Mapping, tree: RobotTree, semantics: Semantics, faults: FaultList) -> None:
-    """Checks the contents of ompl_planning.yaml, or of another pipeline's file."""
+    """Checks the content of ompl_planning.yaml or of a different pipeline's file.
+
+    Args:
+        top: Content of the file.
+        tree: Kinematic tree of the robot.
+        semantics: Groups of the SRDF.
+        faults: Receives the faults.
+    """
     _Planners(parameters_of(top), tree, semantics, faults).check()
 
 
@@ -55,11 +62,11 @@ class _Planners:
             self._faults.add_unknown(where, "group", name, self._semantics.groups)
         listed = texts(entry.entries.get("planner_configs"))
         listed += texts(entry.entries.get("default_planner_config"))
-        for config, at in listed if self._configs else ():
+        for config, location in listed if self._configs else ():
             if config and config not in self._configs:
-                self._faults.add_unknown(at, f"group '{name}': planner configuration", config, self._configs)
-        for text, at in texts(entry.entries.get("projection_evaluator")):
-            self._check_projection(name, text, at)
+                self._faults.add_unknown(location, f"group '{name}': planner configuration", config, self._configs)
+        for text, location in texts(entry.entries.get("projection_evaluator")):
+            self._check_projection(name, text, location)
 
     def _check_projection(self, group: str, text: str, where: SourceLocation) -> None:
         match = _PROJECTION.fullmatch(text.strip())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that no named state is in collision, and the default posture neither if no state is named."""
+"""Checks that no named state is in collision, and without named states, that the default state is not."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from modular_framework_urdf.xml_text import Element
 def check_postures(
     urdf: XmlDocument, srdf: XmlDocument, root: Element, resolve: Callable[[str], str], faults: FaultList
 ) -> None:
-    """Checks the postures of a robot.
+    """Checks the named states of a robot for collisions. A robot that cannot be loaded is not checked.
 
     Args:
-        urdf: Robot description.
-        srdf: Semantic description.
-        root: Root element of the semantic description.
-        resolve: Returns the path of a mesh file, from its URI.
-        faults: Where faults are noted; not for a robot that cannot be loaded, which has faults of its own.
+        urdf: URDF document.
+        srdf: SRDF document.
+        root: Root element of the SRDF.
+        resolve: Function that returns the path of a mesh file from its URI.
+        faults: Receives the faults.
     """
     try:
         model = RobotModel(urdf.text, srdf.text, resolve=resolve)
@@ -39,26 +39,26 @@ def check_postures(
         if not states and (contacts := _contacts(model, default)):
             faults.add(
                 SourceLocation(srdf.where, root.sourceline, 1),
-                "no state is named to begin at, and the default posture is in collision: "
-                f"{describe_contacts(contacts)}; name a state, or disable the collisions of links that may touch",
+                "there is no named state, and the default state is in collision: "
+                f"{describe_contacts(contacts)}; add a named state, or disable the collisions of links that may touch",
             )
     except PlanningError:
         return
 
 
 def _check_state(model: RobotModel, element: Element, where: str, faults: FaultList) -> None:
-    """Checks one named state, for links that only the joints of the state move against each other."""
+    """Checks a named state for collisions between links whose relative pose the state determines."""
     group, name = element.get("group", ""), element.get("name", "")
     values = model.semantics.group_states.get(group, {}).get(name, {})
-    positions, placed = model.default_positions(), {model.index[joint] for joint in values if joint in model.index}
+    positions, set_joints = model.default_positions(), {model.index[joint] for joint in values if joint in model.index}
     for joint, value in values.items():
         if joint in model.index:
             positions[model.index[joint]] = value
-    placed |= {follower for follower, leader, _, _ in model.mimics if leader in placed}
+    set_joints |= {follower for follower, leader, _, _ in model.mimics if leader in set_joints}
     contacts = [
         contact
         for contact in _contacts(model, model.with_mimics(positions))
-        if placed.issuperset(_joints_between(model, contact))
+        if set_joints.issuperset(_joints_between(model, contact))
     ]
     if contacts:
         faults.add(
@@ -69,9 +69,9 @@ def _check_state(model: RobotModel, element: Element, where: str, faults: FaultL
 
 
 def _joints_between(model: RobotModel, contact: Contact) -> set[int]:
-    """Returns the indices of the joints that move two links against each other."""
-    one, other = (set(model.joints_above(body.name)) for body in (contact.first, contact.second))
-    return {model.index[joint] for joint in one ^ other}
+    """Returns the indices of the joints that determine the relative pose of two links."""
+    first, second = (set(model.joints_above(body.name)) for body in (contact.first, contact.second))
+    return {model.index[joint] for joint in first ^ second}
 
 
 def _contacts(model: RobotModel, positions: Array) -> list[Contact]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks the sensors of the octomap, by the reader that reads them at run time."""
+"""Checks the octomap's sensors with the reader used at run time."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from modular_framework_core.files.located_yaml import Mapping, Scalar, Sequence,
 from modular_framework_planning.perception.sensor_settings import read_sensors
 from modular_framework_setup.config_files.yaml_files import is_open, parameters_of
 
-_NUMBER = re.compile(r"sensors\[\d+\]: ")
+_INDEX_PREFIX = re.compile(r"sensors\[\d+\]: ")
 
 
 def check_sensors(top: Mapping, faults: FaultList) -> None:
-    """Checks sensors_3d.yaml: a list of sensors, or (ROS 2) a list of names of sensors in the same file."""
+    """Checks sensors_3d.yaml: a list of sensors or, in ROS 2, a list of names of sensors in the same file."""
     top = parameters_of(top)
     sensors = top.entries.get("sensors")
     if not isinstance(sensors, Sequence):
-        found = "nothing" if sensors is None else kind_of(sensors)
-        faults.add(sensors.location if sensors else top.location, f"sensors is {found}; expected a list of sensors")
+        kind = "nothing" if sensors is None else kind_of(sensors)
+        faults.add(sensors.location if sensors else top.location, f"sensors is {kind}; expected a list of sensors")
         return
     for item in sensors.items:
         entry = item
@@ -31,4 +31,4 @@ def check_sensors(top: Mapping, faults: FaultList) -> None:
         if isinstance(entry, Mapping) and any(isinstance(v, str) and is_open(v) for v in entry.plain().values()):
             continue
         for text in read_sensors([entry.plain()], None)[1]:
-            faults.add(entry.location, f"sensor: {_NUMBER.sub('', text)}; correct it")
+            faults.add(entry.location, f"sensor: {_INDEX_PREFIX.sub('', text)}; correct it")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks an SRDF against the robot: states, end effectors, virtual and passive joints, and the collision matrix."""
+"""Checks the groups, states, end effectors, joints and collision pairs of an SRDF against the robot."""
 
 from __future__ import annotations
 
@@ -19,22 +19,19 @@ ELEMENTS = (
 
 
 def check_srdf(root: Element, where: str, tree: RobotTree, faults: FaultList) -> Semantics:
-    """Checks an SRDF.
+    """Checks an SRDF and returns its groups, states and virtual joints.
 
     Args:
-        root: of the document.
-        where: its file, for messages.
-        tree: of the robot.
-        faults: where faults are noted.
-
-    Returns:
-        What the checks of other files need of it.
+        root: Root element of the SRDF.
+        where: Path of the SRDF, for messages.
+        tree: Kinematic tree of the robot.
+        faults: Receives the faults.
     """
     return _SrdfChecker(root, where, tree, faults).check()
 
 
 class _SrdfChecker:
-    """Checks one document."""
+    """Checks one SRDF."""
 
     def __init__(self, root: Element, where: str, tree: RobotTree, faults: FaultList) -> None:
         self._root, self._where, self._tree, self._faults = root, where, tree, faults
@@ -58,50 +55,52 @@ class _SrdfChecker:
         self._check_pairs()
         return Semantics(groups, {name: frozenset(items) for name, items in states.items()}, frozenset(virtual))
 
-    def _at(self, element: Element) -> SourceLocation:
+    def _location(self, element: Element) -> SourceLocation:
         return SourceLocation(self._where, element.sourceline, 1)
 
     def _check_top(self) -> None:
         name, robot = self._root.get("name", ""), self._tree.robot.name
         if name != robot:
             self._faults.add(
-                self._at(self._root),
-                f"the SRDF is for robot '{name}', and the URDF ({self._tree.file}) describes '{robot}'; both names "
+                self._location(self._root),
+                f"the SRDF is for robot '{name}', but the URDF ({self._tree.file}) describes '{robot}'; both names "
                 "must be the same; correct one of them",
             )
         for element in self._root:
             if isinstance(element.tag, str) and element.tag not in ELEMENTS:
-                self._faults.add_unknown(self._at(element), "element", element.tag, ELEMENTS)
+                self._faults.add_unknown(self._location(element), "element", element.tag, ELEMENTS)
 
     def _check_name(self, element: Element, key: str, what: str, allowed: Iterable[str]) -> bool:
         name = (element.get(key) or "").strip()
         if not name:
-            self._faults.add(self._at(element), f"<{element.tag}> has no attribute '{key}'; add it")
+            self._faults.add(self._location(element), f"<{element.tag}> has no attribute '{key}'; add it")
             return False
         if name not in allowed:
-            self._faults.add_unknown(self._at(element), f"<{element.tag}>: {what}", name, allowed)
+            self._faults.add_unknown(self._location(element), f"<{element.tag}>: {what}", name, allowed)
             return False
         return True
 
     def _check_state(self, element: Element, groups: Mapping[str, PlanningGroup], states: dict[str, set[str]]) -> None:
         name, group_name = element.get("name", ""), element.get("group", "")
         if not name:
-            self._faults.add(self._at(element), "a <group_state> has no name; give it one")
+            self._faults.add(self._location(element), "a <group_state> has no name; give it one")
         if not self._check_name(element, "group", "group", groups):
             return
         if name in states.setdefault(group_name, set()):
-            self._faults.add(self._at(element), f"group '{group_name}' has two states '{name}'; rename one of them")
+            self._faults.add(
+                self._location(element), f"group '{group_name}' has two states '{name}'; rename one of them"
+            )
         states[group_name].add(name)
-        group, given = groups[group_name], set()
+        group, joints = groups[group_name], set()
         for item in element.findall("joint"):
-            given.add(item.get("name", ""))
+            joints.add(item.get("name", ""))
             self._check_state_joint(item, f"state '{name}' of group '{group_name}'", group)
-        missing = [joint for joint in group.active if joint not in given]
+        missing = [joint for joint in group.active if joint not in joints]
         if missing and group.is_whole:
             self._faults.add(
-                self._at(element),
-                f"state '{name}' of group '{group_name}' has no value for {', '.join(missing)}; a value for each joint "
-                "of the group that moves is needed; add it",
+                self._location(element),
+                f"state '{name}' of group '{group_name}' has no value for {', '.join(missing)}; each active joint "
+                "of the group needs a value; add it",
             )
 
     def _check_state_joint(self, item: Element, owner: str, group: PlanningGroup) -> None:
@@ -112,22 +111,22 @@ class _SrdfChecker:
                 return
             if name in self._tree.joints:
                 allowed = ", ".join(group.active)
-                self._faults.add(self._at(item), f"{what} is not in the group; allowed: {allowed}; remove it")
+                self._faults.add(self._location(item), f"{what} is not in the group; allowed: {allowed}; remove it")
             else:
-                self._faults.add_unknown(self._at(item), f"{owner}: joint", name, group.active)
+                self._faults.add_unknown(self._location(item), f"{owner}: joint", name, group.active)
             return
         try:
             values = [float(word) for word in item.get("value", "").split()]
         except ValueError:
             values = []
         if not values:
-            found = item.get("value", "")
-            self._faults.add(self._at(item), f"{owner}: '{name}' is '{found}'; expected a position in rad or m")
+            text = item.get("value", "")
+            self._faults.add(self._location(item), f"{owner}: '{name}' is '{text}'; expected a position in rad or m")
             return
         variables = VARIABLES.get(self._virtual_kinds.get(name, ""), values)
         if len(values) != len(variables):
             self._faults.add(
-                self._at(item),
+                self._location(item),
                 f"{owner}: '{name}' has {len(values)} numbers; expected for a {self._virtual_kinds[name]} virtual "
                 f"joint: {len(variables)} ({' '.join(map(str, variables))}); correct it",
             )
@@ -138,58 +137,60 @@ class _SrdfChecker:
         lower, upper = joint.limit.lower, joint.limit.upper
         if not lower - END_M <= values[0] <= upper + END_M:
             self._faults.add(
-                self._at(item),
+                self._location(item),
                 f"{owner}: '{name}' is at {values[0]:g}; allowed by the URDF: {lower:g} to {upper:g}; correct it",
             )
 
     def _check_end_effector(self, element: Element, groups: Mapping[str, PlanningGroup]) -> None:
         name = element.get("name", "")
         if not name:
-            self._faults.add(self._at(element), "an <end_effector> has no name; give it one")
+            self._faults.add(self._location(element), "an <end_effector> has no name; give it one")
         has_group = self._check_name(element, "group", "group", groups)
         has_link = self._check_name(element, "parent_link", "parent_link", self._tree.links)
         parent, link = element.get("parent_group", ""), (element.get("parent_link") or "").strip()
         if parent and parent not in groups:
-            self._faults.add_unknown(self._at(element), f"end effector '{name}': parent_group", parent, groups)
+            self._faults.add_unknown(self._location(element), f"end effector '{name}': parent_group", parent, groups)
         elif has_link and parent and link not in groups[parent].links:
             allowed = ", ".join(item for item in self._tree.links if item in groups[parent].links)
             self._faults.add(
-                self._at(element),
+                self._location(element),
                 f"end effector '{name}': parent_link '{link}' is not in its parent_group '{parent}'; allowed: {allowed}"
                 "; correct the link or the group",
             )
         elif has_link and not parent and not self._holders(link, element.get("group", ""), groups):
             self._faults.add(
-                self._at(element),
-                f"end effector '{name}': no other group contains its parent_link '{link}', so nothing moves it; name a "
+                self._location(element),
+                f"end effector '{name}': no other group contains its parent_link '{link}'; name a "
                 "link of a group, or add parent_group",
             )
         if has_group and parent and parent == element.get("group"):
-            self._faults.add(self._at(element), f"end effector '{name}': group and parent_group are both '{parent}'")
+            self._faults.add(
+                self._location(element), f"end effector '{name}': group and parent_group are both '{parent}'"
+            )
 
     @staticmethod
-    def _holders(link: str, own: str, groups: Mapping[str, PlanningGroup]) -> list[str]:
-        return [name for name, group in groups.items() if name != own and link in group.links]
+    def _holders(link: str, own_group: str, groups: Mapping[str, PlanningGroup]) -> list[str]:
+        return [name for name, group in groups.items() if name != own_group and link in group.links]
 
     def _check_virtual_joint(self, element: Element) -> None:
         name, kind = element.get("name", ""), element.get("type", "")
         if not name or not element.get("parent_frame"):
             missing = "name" if not name else "parent_frame"
-            self._faults.add(self._at(element), f"<virtual_joint> '{name}' has no attribute '{missing}'; add it")
+            self._faults.add(self._location(element), f"<virtual_joint> '{name}' has no attribute '{missing}'; add it")
         if kind not in VIRTUAL_KINDS:
-            self._faults.add_unknown(self._at(element), f"virtual joint '{name}': type", kind, VIRTUAL_KINDS)
+            self._faults.add_unknown(self._location(element), f"virtual joint '{name}': type", kind, VIRTUAL_KINDS)
         roots = self._tree.roots
         if self._check_name(element, "child_link", "child_link", self._tree.links) and roots:
             child = (element.get("child_link") or "").strip()
             if child not in roots:
                 self._faults.add(
-                    self._at(element),
+                    self._location(element),
                     f"virtual joint '{name}': child_link '{child}' is not the root of the robot; allowed: "
-                    f"{', '.join(roots)}; a virtual joint places the whole robot, so name its root",
+                    f"{', '.join(roots)}; name the root, because a virtual joint places the whole robot",
                 )
 
     def _check_pairs(self) -> None:
-        """Notes each link that the robot lacks once, however many pairs it is in."""
+        """Reports each unknown link once, even if it occurs in several pairs."""
         links = self._tree.links
         unknown: dict[str, list[tuple[Element, str]]] = {}
         for tag in ("disable_collisions", "enable_collisions"):
@@ -198,11 +199,11 @@ class _SrdfChecker:
                     name = (element.get(key) or "").strip()
                     if name not in links:
                         unknown.setdefault(name, []).append((element, key))
-        for name, places in unknown.items():
-            element, key = places[0]
-            more = f" (and in {len(places) - 1} more pairs)" if len(places) > 1 else ""
-            what = f"<{element.tag}>{more}: {key}" if name else f"<{element.tag}>{more} has no attribute '{key}':"
-            self._faults.add_unknown(self._at(element), what, name, links)
+        for name, uses in unknown.items():
+            element, key = uses[0]
+            note = f" (and in {len(uses) - 1} more pairs)" if len(uses) > 1 else ""
+            what = f"<{element.tag}>{note}: {key}" if name else f"<{element.tag}>{note} has no attribute '{key}':"
+            self._faults.add_unknown(self._location(element), what, name, links)
         for tag in ("disable_default_collisions", "link_sphere_approximation"):
             for element in self._root.findall(tag):
                 self._check_name(element, "link", "link", links)

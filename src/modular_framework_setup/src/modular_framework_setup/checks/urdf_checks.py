@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks a robot description by itself: its tree, its limits, its mimic joints, and that its mesh files are there."""
+"""Checks the tree, limits, mimic joints, transmissions and mesh files of a URDF."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PACKAGE = re.compile(r"package://([^/]+)/")
 
 
 def check_urdf(document: XmlDocument, faults: FaultList) -> RobotTree | None:
-    """Checks a robot description; returns its tree, or None when it cannot be read."""
+    """Checks a URDF and returns its kinematic tree, or None if unreadable."""
     try:
         robot = read_urdf(document.text, document.where)
     except XmlError as error:
@@ -34,7 +34,7 @@ def check_urdf(document: XmlDocument, faults: FaultList) -> RobotTree | None:
 
 
 def check_tree(tree: RobotTree, faults: FaultList) -> None:
-    """Checks links, joints and transmissions of a robot description, but not its meshes."""
+    """Checks the links, joints and transmissions of a URDF, but not its meshes."""
     robot = tree.robot
     _check_names(robot, tree, faults)
     _check_roots(tree, faults)
@@ -54,17 +54,17 @@ def _check_names(robot: Robot, tree: RobotTree, faults: FaultList) -> None:
             if not item.name:
                 faults.add(tree.location(item.line), f"a {what} has no name; give it one")
             elif count[item.name] > 1 and item.name in seen:
-                faults.add(tree.location(item.line), f"{what} '{item.name}' is there twice; rename one of them")
+                faults.add(tree.location(item.line), f"{what} '{item.name}' exists twice; rename one of them")
             seen.add(item.name)
-    carried: set[str] = set()
+    children: set[str] = set()
     for joint in robot.joints:
-        if joint.child in carried:
+        if joint.child in children:
             faults.add(
                 tree.location(joint.line),
-                f"joint '{joint.name}': link '{joint.child}' is the child of another joint too; one joint may carry "
-                "a link; remove one of them",
+                f"joint '{joint.name}': link '{joint.child}' is already the child of another joint; a link may have "
+                "only one parent joint; remove one of them",
             )
-        carried.add(joint.child)
+        children.add(joint.child)
 
 
 def _check_roots(tree: RobotTree, faults: FaultList) -> None:
@@ -72,11 +72,11 @@ def _check_roots(tree: RobotTree, faults: FaultList) -> None:
     if len(roots) == 1:
         return
     line = tree.links[roots[1]].line if roots else 1
-    found = ", ".join(roots) or "none"
+    names = ", ".join(roots) or "none"
     faults.add(
         tree.location(line),
-        f"{len(roots)} links have no joint above them ({found}); exactly one, the root, is allowed; "
-        "connect the others to the tree by joints",
+        f"{len(roots)} links have no parent joint ({names}); only the root link may have none; "
+        "connect the other links to the tree by joints",
     )
 
 
@@ -100,12 +100,12 @@ def _check_limit(joint: Joint, tree: RobotTree, faults: FaultList) -> None:
         return
     where = tree.location(joint.line)
     if joint.limit is None:
-        faults.add(where, f"joint '{joint.name}' is {joint.kind} and has no <limit>; add lower, upper and velocity")
+        faults.add(where, f"joint '{joint.name}' is {joint.kind}, but has no <limit>; add lower, upper and velocity")
     elif joint.limit.lower > joint.limit.upper:
         faults.add(
             where,
-            f"joint '{joint.name}': its lower limit {joint.limit.lower:g} is above its upper one "
-            f"{joint.limit.upper:g}; exchange or correct them",
+            f"joint '{joint.name}': its lower limit {joint.limit.lower:g} is above its upper limit "
+            f"{joint.limit.upper:g}; swap or correct them",
         )
     elif joint.limit.velocity is not None and joint.limit.velocity < 0.0:
         faults.add(where, f"joint '{joint.name}': its velocity is {joint.limit.velocity:g}; it must be above 0")
@@ -131,7 +131,7 @@ def _check_transmissions(robot: Robot, tree: RobotTree, faults: FaultList) -> No
 
 
 def _check_meshes(robot: Robot, tree: RobotTree, faults: FaultList) -> None:
-    """Notes each mesh that is not there once, and each package that is not there once."""
+    """Reports each missing mesh once, and each missing package once."""
     lines: dict[str, int] = {}
     for link in robot.links:
         for placed in (*link.visuals, *link.collisions):
@@ -149,6 +149,6 @@ def _check_meshes(robot: Robot, tree: RobotTree, faults: FaultList) -> None:
             is_package = error.found.startswith("package ")
             if match and is_package:
                 missing.add(match[1])
-            more = sum(other.startswith(f"package://{match[1]}/") for other in lines) if match and is_package else 0
-            text = f" ({more} meshes are there)" if more > 1 else ""
-            faults.add(tree.location(line), f"mesh '{uri}': {error.found}{text}; {error.allowed}")
+            count = sum(other.startswith(f"package://{match[1]}/") for other in lines) if match and is_package else 0
+            note = f" ({count} meshes refer to it)" if count > 1 else ""
+            faults.add(tree.location(line), f"mesh '{uri}': {error.found}{note}; {error.allowed}")
