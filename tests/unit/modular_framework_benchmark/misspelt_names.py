@@ -206,6 +206,7 @@ def in_script(text: str, words: str, state: str = "") -> Case:
     return Case("task script", text.split("\n")[0][:40], refused, words)
 
 
+IK = "/robot_description_kinematics"
 OWN_STATE = """import smach
 class Mine(smach.State):
     def __init__(self, outcomes=("success",), **options):
@@ -226,6 +227,9 @@ CASES = [
     in_parameters("/planner_name", "omple/RRT", "no pipeline 'omple'.*did you mean 'ompl'"),
     in_parameters("/planner_name", "pilz_industrial_motion_planner/LINE", "no planner.*LIN'"),
     in_parameters("/planner_name", 3, "is 3; allowed: a text"),
+    in_parameters(f"{IK}/arm/kinematics_solver", "numerik", "no kinematics_solver 'numerik'.*did you mean 'numeric'"),
+    in_parameters(f"{IK}/arm/kinematics_solver_timout", 0.1, "no key.*did you mean 'kinematics_solver_timeout'"),
+    in_parameters(f"{IK}/armm/kinematics_solver", "numeric", "no planning group 'armm'.*did you mean 'arm'"),
     in_parameters("/robot_speed_factor", 7, "is 7; allowed: a number, above 0 and at most 1"),
     in_parameters("/robot_speed_factor", "fast", "is 'fast'; allowed: a number"),
     in_parameters("/arm_group_name", "armm", "no planning group 'armm'.*did you mean 'arm'"),
@@ -313,7 +317,8 @@ CASES = [
     in_experiment(PLANNING, ("planner_parameters",), {"range": "far"}, "'range' is 'far'.*a number of at least 0"),
     in_experiment(PLANNING, ("parameters",), {f"{PIPELINE}/plannr_configs/RRT/range": 1.0}, "'planner_configs'"),
     in_experiment(KINEMATICS, ("factors", "group"), ["panda_arm", "panda_amr"], "panda_arm"),
-    in_experiment(KINEMATICS, ("solver",), "trac_ikk", "allowed|known"),
+    in_experiment(KINEMATICS, ("solver",), "trac_ikk", "allowed are closed form, numeric"),
+    in_experiment(KINEMATICS, ("solver",), "kdl_kinematics_plugin/KDLKinematicsPlugin", "allowed are closed form"),
     in_experiment(GRASPS, ("gripper_joint",), "panda_finger_joint", "panda_finger_joint1"),
     in_experiment(GRASPS, ("method_parameters",), {"finger_clearance": "wide"}, "is 'wide'; allowed: a number"),
     in_experiment(GRASPS, ("method_parameters",), {"finger_clearence": 0.01}, "did you mean 'finger_clearance'"),

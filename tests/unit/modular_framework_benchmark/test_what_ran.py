@@ -53,6 +53,18 @@ def test_a_record_says_planner_settings_implementation_and_digests(tmp_path: Pat
     assert running_stack(parameters, {}, [], []).digests["world"] != snapshot["digests"]["world"]
 
 
+def test_a_record_says_by_which_method_poses_were_solved_and_for_which_plugin(tmp_path: Path) -> None:
+    plans = [plan("RRT", "OMPL"), plan("RRT", "OMPL")]
+    plans[1]["run"]["solver"] = "closed form"
+    kinematics = {"arm": {"kinematics_solver": "kdl_kinematics_plugin/KDLKinematicsPlugin"}, "wrist": {}}
+    ran = running_stack({"robot_description_kinematics": kinematics}, {}, [], plans)
+    snapshot = record_of(tmp_path, json.loads(json.dumps(asdict(ran)))).snapshot
+    assert snapshot["solver"] == "closed form"
+    assert snapshot["substitutions"] == (
+        "the framework's inverse kinematics for kdl_kinematics_plugin/KDLKinematicsPlugin",
+    )
+
+
 def test_a_documented_substitution_is_recorded_and_the_episode_counts(tmp_path: Path) -> None:
     record = record_of(tmp_path, stack(tmp_path, plan("PRM", "CBiRRT"), plan("PRM", "OMPL")))
     assert record.status is EpisodeStatus.SUCCEEDED

@@ -266,6 +266,26 @@ def test_kinematics_yaml_is_read_and_its_faults_are_reported(model: RobotModel) 
             settings_from(bad)
 
 
+@pytest.mark.parametrize("name", ["numerik", "kdl_kinematics_plugin/KDLKinematicPlugin", "kdl/KDLKinematicsPlugin"])
+def test_a_misspelt_solver_of_kinematics_yaml_is_refused_with_the_known_ones(name: str) -> None:
+    with pytest.raises(PlanningError, match=f"'arm'.*'{name}'; allowed: numeric, kdl_kinematics_plugin/"):
+        settings_from({"arm": {"kinematics_solver": name}})
+
+
+@pytest.mark.parametrize("name", ["", "numeric", "my_arm/MyPlugin", "my_arm_arm_kinematics/IKFastKinematicsPlugin"])
+def test_own_and_generated_plugins_may_stand_in_kinematics_yaml(name: str) -> None:
+    assert settings_from({"arm": {"kinematics_solver": name}})["arm"].solver == name
+
+
+def test_a_solver_names_the_method_that_solves(model: RobotModel, seven: RobotModel) -> None:
+    def method(robot: RobotModel, name: str) -> str:
+        return KinematicsPool(robot, settings_from({"arm": {"kinematics_solver": name}})).solver("arm").method
+
+    assert method(model, "kdl_kinematics_plugin/KDLKinematicsPlugin") == "closed form"
+    assert method(model, "numeric") == method(seven, "numeric") == "numeric"
+    assert method(seven, "") == "closed form and search"
+
+
 def test_of_about_equally_near_solutions_the_one_with_most_clearance_is_taken() -> None:
     seed = np.zeros(2)
     free = [np.array([0.30, 0.0]), np.array([0.35, 0.0]), np.array([0.9, 0.0])]

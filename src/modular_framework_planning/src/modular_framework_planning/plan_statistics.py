@@ -58,6 +58,7 @@ class PlannerRun:
         adapters: request adapters, outermost first.
         implementation: who searched: `compiled`, `OMPL`, `CBiRRT`; empty where no search was needed or it never began.
         replaced: the planner_id that was asked for and that the pipeline does not have; empty otherwise.
+        solver: Method of the inverse kinematics of pose goals; empty if there is no pose goal.
     """
 
     pipeline: str
@@ -66,6 +67,7 @@ class PlannerRun:
     adapters: tuple[str, ...] = ()
     implementation: str = ""
     replaced: str = ""
+    solver: str = ""
 
 
 @dataclass(frozen=True, slots=True)

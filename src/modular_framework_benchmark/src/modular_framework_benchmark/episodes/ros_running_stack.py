@@ -11,7 +11,12 @@ from typing import Any
 import rospkg
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
-from modular_framework_benchmark.records.what_ran import RanMethod, WhatRan, description_digests
+from modular_framework_benchmark.records.what_ran import (
+    RanMethod,
+    WhatRan,
+    description_digests,
+    solver_substitutions,
+)
 from modular_framework_planning.plan_statistics import PlannerRun
 from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
@@ -22,6 +27,7 @@ FILES = {
 }
 """Parameters of nodes that name files, by what the files are."""
 NODE_TIMEOUT_S = 5.0
+KINEMATICS = "/robot_description_kinematics"
 DESCRIPTIONS = ("/robot_description", "/robot_description_semantic")
 
 
@@ -49,10 +55,17 @@ def running_stack(
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),
         digests=described | digests,
+        substitutions=solver_substitutions(named_solvers(_value(parameters, KINEMATICS))),
     )
     # a sequence has a run for each of its motions
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
     return found.with_plans(PlannerRun(**run) for run in runs)
+
+
+def named_solvers(kinematics: Any) -> list[str]:
+    """Returns the solver of each group in the contents of kinematics.yaml."""
+    groups = kinematics.values() if isinstance(kinematics, Mapping) else ()
+    return [str(group.get("kinematics_solver", "")) for group in groups if isinstance(group, Mapping)]
 
 
 def _value(parameters: Mapping[str, Any], name: str) -> Any:

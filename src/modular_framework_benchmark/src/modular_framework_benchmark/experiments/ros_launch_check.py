@@ -18,6 +18,7 @@ from modular_framework_core.launching.ros_launch_preview import LaunchPreview, l
 from modular_framework_core.task_constructor import generator, pipeline
 from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
 from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.kinematics.kinematics_settings import KEYS, NUMERIC, PLUGINS, is_known_solver
 from modular_framework_planning.planning_pipeline.planner_registry import (
     PlannerRegistry,
     ResolvedPlanner,
@@ -61,6 +62,7 @@ class LaunchCheck:
                 *self._names.misspelt(leaves(self._given)),
                 *self._names.wrong_values(),
                 *self._robot_faults(),
+                *self._kinematics_faults(),
                 *(self._planner_faults() if self._node is not None else ()),
                 *self._controller_faults(),
                 *self._task_faults(),
@@ -157,6 +159,21 @@ class LaunchCheck:
             if value not in joints:
                 yield _unknown(name, "joint", value, joints)
 
+    def _kinematics_faults(self) -> Iterator[LaunchFault]:
+        """Yields the groups, solvers and keys of kinematics.yaml that do not exist."""
+        groups = self._groups()
+        for name, value in self.launch.parameters.items():
+            _, found, rest = name.partition(f"/{DESCRIPTION}_kinematics/")
+            group, _, key = rest.partition("/")
+            if not found:
+                continue
+            if groups and group not in groups:
+                yield _unknown(name, "planning group", group, groups)
+            elif key.startswith("kinematics_") and key not in KEYS:
+                yield _unknown(name, "key of kinematics.yaml", key, KEYS)
+            elif key == "kinematics_solver" and not is_known_solver(str(value)):
+                yield _unknown(name, key, str(value), (NUMERIC, *PLUGINS))
+
     def _controller_faults(self) -> Iterator[LaunchFault]:
         """Yields controller files that are not there or cannot be read."""
         for node in self.launch.nodes:
@@ -170,6 +187,11 @@ class LaunchCheck:
                     yield LaunchFault(
                         "controller_file", f"argument 'controller_file': {error}{nearest(file, there)}", ARGUMENTS
                     )
+
+    def named_solvers(self) -> list[str]:
+        """Returns the kinematics solvers that kinematics.yaml names, one per group."""
+        below, key = f"/{DESCRIPTION}_kinematics/", "/kinematics_solver"
+        return [str(value) for name, value in self.launch.parameters.items() if below in name and name.endswith(key)]
 
     def planner(self) -> ResolvedPlanner | None:
         """Returns what plans for the task; None if the launch has no planner, or none of the name it gives."""

@@ -25,7 +25,7 @@ from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.what_ran import RanMethod, WhatRan, description_digests
+from modular_framework_benchmark.records.what_ran import RanMethod, WhatRan, description_digests, solver_substitutions
 from modular_framework_core.grasp_generation.grasp_candidates import (
     GraspCandidate,
     GraspMethod,
@@ -77,7 +77,7 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
             figures=_figures(candidates, reached, found),
-            ran=_ran(str(settings["method"]), prepared.robot),
+            ran=_ran(str(settings["method"]), prepared),
         )
         status = EpisodeStatus.SUCCEEDED if found else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report, folder, watch)
@@ -93,12 +93,14 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         return _Prepared(robot, robot.solvers().solver(group.name), gripper)
 
 
-def _ran(method: str, robot: Robot) -> WhatRan:
+def _ran(method: str, prepared: _Prepared) -> WhatRan:
     package = method.partition(":")[0].partition(".")[0]
     version, sources = package_source(package)
     return WhatRan(
         methods={package: RanMethod(version, sources)},
-        digests=description_digests(*robot.model.source[:2]),
+        solver=prepared.solver.method,
+        substitutions=solver_substitutions([prepared.solver.settings.solver]),
+        digests=description_digests(*prepared.robot.model.source[:2]),
     )
 
 

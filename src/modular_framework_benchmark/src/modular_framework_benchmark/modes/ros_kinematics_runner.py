@@ -17,15 +17,21 @@ import numpy as np
 import pinocchio as pin
 
 from modular_framework_benchmark.metrics.measurements import ComponentReport
+from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.modes.parameters import parameters_below
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.what_ran import WhatRan, description_digests
+from modular_framework_benchmark.records.what_ran import WhatRan, description_digests, solver_substitutions
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
-from modular_framework_planning.kinematics.kinematics_settings import KinematicsSettings, settings_from
+from modular_framework_planning.kinematics.kinematics_settings import (
+    CLOSED_FORM,
+    NUMERIC,
+    KinematicsSettings,
+    settings_from,
+)
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_ros.reported_figures import (
     POSITION_ERROR,
@@ -36,6 +42,8 @@ from modular_framework_ros.reported_figures import (
     Figure,
 )
 
+SOLVERS = ("", CLOSED_FORM, NUMERIC)
+"""Allowed values of the setting `solver`; empty for a closed form if the chain has one."""
 POSITION_TOLERANCE_M = 1.0e-4
 ROTATION_TOLERANCE_RAD = 1.0e-3
 
@@ -76,7 +84,11 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
             ended_s=ended_s,
             wall_s=ended_s - started_s,
             figures=_figures(results),
-            ran=WhatRan(solver=solver.settings.solver, digests=description_digests(*robot.model.source[:2])),
+            ran=WhatRan(
+                solver=solver.method,
+                digests=description_digests(*robot.model.source[:2]),
+                substitutions=solver_substitutions([solver.settings.solver]),
+            ),
         )
         status = EpisodeStatus.FAILED if unsolved else EpisodeStatus.SUCCEEDED
         return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)
@@ -85,7 +97,11 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
         """Returns the solver, warm: its first solution takes longer."""
         robot = self.robot(settings["robot"])
         group = robot.chain(str(settings["group"]))
+        if settings["solver"] not in SOLVERS:
+            raise ModeError(f"solver '{settings['solver']}': allowed are {', '.join(filter(None, SOLVERS))}")
         solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
+        if settings["solver"] == CLOSED_FORM and solver.method == NUMERIC:
+            raise ModeError(f"solver '{CLOSED_FORM}': group '{group.name}' has no closed form; leave the key out")
         solver.solutions(group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _home(robot))
         return solver
 

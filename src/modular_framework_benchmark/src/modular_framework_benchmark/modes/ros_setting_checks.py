@@ -16,11 +16,10 @@ from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner, load_method
 from modular_framework_benchmark.modes.ros_kinematics_runner import KinematicsEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
-from modular_framework_benchmark.records.what_ran import substitution_text
+from modular_framework_benchmark.records.what_ran import solver_substitutions, substitution_text
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError
-from modular_framework_planning.kinematics.kinematics_settings import NUMERIC
 from modular_framework_planning.planning_pipeline.planner_registry import (
     PlannerRegistry,
     ResolvedPlanner,
@@ -36,9 +35,6 @@ def setting_checks() -> dict[str, SettingsCheck]:
     planning, kinematics, grasps = PlanningEpisodeRunner(), KinematicsEpisodeRunner(), GraspEpisodeRunner()
 
     def check_kinematics(settings: Mapping[str, Any]) -> None:
-        solver = str(settings["solver"])
-        if solver not in ("", NUMERIC) and "/" not in solver:
-            raise ModeError(f"solver '{solver}': allowed are {NUMERIC}, and PACKAGE/PLUGIN of a kinematics.yaml")
         kinematics.prepared(settings)
 
     def check_grasps(settings: Mapping[str, Any]) -> None:
@@ -91,7 +87,7 @@ def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
             "nodes": sorted(map(repr, check.launch.nodes)),
             "parameters": {**check.launch.parameters, "/planner_name": repr(check.planner())},
         },
-        _substitutions(check.registry(), check.planner()),
+        (*_substitutions(check.registry(), check.planner()), *solver_substitutions(check.named_solvers())),
     )
 
 

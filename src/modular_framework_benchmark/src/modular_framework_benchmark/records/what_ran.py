@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from modular_framework_planning.kinematics.kinematics_settings import CLOSED_FORM, NUMERIC
 from modular_framework_planning.plan_statistics import PlannerRun
 
 
@@ -48,7 +49,7 @@ class WhatRan:
 
     Attributes:
         planners: Each planner, by its name and that of its pipeline.
-        solver: Inverse kinematics, in the mode that measures it.
+        solver: Methods of inverse kinematics; empty if no pose was solved for.
         methods: Each method that generates grasps, by package.
         controllers: Type of each controller that ran, by name.
         physics_engine: What moved the bodies.
@@ -91,8 +92,9 @@ class WhatRan:
         Args:
             runs: What planned each motion, also each one that failed.
         """
-        planners: dict[str, RanPlanner] = {}
+        runs, planners = list(runs), dict[str, RanPlanner]()
         substitutions, replaced = set(self.substitutions), set(self.replaced)
+        solvers = {self.solver, *(run.solver for run in runs)} - {""}
         for run in runs:
             name = f"{run.planner} of {run.pipeline}"
             before = planners[name].implementations if name in planners else ()
@@ -105,6 +107,7 @@ class WhatRan:
         return replace(
             self,
             planners=planners,
+            solver=", ".join(sorted(solvers)),
             substitutions=tuple(sorted(substitutions)),
             replaced=tuple(sorted(replaced)),
         )
@@ -119,6 +122,12 @@ CONSTRAINED = "CBiRRT"
 def substitution_text(planner: str, constrained: str = CONSTRAINED) -> str:
     """Returns what a record and a dry run say of a planner that another search replaces."""
     return f"{constrained} for {planner}, which cannot keep path constraints"
+
+
+def solver_substitutions(named: Iterable[str]) -> tuple[str, ...]:
+    """Returns the substitutions of the solvers that kinematics.yaml names, as records and dry runs show them."""
+    plugins = sorted(set(named) - {"", NUMERIC, CLOSED_FORM})
+    return tuple(f"the framework's inverse kinematics for {plugin}" for plugin in plugins)
 
 
 def description_digests(urdf: str, srdf: str) -> dict[str, str]:

@@ -24,7 +24,12 @@ from modular_framework_planning.kinematics.compiled_kinematics import (
     unique_rows,
     whole_turns,
 )
-from modular_framework_planning.kinematics.kinematics_settings import NUMERIC, KinematicsSettings
+from modular_framework_planning.kinematics.kinematics_settings import (
+    CLOSED_FORM,
+    CLOSED_FORM_AND_SEARCH,
+    NUMERIC,
+    KinematicsSettings,
+)
 from modular_framework_planning.robot_model.multi_dof_joint import UNBOUNDED_M
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
@@ -66,6 +71,13 @@ class InverseKinematics:
         self._is_continuous = np.array([model.is_continuous(int(number)) for number in group.indices])
         self._closed = self._try_closed_form()
         self.reach = self._max_reach()
+
+    @property
+    def method(self) -> str:
+        """The method that solves: `NUMERIC`, `CLOSED_FORM` or `CLOSED_FORM_AND_SEARCH`."""
+        if self._closed is None:
+            return NUMERIC
+        return CLOSED_FORM if self._closed.locked is None else CLOSED_FORM_AND_SEARCH
 
     @property
     def finds_all(self) -> bool:

@@ -32,6 +32,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PipelineSettings,
     PlanningAnswer,
     PlanningRequest,
+    PoseGoal,
 )
 from modular_framework_planning.planning_pipeline.adapters.limit_max_cartesian_link_speed import (
     LimitMaxCartesianLinkSpeed,
@@ -246,7 +247,9 @@ class PlanningPipeline:
             raise PlanningError(ErrorCode.INVALID_GROUP_NAME, f"group '{group.name}' has no joint that can be moved")
         planner_id, parameters, replaced = self._chosen_planner(request.planner_id, group.name)
         adapters = tuple(type(item).__name__ for item in self._adapters_for(request))
-        phases.run = PlannerRun(self.name, planner_id, parameters, adapters, replaced=replaced)
+        phases.run = PlannerRun(
+            self.name, planner_id, parameters, adapters, replaced=replaced, solver=self._solver(request)
+        )
         start = np.array(request.scene.positions)
         if not np.isfinite(start).all():
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "start state: a joint position is not finite")
@@ -275,6 +278,15 @@ class PlanningPipeline:
             repeatable=repeatable,
             phases=phases,
         )
+
+    def _solver(self, request: PlanningRequest) -> str:
+        """Returns the method of the inverse kinematics of pose goals; "" without one."""
+        if not any(isinstance(goal, PoseGoal) for goal in request.goals):
+            return ""
+        try:
+            return self._kinematics.solver(request.group).method
+        except PlanningError:
+            return ""  # not a chain: pose goals are projected
 
     def _reserved(self, allowed_time_s: float, planner_id: str) -> float:
         """Returns how much of the allowed time is kept for repairing, timing and checking the path found [s]."""

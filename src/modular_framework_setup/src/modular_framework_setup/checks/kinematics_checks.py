@@ -3,31 +3,13 @@
 
 from __future__ import annotations
 
-import re
-
-from modular_framework_core.files.faults import FaultList, closest
+from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, kind_of
-from modular_framework_planning.kinematics.kinematics_settings import NUMERIC
+from modular_framework_planning.kinematics.kinematics_settings import KEYS, NUMERIC, PLUGINS, is_known_solver
 from modular_framework_setup.config_files.robot_tree import Semantics
 from modular_framework_setup.config_files.yaml_files import is_open, parameters_of, plain_text, read_number, read_truth
 
-SOLVERS = (
-    "kdl_kinematics_plugin/KDLKinematicsPlugin",
-    "lma_kinematics_plugin/LMAKinematicsPlugin",
-    "srv_kinematics_plugin/SrvKinematicsPlugin",
-    "cached_ik_kinematics_plugin/CachedKDLKinematicsPlugin",
-    "cached_ik_kinematics_plugin/CachedSrvKinematicsPlugin",
-    "trac_ik_kinematics_plugin/TRAC_IKKinematicsPlugin",
-    "bio_ik/BioIKKinematicsPlugin",
-    "pick_ik/PickIkPlugin",
-    "moveit_opw_kinematics_plugin/MoveItOPWKinematicsPlugin",
-    "pr2_arm_kinematics/PR2ArmKinematicsPlugin",
-    *(f"ur_kinematics/UR{name}KinematicsPlugin" for name in ("3", "5", "10")),
-    NUMERIC,
-)
 NUMBERS = ("kinematics_solver_search_resolution", "kinematics_solver_timeout", "kinematics_solver_attempts")
-KEYS = ("kinematics_solver", *NUMBERS, "kinematics_solver_ik_links")
-_PLUGIN = re.compile(r"\w+/\w+")
 
 
 def check_kinematics(top: Mapping, semantics: Semantics, faults: FaultList) -> None:
@@ -68,19 +50,6 @@ def _check_group(group: str, entry: Mapping, faults: FaultList) -> None:
 
 
 def _check_solver(group: str, entry: Mapping, faults: FaultList) -> None:
-    """Checks the solver plugin. An unknown plugin is allowed unless it resembles a known plugin."""
     solver, where = plain_text(entry.entries["kinematics_solver"]), entry.keys["kinematics_solver"]
-    if solver in SOLVERS or is_open(solver):
-        return
-    package = solver.partition("/")[0]
-    is_of_known_package = any(package == known.partition("/")[0] for known in SOLVERS)
-    is_plugin = _PLUGIN.fullmatch(solver) is not None
-    is_ikfast = solver.endswith("IKFastKinematicsPlugin")
-    if not is_plugin or is_of_known_package or (not is_ikfast and closest(solver, SOLVERS) in _same_class(solver)):
-        faults.add_unknown(where, f"group '{group}': kinematics_solver", solver, SOLVERS)
-
-
-def _same_class(solver: str) -> list[str]:
-    """Returns the known solvers of the same class name, in which case the package is misspelt."""
-    name = solver.partition("/")[2]
-    return [known for known in SOLVERS if known.partition("/")[2] == name]
+    if not (is_known_solver(solver) or is_open(solver)):
+        faults.add_unknown(where, f"group '{group}': kinematics_solver", solver, (NUMERIC, *PLUGINS))
