@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from modular_framework_benchmark.experiments.experiment import Experiment
@@ -70,9 +70,10 @@ class FakeSurroundings:
         self.launch_file(launch)
         return ARGUMENTS
 
-    def check_launch(self, launch: str, arguments: Mapping[str, str]) -> None:
+    def launch_faults(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
         if arguments.get("gui", "false") not in ("true", "false"):
-            raise NotThere(f"argument 'gui' is '{arguments['gui']}', allowed are true and false")
+            return (f"argument 'gui' is '{arguments['gui']}', allowed are true and false",)
+        return ()
 
     def task(self, name: str, folder: Path) -> str:
         if name != "simulation_pick.yaml":

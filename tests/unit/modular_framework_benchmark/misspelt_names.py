@@ -316,6 +316,21 @@ CASES = [
     in_experiment(PLANNING, ("planner_parameters",), {"rang": 1.0}, "no setting 'rang'.*did you mean 'range'"),
     in_experiment(PLANNING, ("planner_parameters",), {"range": "far"}, "'range' is 'far'.*a number of at least 0"),
     in_experiment(PLANNING, ("parameters",), {f"{PIPELINE}/plannr_configs/RRT/range": 1.0}, "'planner_configs'"),
+    in_experiment(
+        PLANNING, ("parameters",), {f"{PIPELINE}/request_adapters": "AddTimeOptimal"}, "AddTimeOptimal' is not known"
+    ),
+    in_experiment(PLANNING, ("parameters",), {f"{PIPELINE}/search_thread": 2}, "did you mean 'search_threads'"),
+    in_experiment(
+        PLANNING,
+        ("parameters",),
+        {"/robot_description_planning/joint_limits/panda_joint1/max_velocity": 1.0},
+        "no effect in this mode; allowed are names below /move_group/planning_pipelines/ompl/",
+    ),
+    in_experiment(PLANNING, ("parameters",), {"/move_group/seed": 4}, "each episode has its own seed"),
+    in_experiment(
+        PLANNING, ("parameters",), {"/move_group/planning_pipelines/stomp": {"jiggle_fraction": 0.1}}, "no effect"
+    ),
+    in_experiment(KINEMATICS, ("parameters",), {"/planer_name": "RRT"}, "no effect in this mode"),
     in_experiment(KINEMATICS, ("factors", "group"), ["panda_arm", "panda_amr"], "panda_arm"),
     in_experiment(KINEMATICS, ("solver",), "trac_ikk", "allowed are closed form, numeric"),
     in_experiment(KINEMATICS, ("solver",), "kdl_kinematics_plugin/KDLKinematicsPlugin", "allowed are closed form"),

@@ -70,6 +70,81 @@ def test_all_faults_of_an_experiment_are_listed_at_once(tmp_path: Path) -> None:
     assert all(word in faults for word in ("planer_name", "robot_speed_factor", "max_torq", "bullet")), faults
 
 
+def _many_faults() -> dict:
+    content = changed(TASK, ("parameters",), {"/planer_name": "$planer", "/robot_speed_factor": 7})
+    content = changed(content, ("arguments", "physics_engine"), "bullet")
+    return changed(changed(content, ("objects", 0, "model"), "cub"), ("metrics",), ["sucess"])
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        (("task",), "simulation_pik.yaml", ("simulation_pik", "/planer_name")),
+        (("arguments", "world_file"), "none.world", ("none.world", "/planer_name")),
+        (("arguments",), {"world_fil": "ur5_table.world", "physics_engine": "bullet"}, ("world_fil", "/planer_name")),
+        (("arguments", "gui"), "maybe", ("'gui' is 'maybe'", "/planer_name")),
+        (("stopping",), {"rule": "sequental"}, ("sequental", "/planer_name")),
+    ],
+    ids=str,
+)
+def test_a_fault_of_one_key_hides_no_fault_of_another(
+    path: tuple[str, ...], value: object, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    faults = experiment_faults(changed(_many_faults(), path, value), tmp_path)
+    for word in (*words, "'$planer'", "'/robot_speed_factor' is 7", "is 'bullet'", "'cub'", "'sucess'"):
+        assert word in faults, faults
+
+
+def test_a_misspelt_robot_makes_no_names_of_the_default_robot_wrong(tmp_path: Path) -> None:
+    content = changed(PLAIN, ("arguments", "moveit_config_package"), "panda_hand_moveit_confg")
+    content = changed(content, ("parameters",), {"/arm_group_name": "panda_arm", "/robot_speed_factor": 7})
+    faults = experiment_faults(content, tmp_path)
+    assert faults.startswith("2 faults") and "moveit_confg" in faults and "'/robot_speed_factor' is 7" in faults
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (
+            PLANNING
+            | {"group": "pandaarm", "planner_parameters": {"rang": 1.0}, "parameters": {"/planer": 1, "/wold": 2}},
+            ("pandaarm", "rang", "/planer", "/wold"),
+        ),
+        (
+            KINEMATICS
+            | {"solver": "trac_ikk", "factors": {"group": ["panda_arm", "panda_amr"]}, "parameters": {"/x": 1}},
+            ("trac_ikk", "panda_amr", "/x"),
+        ),
+        (
+            GRASPS
+            | {
+                "gripper_joint": "finger",
+                "group": "panda_manipulatr",
+                "method_parameters": {"yaw_stp": 0.1, "yaw_step": 9},
+            },
+            ("'finger'", "panda_manipulatr", "yaw_stp", "'yaw_step' is 9"),
+        ),
+        (GRASPS | {"robot": "panda_moveit_confg", "method_parameters": {"yaw_stp": 0.1}}, ("moveit_confg", "yaw_stp")),
+    ],
+    ids=lambda value: value["mode"] if isinstance(value, dict) else "",
+)
+def test_all_faults_of_modes_without_simulation_are_listed_at_once(
+    content: dict, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    write_problem(tmp_path)
+    faults = experiment_faults(content, tmp_path)
+    assert all(word in faults for word in words), faults
+
+
+def test_mode_planning_takes_the_parameters_that_it_reads(tmp_path: Path) -> None:
+    write_problem(tmp_path)
+    given = {
+        PIPELINE: {"jiggle_fraction": 0.1, "panda_arm": {"default_planner_config": "RRT"}},
+        "/move_group/search_threads": 1,
+    }
+    assert experiment_faults(PLANNING | {"parameters": given}, tmp_path) == ""
+
+
 @pytest.mark.parametrize(
     "package", ["modular_framework_api", "panda_hand_robot", "iiwa_wsg50_robot", "dual_panda_robot"]
 )

@@ -30,7 +30,7 @@ from modular_framework_benchmark.experiments.setting_trees import check_referenc
 from modular_framework_benchmark.experiments.surroundings import Surroundings
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
-from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
+from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault, closest
 from modular_framework_core.files.located_yaml import Mapping, Scalar, loads
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, value_of
 
@@ -118,6 +118,7 @@ class _Reader:
         self._root = corrected_keys(root, (*KEYS, *mode_keys), "the key", reading.faults)
         self._mode_keys = mode_keys
         self._refers_to_factors = True
+        self._meant_factors: dict[str, str] = {}
         self._base = Mapping(
             {key: value for key, value in self._root.entries.items() if key in mode_keys},
             {key: value for key, value in self._root.keys.items() if key in mode_keys},
@@ -182,13 +183,11 @@ class _Reader:
         if node is None:
             return {}
         factors = read_factors(node, self._mode_keys, self._reading)
-        before = len(self._reading.faults)
-        check_references(self._base, factors, self._reading.faults)
-        for levels in factors.values():
-            for level in levels.values():
-                check_references(level.settings, factors, self._reading.faults)
-        self._refers_to_factors = len(self._reading.faults) == before
-        if isinstance(node, Mapping) and self._refers_to_factors:
+        trees = [self._base, *(level.settings for levels in factors.values() for level in levels.values())]
+        unknown = [name for tree in trees for name in check_references(tree, factors, self._reading.faults)]
+        self._meant_factors = {name: meant for name in unknown if (meant := closest(name, factors)) is not None}
+        self._refers_to_factors = len(self._meant_factors) == len(set(unknown))
+        if isinstance(node, Mapping) and not unknown:
             note_unused(factors, self._base, node, self._reading)
         return factors
 
@@ -284,11 +283,9 @@ class _Reader:
             return ()
         found, resolved = [], {}
         for item in design:
-            node = combined(self._base, factors, item)
-            before = len(self._reading.faults)
+            node = combined(self._base, factors, item, self._meant_factors)
             settings = read_settings(str(self._mode), node, self._reading)
-            if len(self._reading.faults) == before:
-                resolved[tuple(item.items())] = self._resolved(node, settings)
+            resolved[tuple(item.items())] = self._resolved(node, settings)
             found.append(Combination(item, settings))
         if not len(self._reading.faults):
             note_equal_levels(factors, resolved, self._reading)

@@ -130,13 +130,22 @@ def note_equal_levels(factors: Levels, resolved: Map[tuple[tuple[str, str], ...]
                 )
 
 
-def combined(base: Mapping, factors: Levels, configuration: Map[str, str]) -> Mapping:
-    """Returns the settings of one level of each factor: those of the base, and over them those of the levels."""
+def combined(base: Mapping, factors: Levels, configuration: Map[str, str], meant: Map[str, str]) -> Mapping:
+    """Returns the settings of one level of each factor: those of the base, and over them those of the levels.
+
+    Args:
+        base: Settings of every combination.
+        factors: The factors.
+        configuration: Label of a level of each factor.
+        meant: The factor that a misspelt `$NAME` stands for, by NAME.
+    """
     chosen = {name: factors[name][label] for name, label in configuration.items()}
     tree = base
     for level in chosen.values():
         tree = merged(tree, level.settings)
-    return substituted(tree, {name: level.value for name, level in chosen.items()})  # type: ignore[return-value]
+    values = {name: level.value for name, level in chosen.items()}
+    values |= {name: values[factor] for name, factor in meant.items()}
+    return substituted(tree, values)  # type: ignore[return-value]
 
 
 def read_design(node: Node | None, factors: Levels, reading: Reading) -> list[dict[str, str]]:

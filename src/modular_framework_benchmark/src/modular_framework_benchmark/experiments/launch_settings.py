@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping as Map
 from typing import Any
 
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, SceneObject, named_object
 from modular_framework_benchmark.experiments.surroundings import NotThere
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
+from modular_framework_core.task_constructor.key_spelling import intended_key
 
 DEFAULT_LAUNCH = "modular_framework_api/start_framework.launch"
 DEFAULT_TASK = "simulation_pick.yaml"
@@ -19,6 +21,8 @@ OWN_ARGUMENTS = {
     "seed": "each episode has its own seed, made from the experiment's key seed",
 }
 """Launch arguments that the episodes set, and what to do instead."""
+WORLD_ARGUMENTS = ("world_file", "scene_file")
+"""Arguments that name a file, but decide neither the nodes that start nor the robot."""
 
 
 def read_launch(node: Node, reading: Reading) -> str | None:
@@ -31,6 +35,7 @@ def read_launch(node: Node, reading: Reading) -> str | None:
         reading.surroundings.launch_file(given)
     except NotThere as error:
         reading.faults.add(node.location, str(error))
+        return None
     return given
 
 
@@ -75,36 +80,73 @@ def _argument_text(value: Scalar) -> str:
 
 
 def finish(node: Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
-    """Checks arguments against the launch file, looks the models up, and returns the settings."""
-    launch, arguments = values["launch"], values["arguments"]
+    """Checks arguments against the launch file, looks the models up, and returns the settings.
+
+    The settings have no `arguments` if those that were read do not decide what starts: one is wrong that names a file.
+    """
+    if "launch" not in values:
+        return values
+    launch, arguments = values["launch"], values.get("arguments", {})
     try:
         known = reading.surroundings.launch_arguments(launch)
     except NotThere as error:
         reading.faults.add(_location_of(node, "launch"), str(error))
-        return values
-    given = node.entries.get("arguments")
-    unknown = (
-        {name: found for name, found in given.keys.items() if name not in known} if isinstance(given, Mapping) else {}
-    )
-    for name, location in unknown.items():
-        reading.faults.add_unknown(location, f"the argument of {launch}", name, sorted(known), given=arguments)
-    if unknown:
-        return values
-    try:
-        reading.surroundings.check_launch(launch, arguments)
-    except NotThere as error:
-        reading.faults.add(_location_of_argument(node, str(error)), str(error))
-    task = values.get("task")
-    if task == DEFAULT_TASK:
-        values["task"] = reading.surroundings.task(task, reading.folder)
-    objects = placed_objects(values["objects"], launch, arguments, reading)
-    wanted = (values["success"] or {}).get("object")
-    names = [found.name for found in objects]
+        return {key: value for key, value in values.items() if key != "launch"}
+    sound, decides = _sound_arguments(node, launch, arguments, known, reading)
+    if values.get("task") == DEFAULT_TASK:
+        values["task"] = reading.surroundings.task(DEFAULT_TASK, reading.folder)
+    before = len(reading.faults)
+    objects = placed_objects(values.get("objects", []), launch, sound, reading)
+    if len(reading.faults) == before and "objects" in values:
+        _check_success(node, values.get("success") or {}, [found.name for found in objects], reading)
+    result = values | {"objects": objects, "arguments": sound}
+    return result if decides else {key: value for key, value in result.items() if key != "arguments"}
+
+
+def _check_success(node: Mapping, success: dict[str, Any], names: list[str], reading: Reading) -> None:
+    wanted = success.get("object")
     if wanted is not None and wanted not in names:
         reading.faults.add_unknown(_location_of(node, "success"), "the object of success", wanted, names)
-    elif values["success"] and not values["objects"]:
+    elif success and not names:
         reading.faults.add(_location_of(node, "success"), "success speaks of an object, and there is none in objects")
-    return values | {"objects": objects}
+
+
+def _sound_arguments(
+    node: Mapping, launch: str, given: dict[str, str], known: Map[str, str | None], reading: Reading
+) -> tuple[dict[str, str], bool]:
+    """Returns the arguments without those that are wrong, and whether what starts does not depend on the latter.
+
+    A misspelt name counts as the argument that was meant.
+    """
+    keys = node.entries.get("arguments")
+    locations = keys.keys if isinstance(keys, Mapping) else {}
+    sound = {name: value for name, value in given.items() if name in known}
+    decides = "arguments" not in node.entries or isinstance(keys, Mapping)
+    for name in given:
+        if name not in known:
+            what = f"the argument of {launch}"
+            reading.faults.add_unknown(locations[name], what, name, sorted(known), given=given)
+            meant = intended_key(name, [free for free in known if free not in given])
+            if meant is not None:
+                sound[meant] = given[name]
+            decides = decides and meant is not None
+    wrong = {"": ""}
+    while wrong:  # faults of files are found once the other values are right
+        wrong = {_argument_in(text): text for text in reading.surroundings.launch_faults(launch, sound)}
+        for name, text in wrong.items():
+            reading.faults.add(locations.get(name, _location_of(node, "arguments")), text)
+            is_truth = str(known.get(name)).lower() in ("true", "false")
+            decides = decides and (name in WORLD_ARGUMENTS or is_truth)
+        if not wrong.keys() & sound.keys():
+            break
+        sound = {name: value for name, value in sound.items() if name not in wrong}
+    return sound, decides
+
+
+def _argument_in(fault: str) -> str:
+    """Returns the argument that a fault names; empty if it names none."""
+    named = re.search(r"argument '([^']*)'", fault)
+    return named[1] if named is not None else ""
 
 
 def placed_objects(
@@ -128,14 +170,6 @@ def placed_objects(
             continue
         objects.append(named_object(item, file, taken, reading))
     return objects
-
-
-def _location_of_argument(node: Mapping, fault: str) -> Any:
-    """Returns where the argument is that a fault speaks of."""
-    given, named = node.entries.get("arguments"), re.search(r"argument '([^']*)'", fault)
-    if isinstance(given, Mapping) and named is not None and named[1] in given.keys:
-        return given.keys[named[1]]
-    return _location_of(node, "arguments")
 
 
 def _location_of(node: Mapping, key: str) -> Any:

@@ -39,11 +39,12 @@ class SettingKey:
     required: bool = False
 
     def value(self, key: str, mode: str, node: Node_Mapping, reading: Reading) -> Any:
-        """Returns the value of the key in the settings of a mode, and notes where it is missing."""
+        """Returns the value of the key in the settings of a mode; None, with a fault noted, if it cannot be read."""
         if key in node.entries:
             return self.read(node.entries[key], reading)
         if self.required:
             reading.faults.add(node.location, f"mode {mode} needs the key '{key}', in the file or in every level")
+            return None
         return self.default
 
 
@@ -53,7 +54,7 @@ class Mode:
 
     Attributes:
         keys: Its keys.
-        finish: Checks what keys have to do with each other, and returns the settings.
+        finish: Checks the values that depend on each other, and returns the settings; some may be left out.
     """
 
     keys: Mapping[str, SettingKey]
@@ -69,11 +70,10 @@ def read_settings(mode: str, node: Node_Mapping, reading: Reading) -> dict[str, 
         reading: Where faults are noted, and what there is to refer to.
 
     Returns:
-        A value for each key of the mode.
+        A value for each key of the mode; keys whose value cannot be read are left out.
     """
-    before = len(reading.faults)
     values = {key: setting.value(key, mode, node, reading) for key, setting in MODES[mode].keys.items()}
-    return MODES[mode].finish(node, values, reading) if len(reading.faults) == before else values
+    return MODES[mode].finish(node, {key: value for key, value in values.items() if value is not None}, reading)
 
 
 def _count(what: str, low: int = 1, high: int = 1_000_000) -> ReadValue:
@@ -117,18 +117,25 @@ def _parameters(node: Node, reading: Reading) -> dict[str, Any] | None:
     mapping = reading.mapping(node, "parameters", "{/planner_name: RRTConnect}")
     if mapping is None:
         return None
+    parameters: dict[str, Any] = {}
     for name, location in mapping.keys.items():
         if name in OWN_PARAMETERS:
             reading.faults.add(location, f"the parameter '{name}' cannot be given: {OWN_PARAMETERS[name]}")
-        if not name.startswith("/") or name != "/" + "/".join(part for part in name.split("/") if part):
+        elif not name.startswith("/") or name != "/" + "/".join(part for part in name.split("/") if part):
             reading.faults.add(location, f"the parameter '{name}' must be a whole name from /, such as /planner_name")
-    return {name: json_value(value) for name, value in mapping.entries.items()}
+        else:
+            parameters[name] = json_value(mapping.entries[name])
+    return parameters
 
 
-def _extra_parameters(node: Node, reading: Reading) -> list[str]:
+def _extra_parameters(node: Node, reading: Reading) -> list[str] | None:
     """Reads the names of parameters that nodes of the user's own read."""
-    items = reading.items(node, "extra_parameters", "[/my_node/my_parameter]") or ()
-    return [name for item in items if (name := reading.text(item, "a name in extra_parameters")) is not None]
+    items = reading.items(node, "extra_parameters", "[/my_node/my_parameter]")
+    return (
+        None
+        if items is None
+        else [name for item in items if (name := reading.text(item, "a name in extra_parameters")) is not None]
+    )
 
 
 def _named_values(what: str, example: str) -> ReadValue:
@@ -149,11 +156,13 @@ def _robot(node: Node, reading: Reading) -> Any:
             reading.surroundings.package(package)
         except NotThere as error:
             reading.faults.add(node.location, str(error))
+            return None
     return package
 
 
-def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str]:
+def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str] | None:
     files: dict[str, str] = {}
+    before = len(reading.faults)
     for key, value in node.entries.items():
         if key not in ("urdf", "srdf"):
             reading.faults.add_unknown(node.keys[key], "the key of robot", key, ("urdf", "srdf"))
@@ -166,19 +175,22 @@ def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str]:
     for key in ("urdf", "srdf"):
         if key not in node.entries:
             reading.faults.add(node.location, f"robot has no {key}; allowed: a package, or {{urdf: FILE, srdf: FILE}}")
-    return files
+    return files if len(reading.faults) == before else None
 
 
 def _grasp_settings(node: Node_Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
     """Looks the models up, and checks that the target is one of the objects; it is the first one by default."""
+    if "objects" not in values:
+        return values
+    before, target = len(reading.faults), values.get("target")
     objects = launch_settings.placed_objects(values["objects"], launch_settings.DEFAULT_LAUNCH, {}, reading)
     names = [found.name for found in objects]
     if not values["objects"]:
         reading.faults.add(node.entries["objects"].location, "objects is empty; name at least the one to grasp")
-    if values["target"] and values["target"] not in names:
-        reading.faults.add_unknown(node.entries["target"].location, "the target", values["target"], names)
+    elif target and target not in names and len(reading.faults) == before:
+        reading.faults.add_unknown(node.entries["target"].location, "the target", target, names)
     with_files = [replace(found, model=str(found.file)) for found in objects]
-    return values | {"objects": with_files, "target": values["target"] or (names[0] if names else "")}
+    return values | {"objects": with_files, "target": target or (names[0] if names else "")}
 
 
 def _as_read(node: Node_Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:

@@ -70,6 +70,10 @@ class LaunchCheck:
         except (PlanningError, ModelError) as error:
             return [LaunchFault("", str(error))]
 
+    def faults_of_values(self) -> list[LaunchFault]:
+        """Returns the faults of values alone, for a launch of which only a part is known."""
+        return list(self._names.wrong_values())
+
     def registry(self) -> PlannerRegistry | None:
         """Returns the planners of the launch; None if it starts no move_group."""
         if self._node is None:
@@ -83,7 +87,7 @@ class LaunchCheck:
         parent = f"{self._node.name}/{PIPELINES}/"
         given = [name.removeprefix(parent).split("/")[0] for name in leaves(self._given) if name.startswith(parent)]
         broken = registry.adapter_faults([registry.default, *given])
-        yield from (LaunchFault("", text) for text in broken)
+        yield from (LaunchFault(f"{parent}{name}", text) for name, text in broken.items())
         for name, value in self._names.naming("pipeline"):
             if value not in registry.specs:
                 yield _unknown(name, "pipeline", value, tuple(registry.specs))
@@ -96,8 +100,8 @@ class LaunchCheck:
                 continue
             except ModelError:
                 continue  # noted above
-            for text in registry.adapter_faults([found.pipeline]):
-                if text not in broken:
+            for parameter, text in registry.adapter_faults([found.pipeline]).items():
+                if parameter not in broken:
                     yield LaunchFault(name, text)
             for text in registry.faults(found):
                 yield LaunchFault(name, f"planner '{value}': {text.replace('; it is ignored', '')}")

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,7 +14,12 @@ import rospkg
 from modular_framework_benchmark.experiments.surroundings import NotThere
 from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
 from modular_framework_core.files.faults import listing, nearest
-from modular_framework_core.launching.launch_arguments import argument_values, check_arguments, known_arguments
+from modular_framework_core.launching.launch_arguments import (
+    ArgumentError,
+    argument_values,
+    check_arguments,
+    known_arguments,
+)
 from modular_framework_core.launching.launch_values import file_faults
 
 
@@ -57,12 +62,10 @@ class RosSurroundings:
         """Returns the arguments of a launch file, with their defaults."""
         return _known(str(self.launch_file(launch)))
 
-    def check_launch(self, launch: str, arguments: Mapping[str, str]) -> None:
-        """Checks the values of arguments."""
+    def launch_faults(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
+        """Returns what is wrong with the values of arguments."""
         path = str(self.launch_file(launch))
-        problem = _problem(path, tuple(f"{name}:={value}" for name, value in arguments.items()))
-        if problem:
-            raise NotThere(problem.removeprefix(f"{path}: "))
+        return _argument_faults(path, tuple(f"{name}:={value}" for name, value in arguments.items()))
 
     def task(self, name: str, folder: Path) -> str:
         """Returns the path of a task of the API package, or of one's own."""
@@ -108,12 +111,14 @@ def _known(path: str) -> dict[str, str | None]:
 
 
 @lru_cache(maxsize=4096)
-def _problem(path: str, arguments: tuple[str, ...]) -> str:
+def _argument_faults(path: str, arguments: tuple[str, ...]) -> tuple[str, ...]:
     try:
         check_arguments(path, list(arguments), file_faults)  # numbers are checked with the parameters
+    except ArgumentError as error:
+        return error.faults
     except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, ValueError) as error:
-        return str(error)
-    return ""
+        return (str(error).removeprefix(f"{path}: "),)
+    return ()
 
 
 @lru_cache(maxsize=4096)

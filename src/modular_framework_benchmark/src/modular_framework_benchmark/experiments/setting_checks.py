@@ -37,4 +37,4 @@ class CheckedSettings:
 
 
 SettingsCheck = Callable[[Mapping[str, Any]], CheckedSettings]
-"""Looks up the names in the settings of a combination."""
+"""Looks up the names in the settings of a combination; keys whose values cannot be read are missing."""

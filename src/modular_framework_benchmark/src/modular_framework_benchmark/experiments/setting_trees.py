@@ -30,14 +30,17 @@ def references(node: Node) -> Iterator[tuple[str, Scalar]]:
                 yield from references(value)
 
 
-def check_references(node: Node, factors: Map[str, object], faults: FaultList) -> None:
-    """Notes a fault for each `$NAME` that is no factor."""
+def check_references(node: Node, factors: Map[str, object], faults: FaultList) -> list[str]:
+    """Notes a fault for each `$NAME` that is no factor, and returns these names."""
+    unknown = []
     for name, text in references(node):
         if name not in factors:
+            unknown.append(name)
             faults.add(
                 text.location,
                 f"'${name}' names no factor; {listing(factors)}{nearest(name, factors)}; write $$ for a dollar sign",
             )
+    return unknown
 
 
 def substituted(node: Node, levels: Map[str, Scalar]) -> Node:

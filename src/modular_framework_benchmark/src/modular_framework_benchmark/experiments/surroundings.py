@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -32,11 +32,13 @@ class Surroundings(Protocol):
             NotThere: As `launch_file`; or the file is no launch file.
         """
 
-    def check_launch(self, launch: str, arguments: Mapping[str, str]) -> None:
-        """Checks values of the arguments of a launch file, all of which it takes.
+    def launch_faults(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
+        """Returns what is wrong with the values of arguments of a launch file, all of which it takes.
+
+        Each is a sentence that names the argument.
 
         Raises:
-            NotThere: A value is wrong, or names a file that is not there.
+            NotThere: There is no such launch file.
         """
 
     def task(self, name: str, folder: Path) -> str:

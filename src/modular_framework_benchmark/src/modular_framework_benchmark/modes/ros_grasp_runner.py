@@ -41,6 +41,8 @@ from modular_framework_planning.kinematics.inverse_kinematics import InverseKine
 from modular_framework_ros.parameter_declarations import NodeDeclaration, node_declaration
 from modular_framework_ros.reported_figures import BEST_RANK, CANDIDATES, CHECKED, REACHABLE, Figure
 
+ALLOWED_METHOD = "allowed: MODULE:CLASS of a grasp method, such as top_down_grasps.ros_top_down_node:TopDownMethod"
+
 
 @dataclass(frozen=True, slots=True)
 class _Prepared:
@@ -115,18 +117,22 @@ def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:
     Raises:
         ModeError: It cannot be imported, or a parameter is not allowed.
     """
-    module, _, name = reference.partition(":")
-    allowed = "allowed: MODULE:CLASS of a grasp method, such as top_down_grasps.ros_top_down_node:TopDownMethod"
-    try:
-        kind = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError, TypeError) as error:
-        raise ModeError(f"method '{reference}' cannot be imported ({error}); {allowed}") from error
+    kind = method_class(reference)
     declared = node_declaration(*getattr(kind, "declared_in", ("", ""))) or NodeDeclaration()
     try:
         made: GraspMethod = kind(GivenParameters(parameters, declared))
     except TypeError as error:
-        raise ModeError(f"method '{reference}' cannot be made ({error}); {allowed}") from error
+        raise ModeError(f"method '{reference}' cannot be made ({error}); {ALLOWED_METHOD}") from error
     return made
+
+
+def method_class(reference: str) -> Any:
+    """Returns the class of a method; its argument and its errors are those of `load_method`."""
+    module, _, name = reference.partition(":")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise ModeError(f"method '{reference}' cannot be imported ({error}); {ALLOWED_METHOD}") from error
 
 
 def _candidates(

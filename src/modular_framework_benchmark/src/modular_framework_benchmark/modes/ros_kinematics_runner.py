@@ -97,8 +97,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
         """Returns the solver, warm: its first solution takes longer."""
         robot = self.robot(settings["robot"])
         group = robot.chain(str(settings["group"]))
-        if settings["solver"] not in SOLVERS:
-            raise ModeError(f"solver '{settings['solver']}': allowed are {', '.join(filter(None, SOLVERS))}")
+        check_solver(str(settings["solver"]))
         solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
         if settings["solver"] == CLOSED_FORM and solver.method == NUMERIC:
             raise ModeError(f"solver '{CLOSED_FORM}': group '{group.name}' has no closed form; leave the key out")
@@ -106,11 +105,28 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
         return solver
 
 
+def check_solver(name: str) -> None:
+    """Raises ModeError if the setting `solver` is not one of SOLVERS."""
+    if name not in SOLVERS:
+        raise ModeError(f"solver '{name}': allowed are {', '.join(filter(None, SOLVERS))}")
+
+
+def solver_parameters(parameters: Mapping[str, Any], group: str) -> dict[str, Any]:
+    """Returns the settings of a group's solver that ROS parameters give, by their names in kinematics.yaml.
+
+    Raises:
+        ModeError: A parameter is not below the group's name in robot_description_kinematics.
+        PlanningError: A value is not allowed.
+    """
+    given = parameters_below(parameters, (f"/robot_description_kinematics/{group}/",))
+    settings_from({group: given})
+    return given
+
+
 def _solver_settings(robot: Robot, settings: Mapping[str, Any]) -> KinematicsSettings:
     group = str(settings["group"])
     result = robot.kinematics.get(group, KinematicsSettings())
-    parents = (f"/robot_description_kinematics/{group}/",)
-    given = parameters_below(settings.get("parameters") or {}, parents)
+    given = solver_parameters(settings.get("parameters") or {}, group)
     if given:
         result = settings_from({group: {"kinematics_solver": result.solver, **given}})[group]
     return replace(result, solver=str(settings["solver"])) if settings.get("solver") else result

@@ -18,9 +18,10 @@ import pyarrow.parquet as pq
 from modular_framework_benchmark.metrics.measurements import ComponentReport, Motion
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
-from modular_framework_benchmark.modes.parameters import merged, parameters_below
+from modular_framework_benchmark.modes.parameters import merged
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
+from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.what_ran import WhatRan, description_digests
 from modular_framework_planning.errors import ErrorCode, PlanningError
@@ -111,8 +112,8 @@ def _pipeline_spec(robot: Robot, settings: Mapping[str, Any]) -> PipelineSpec:
     """
     name, planner = str(settings.get("pipeline") or "ompl"), str(settings["planner"])
     own = robot.pipelines.get(name) or {"planning_plugin": PLUGINS.get(name, name)}
-    parents = ("/move_group/", f"/move_group/planning_pipelines/{name}/")
-    parameters = merged({**own, **FULL_SPEED}, parameters_below(settings.get("parameters") or {}, parents))
+    given = pipeline_parameters(settings.get("parameters") or {}, name)
+    parameters = merged({**own, **FULL_SPEED}, given)
     if settings.get("planner_parameters"):
         configurations = {planner: {"type": f"geometric::{planner}"}}
         configurations = merged(configurations, parameters.get("planner_configs") or {})

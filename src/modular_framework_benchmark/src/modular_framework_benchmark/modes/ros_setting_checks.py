@@ -3,18 +3,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import rospkg
 
 from modular_framework_benchmark.episodes.errors import SettingsError
 from modular_framework_benchmark.episodes.ros_stack_launch import preview_stack
+from modular_framework_benchmark.experiments.mode_settings import MODES
 from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
 from modular_framework_benchmark.experiments.setting_checks import CheckedSettings, SettingFault, SettingsCheck
 from modular_framework_benchmark.modes.errors import ModeError
-from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner, load_method
-from modular_framework_benchmark.modes.ros_kinematics_runner import KinematicsEpisodeRunner
+from modular_framework_benchmark.modes.robots import Robot
+from modular_framework_benchmark.modes.ros_grasp_runner import GraspEpisodeRunner, load_method, method_class
+from modular_framework_benchmark.modes.ros_kinematics_runner import (
+    KinematicsEpisodeRunner,
+    check_solver,
+    solver_parameters,
+)
+from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
+from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
 from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
 from modular_framework_benchmark.records.what_ran import solver_substitutions, substitution_text
 from modular_framework_core.files.faults import listing, nearest
@@ -33,23 +41,11 @@ NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "
 def setting_checks() -> dict[str, SettingsCheck]:
     """Returns what looks up the settings of each mode."""
     planning, kinematics, grasps = PlanningEpisodeRunner(), KinematicsEpisodeRunner(), GraspEpisodeRunner()
-
-    def check_kinematics(settings: Mapping[str, Any]) -> None:
-        kinematics.prepared(settings)
-
-    def check_grasps(settings: Mapping[str, Any]) -> None:
-        joint = str(settings["gripper_joint"])
-        joints = [item.name for item in read_urdf(grasps.robot(settings["robot"]).urdf).joints]
-        if joint not in joints:
-            raise ModeError(f"gripper_joint '{joint}': the robot has none; {listing(joints)}{nearest(joint, joints)}")
-        load_method(str(settings["method"]), settings["method_parameters"])
-        grasps.prepared(settings)
-
     return {
         "task": check_task,
         "planning": lambda settings: check_planning(planning, settings),
-        "kinematics": lambda settings: _checked_by(check_kinematics, settings),
-        "grasps": lambda settings: _checked_by(check_grasps, settings),
+        "kinematics": lambda settings: check_kinematics(kinematics, settings),
+        "grasps": lambda settings: check_grasps(grasps, settings),
     }
 
 
@@ -57,28 +53,101 @@ def _plain(settings: Mapping[str, Any], *without: str) -> dict[str, Any]:
     return {key: value for key, value in settings.items() if key not in without}
 
 
-def _checked_by(prepare: Any, settings: Mapping[str, Any]) -> CheckedSettings:
-    """Checks settings by making what their episodes share; a fault begins with the key that it speaks of."""
-    try:
-        prepare(settings)
-    except (ModeError, ModelError, PlanningError) as error:
-        text = str(error)
-        key = next((key for key in settings if text.startswith((f"{key} ", f"{key}:"))), "group")
-        return CheckedSettings((SettingFault((key,), text),), None)
-    return CheckedSettings((), dict(settings))
+def _faults_of(checks: Iterable[tuple[tuple[str, ...], Callable[[], object]]]) -> list[SettingFault]:
+    """Returns the faults that checks raise, each with the keys of its setting."""
+    faults = []
+    for keys, check in checks:
+        try:
+            check()
+        except (ModeError, ModelError, PlanningError) as error:
+            faults.append(SettingFault(keys, str(error)))
+    return faults
+
+
+def _robot(runner: ModelEpisodeRunner[Any], settings: Mapping[str, Any]) -> tuple[Robot | None, list[SettingFault]]:
+    """Returns the robot and the fault of loading it; None without a fault if the setting could not be read."""
+    if "robot" not in settings:
+        return None, []
+    faults = _faults_of([(("robot",), lambda: runner.robot(settings["robot"]))])
+    return (None if faults else runner.robot(settings["robot"])), faults
+
+
+def _is_whole(mode: str, settings: Mapping[str, Any]) -> bool:
+    """Returns whether every setting of a mode could be read."""
+    return settings.keys() >= MODES[mode].keys.keys()
+
+
+def _check_group(robot: Robot, name: str) -> None:
+    groups = robot.model.groups
+    if name not in groups:
+        raise ModeError(f"there is no planning group '{name}'; {listing(groups)}{nearest(name, groups)}")
+
+
+def _check_chain(robot: Robot, name: str) -> None:
+    _check_group(robot, name)
+    robot.chain(name)
+
+
+def check_kinematics(runner: KinematicsEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
+    """Checks robot, group, solver and parameters of mode `kinematics`."""
+    group = str(settings.get("group", ""))
+
+    def check_parameter(name: str, value: object) -> Callable[[], object]:
+        return lambda: solver_parameters({name: value}, group)
+
+    robot, faults = _robot(runner, settings)
+    faults += _faults_of([(("solver",), lambda: check_solver(str(settings.get("solver", ""))))])
+    if "group" in settings:
+        given = settings.get("parameters", {})
+        faults += _faults_of((("parameters", name), check_parameter(name, value)) for name, value in given.items())
+    if robot is not None and "group" in settings:
+        faults += _faults_of([(("group",), lambda: _check_chain(robot, group))])
+    if robot is not None and not faults and _is_whole("kinematics", settings):
+        faults += _faults_of([(("group",), lambda: runner.prepared(settings))])
+    return CheckedSettings(tuple(faults), None if faults else dict(settings))
+
+
+def check_grasps(runner: GraspEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
+    """Checks robot, group, gripper joint, method and its parameters of mode `grasps`."""
+    robot, faults = _robot(runner, settings)
+    joint, group = str(settings.get("gripper_joint")), str(settings.get("group"))
+    method, parameters = str(settings.get("method")), settings.get("method_parameters", {})
+
+    def check_joint(robot: Robot) -> None:
+        joints = [item.name for item in read_urdf(robot.urdf).joints]
+        if joint not in joints:
+            raise ModeError(f"gripper_joint '{joint}': the robot has none; {listing(joints)}{nearest(joint, joints)}")
+
+    if "method" in settings:
+        faults += _faults_of([(("method",), lambda: method_class(method))]) or _faults_of(
+            [(("method_parameters",), lambda: load_method(method, parameters))]
+        )
+    if robot is not None and "group" in settings:
+        faults += _faults_of([(("group",), lambda: _check_chain(robot, group))])
+    if robot is not None and "gripper_joint" in settings:
+        faults += _faults_of([(("gripper_joint",), lambda: check_joint(robot))])
+    if robot is not None and not faults and _is_whole("grasps", settings):
+        faults += _faults_of([(("gripper_joint",), lambda: runner.prepared(settings))])
+    return CheckedSettings(tuple(faults), None if faults else dict(settings))
 
 
 def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
     """Checks the launch and the task of mode `task`."""
+    if "launch" not in settings:
+        return CheckedSettings((), None)
+    is_known = "arguments" in settings
     try:
         launch = preview_stack(settings).preview
     except (SettingsError, rospkg.ResourceNotFound) as error:
-        return CheckedSettings((SettingFault(("arguments",), str(error)),), None)
-    check = LaunchCheck(launch, settings["parameters"], tuple(settings["extra_parameters"]))
+        return CheckedSettings((SettingFault(("arguments",), str(error)),) if is_known else (), None)
+    check = LaunchCheck(launch, settings.get("parameters"), settings.get("extra_parameters", ()))
+    found = check.faults() if is_known else check.faults_of_values()
     faults = tuple(
-        SettingFault((found.key, found.name) if found.name else (found.key,), found.text) for found in check.faults()
+        SettingFault((item.key, item.name) if item.name else (item.key,), item.text)
+        for item in found
+        if item.key in settings
     )
-    if faults:
+    if faults or not _is_whole("task", settings):
         return CheckedSettings(faults, None)
     return CheckedSettings(
         (),
@@ -93,26 +162,47 @@ def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
 
 def check_planning(runner: PlanningEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
     """Checks robot, group, pipeline, planner and parameters of mode `planning`."""
-    try:
-        robot = runner.robot(settings["robot"])
-    except (ModeError, ModelError, PlanningError) as error:
-        return CheckedSettings((SettingFault(("robot",), str(error)),), None)
+    robot, faults = _robot(runner, settings)
+    if robot is None:
+        return CheckedSettings(tuple(faults), None)
+    if settings.get("group"):
+        faults += _faults_of([(("group",), lambda: _check_group(robot, str(settings["group"])))])
+    if "pipeline" not in settings:
+        return CheckedSettings(tuple(faults), None)
+    check = _planning_check(robot, settings)
+    faults += _parameter_faults(check, settings)
+    found = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS})) if "planner" in settings else None
+    return CheckedSettings(tuple(faults), {**settings, "planner": repr(found)}, _substitutions(check.registry(), found))
+
+
+def _planning_check(robot: Robot, settings: Mapping[str, Any]) -> LaunchCheck:
+    """Returns the check of a move_group with the robot and the pipeline of mode `planning`."""
     pipeline = str(settings["pipeline"])
     pipelines = {**robot.pipelines}
     pipelines.setdefault(pipeline, {"planning_plugin": PLUGINS.get(pipeline, pipeline)})
-    parameters = leaves({"/move_group/planning_pipelines": pipelines, "/robot_description_planning": robot.planning})
-    check = LaunchCheck(LaunchPreview((NODE,), parameters), settings["parameters"])
-    faults = [
-        SettingFault(("parameters", found.name), found.text)
-        for found in check.faults()
-        if found.name in leaves(settings["parameters"])
-    ]
-    groups = robot.model.groups
-    if settings["group"] and settings["group"] not in groups:
-        hint = f"{listing(groups)}{nearest(settings['group'], groups)}"
-        faults.append(SettingFault(("group",), f"there is no planning group '{settings['group']}'; {hint}"))
-    found = _planner(check, settings, faults, sorted({*robot.pipelines, *PLUGINS}))
-    return CheckedSettings(tuple(faults), {**settings, "planner": repr(found)}, _substitutions(check.registry(), found))
+    parameters = leaves({f"{NODE.name}/planning_pipelines": pipelines, "/robot_description_planning": robot.planning})
+    urdf, srdf = robot.model.source[:2]
+    parameters |= {"/robot_description": urdf, "/robot_description_semantic": srdf}
+    parameters[f"{NODE.name}/default_planning_pipeline"] = pipeline
+    return LaunchCheck(LaunchPreview((NODE,), parameters), settings.get("parameters"))
+
+
+def _parameter_faults(check: LaunchCheck, settings: Mapping[str, Any]) -> Iterator[SettingFault]:
+    """Yields what is wrong with the parameters of mode `planning`, and with those of its pipeline."""
+    given = leaves(settings.get("parameters", {}))
+    pipeline, unread = str(settings["pipeline"]), set()
+    for name, value in given.items():
+        try:
+            pipeline_parameters({name: value}, pipeline)
+        except ModeError as error:
+            unread.add(name)
+            yield SettingFault(("parameters", name), str(error))
+    plugin = f"{NODE.name}/planning_pipelines/{pipeline}/planning_plugin"
+    for found in check.faults():
+        if found.name not in unread and (
+            found.name != plugin or plugin in given
+        ):  # else it is a fault of the pipeline's name
+            yield SettingFault(("parameters", found.name), found.text)
 
 
 def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:
@@ -128,7 +218,7 @@ def _planner(
     try:
         registry = check.registry()
         assert registry is not None
-        found = registry.resolve(str(settings["planner"]), str(settings["group"]), str(settings["pipeline"]))
+        found = registry.resolve(str(settings["planner"]), str(settings.get("group", "")), str(settings["pipeline"]))
     except UnknownNameError as error:
         hint = f"{listing(error.known)}{nearest(error.name, error.known)}"
         faults.append(SettingFault((error.what,), f"there is no {error.what} '{error.name}'; {hint}"))
@@ -143,7 +233,7 @@ def _planner(
 
 
 def _setting_faults(check: LaunchCheck, found: ResolvedPlanner, settings: Mapping[str, Any]) -> Iterator[SettingFault]:
-    for key, value in settings["planner_parameters"].items():
+    for key, value in settings.get("planner_parameters", {}).items():
         registry = check.registry()
         for text in registry.faults(found, {key: value}) if registry is not None else ():
             yield SettingFault(("planner_parameters", key), text.replace("; it is ignored", ""))

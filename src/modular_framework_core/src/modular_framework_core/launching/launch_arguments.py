@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import roslaunch.arg_dump
@@ -18,6 +18,18 @@ from modular_framework_urdf import xml_text
 
 BOOLEANS = ("true", "false", "1", "0")
 """Texts that roslaunch accepts as a bool, case-insensitive."""
+
+
+class ArgumentError(roslaunch.core.RLException):  # type: ignore[misc]
+    """Arguments of a launch file are wrong.
+
+    Attributes:
+        faults: A sentence for each.
+    """
+
+    def __init__(self, path: str, faults: Sequence[str]) -> None:
+        super().__init__(f"{path}: {'; '.join(faults)}")
+        self.faults = tuple(faults)
 
 
 def argument_values(path: str, arguments: list[str]) -> dict[str, str]:
@@ -69,7 +81,7 @@ def check_arguments(
         faults_of: Function that returns the faults in the values of all arguments.
 
     Raises:
-        roslaunch.core.RLException: Arguments are unknown or invalid; the message names all of them.
+        ArgumentError: Arguments are unknown or invalid; the message names all of them.
     """
     known = known_arguments(path)
     faults = []
@@ -91,4 +103,4 @@ def check_arguments(
     if not faults:
         faults = faults_of(argument_values(path, arguments))
     if faults:
-        raise roslaunch.core.RLException(f"{path}: " + "; ".join(faults))
+        raise ArgumentError(path, faults)

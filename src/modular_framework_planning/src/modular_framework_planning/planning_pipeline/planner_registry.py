@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from modular_framework_planning.errors import ModelError, PlanningError
@@ -124,18 +125,26 @@ class PlannerRegistry:
         """Returns what searches in place of a planner that cannot keep path constraints; empty if nothing does."""
         return str(getattr(planner_class(found.plugin), "constrained_planner", ""))
 
-    def adapter_faults(self, pipelines: Iterable[str]) -> list[str]:
-        """Returns what is wrong with the plugins and request adapters of some pipelines, one sentence each."""
-        faults = []
+    def adapter_faults(self, pipelines: Iterable[str]) -> dict[str, str]:
+        """Returns what is wrong with the plugins and request adapters of some pipelines.
+
+        Returns:
+            A sentence by PIPELINE/PARAMETER.
+        """
+        faults: dict[str, str] = {}
         for name in dict.fromkeys(pipelines):
             spec = self.specs.get(name)
             if spec is None:
                 continue
-            try:
-                planner_class(spec.planner)
-                make_adapters(spec.adapters)
-            except (ModelError, PlanningError) as error:
-                faults.append(f"pipeline '{name}': {error}")
+            checks = {
+                "planning_plugin": partial(planner_class, spec.planner),
+                "request_adapters": partial(make_adapters, spec.adapters),
+            }
+            for parameter, check in checks.items():
+                try:
+                    check()
+                except (ModelError, PlanningError) as error:
+                    faults[f"{name}/{parameter}"] = f"pipeline '{name}': {error}"
         return faults
 
     def _planners(self, spec: PipelineSpec) -> tuple[str, ...]:

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""ROS parameters that mode `planning` reads: those of the pipeline that plans."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from modular_framework_benchmark.modes.errors import ModeError
+from modular_framework_benchmark.modes.parameters import parameters_below
+from modular_framework_core.files.faults import nearest
+from modular_framework_core.launching.ros_launch_preview import leaves
+from modular_framework_ros.parameter_declarations import existing_declaration
+
+NODE = "/move_group/"
+NOT_READ = {"seed": "each episode has its own seed", "capabilities": "this mode starts no move_group"}
+"""Parameters of a pipeline without effect in this mode, and the reason."""
+
+
+def pipeline_parameters(parameters: Mapping[str, Any], pipeline: str) -> dict[str, Any]:
+    """Returns the parameters of a pipeline, nested; a name below the pipeline comes before the same name of the node.
+
+    Args:
+        parameters: Values by whole name.
+        pipeline: Name of the pipeline that plans.
+
+    Raises:
+        ModeError: The mode does not read a parameter; names each.
+    """
+    own, given = f"{NODE}planning_pipelines/{pipeline}/", leaves(parameters)
+    declared = existing_declaration("modular_framework_planning", "planning_pipeline").parameters
+    read = [f"{parent}{key}" for parent in (own, NODE) for key in declared if key not in NOT_READ]
+    faults = []
+    for name in given:
+        key = name.removeprefix(own).removeprefix(NODE).partition("/")[0]
+        is_read = name.startswith(own) or (name.startswith(NODE) and key in declared)
+        if not is_read or key in NOT_READ:
+            reason = NOT_READ[key] if is_read else f"allowed are names below {own}{nearest(name, read)}"
+            faults.append(f"parameter '{name}' has no effect in this mode; {reason}")
+    if faults:
+        raise ModeError("; ".join(faults))
+    return parameters_below(given, (NODE, own))
