@@ -207,6 +207,7 @@ def in_script(text: str, words: str, state: str = "") -> Case:
 
 
 IK = "/robot_description_kinematics"
+LIMITS = "/robot_description_planning/joint_limits"
 OWN_STATE = """import smach
 class Mine(smach.State):
     def __init__(self, outcomes=("success",), **options):
@@ -271,6 +272,32 @@ CASES = [
     in_parameters(f"{PIPELINE}/path_tolerance", -1, "is -1; allowed: a number, at least 0"),
     in_parameters(f"{PIPELINE}/resample_dt", 0, "is 0; allowed: a number, at least 0.004"),
     in_parameters("/move_group/trajectory_execution/allowed_start_tolerance", -1, "allowed: a number, at least 0"),
+    in_parameters(f"{LIMITS}/elbo_joint/max_velocity", 1.0, "names no joint: 'elbo_joint'.*did you mean 'elbow_joint'"),
+    in_parameters(f"{LIMITS}/elbow_joint/max_velocty", 1.0, "did you mean 'max_velocity'"),
+    in_parameters(f"{LIMITS}/elbow_joint", {"max_velocity": -1}, "is -1; allowed: a number, above 0"),
+    in_parameters(f"{LIMITS}/elbow_joint", 3, "is 3; allowed: has_position_limits"),
+    in_parameters("/joint_limits/elbo_joint/max_velocity", 1.0, "did you mean 'elbow_joint'"),
+    in_parameters(
+        "/robot_description_planning/default_velocity_scaling_facor", 0.5, "mean 'default_velocity_scaling_factor'"
+    ),
+    in_parameters(
+        "/robot_description_planning/default_robot_link_padding/base_lnk", 0.1, "no link.*did you mean 'base_link'"
+    ),
+    in_parameters(
+        "/move_group/trajectory_execution/joints_allowed_start_tolerance/elbo_joint", 0.1, "did you mean 'elbow_joint'"
+    ),
+    in_parameters("/collision_detector", "Bulet", "'Bulet' is not known.*did you mean 'Bullet'"),
+    in_parameters("/move_group/collision_detector", "fcll", "'fcll' is not known.*did you mean 'FCL'"),
+    in_parameters("/move_group/capabilities", "move_group/TfPublishr", "did you mean 'move_group/TfPublisher'"),
+    in_parameters(
+        "/move_group/disable_capabilities", "move_group/MoveGroupPickPlaceActon", "mean 'move_group/MoveGroupPickPlace"
+    ),
+    in_parameters("/move_group/planning_pipelines/ompl/capabilities", "move_group/Tf", "no capability 'move_group/Tf'"),
+    in_parameters(
+        "/move_group/moveit_controller_manager",
+        "moveit_simple_controller_manager/MoveItSimpleControllerManagr",
+        "did you mean 'moveit_simple_controller_manager/MoveItSimpleControllerManager'",
+    ),
     # Launch arguments of an experiment
     in_experiment(TASK, ("arguments",), {"world_fil": "ur5_table.world"}, "did you mean 'world_file'"),
     in_experiment(TASK, ("arguments", "world_file"), "ur5_tabel.world", "did you mean 'ur5_table.world'"),
@@ -298,6 +325,18 @@ CASES = [
     in_experiment(TASK, ("compare",), "planer", "did you mean 'planner'"),
     in_experiment(TASK, ("trails",), 5, "'trails' is unknown; allowed: .*trials"),
     in_experiment(TASK, ("factors", "planner"), ["RRTConnect", "ompl/RRTConnect"], "run the same"),
+    in_experiment(
+        PLAIN,
+        ("factors", "world"),
+        {"a": {"parameters": {"/collision_detector": "FCL"}}, "b": {"parameters": {"/collision_detector": "Bullet"}}},
+        "run the same",
+    ),
+    in_experiment(
+        PLAIN,
+        ("factors", "world"),
+        {"a": {}, "b": {"parameters": {"/move_group/plan_execution/max_replan_attempts": 5}}},
+        "run the same",
+    ),
     in_experiment(
         PLAIN,
         ("factors", "world"),

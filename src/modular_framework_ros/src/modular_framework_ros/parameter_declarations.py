@@ -54,6 +54,8 @@ class Declaration:
         names: Kind of thing it names, such as `planner` or `group`; empty: none.
         adjustable: Lowest and highest value that dynamic_reconfigure may give it while the node runs; empty: none.
         tree: Whether there are names below this one that only the robot or a plugin knows.
+        below: PACKAGE/NAME of the declaration of these names, in which `{joint}`, `{link}` and `{group}` stand for
+            names of the robot; empty: any are allowed.
     """
 
     name: str
@@ -72,6 +74,7 @@ class Declaration:
     names: str = ""
     adjustable: tuple[Any, ...] = ()
     tree: bool = False
+    below: str = ""
 
     @property
     def allowed(self) -> str:

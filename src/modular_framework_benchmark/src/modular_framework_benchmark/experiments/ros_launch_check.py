@@ -10,6 +10,13 @@ from typing import Any
 
 import rospkg
 
+from modular_framework_benchmark.experiments.ros_move_group_names import (
+    DETECTOR,
+    MANAGER,
+    move_group_faults,
+    resolved_names,
+)
+from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
 from modular_framework_core.files import default_folders
 from modular_framework_core.files.faults import TaskFault, listing, nearest
 from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
@@ -25,9 +32,6 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
     UnknownNameError,
 )
 from modular_framework_ros.parameter_declarations import node_declaration
-from modular_framework_urdf.srdf_reader import read_srdf
-from modular_framework_urdf.urdf_reader import read_urdf
-from modular_framework_urdf.xml_text import XmlError
 
 MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
 PIPELINES = "planning_pipelines"
@@ -63,6 +67,7 @@ class LaunchCheck:
                 *self._names.wrong_values(),
                 *self._robot_faults(),
                 *self._kinematics_faults(),
+                *move_group_faults(self._names, self._given),
                 *(self._planner_faults() if self._node is not None else ()),
                 *self._controller_faults(),
                 *self._task_faults(),
@@ -115,7 +120,7 @@ class LaunchCheck:
             if not name.startswith(parent):
                 continue
             pipeline, key, *rest = [*name.removeprefix(parent).split("/"), ""]
-            known = (*declared.parameters, *self._groups())
+            known = (*declared.parameters, *self._robot.groups)
             if pipeline not in self._pipelines and f"{parent}{pipeline}/planning_plugin" not in self.launch.parameters:
                 yield _unknown(name, "pipeline", pipeline, self._pipelines)
             elif key not in known:
@@ -140,32 +145,28 @@ class LaunchCheck:
         for text in registry.faults(found, {key: value}):
             yield LaunchFault(name, text.replace("; it is ignored", ""))
 
-    def _groups(self) -> tuple[str, ...]:
-        text = self.launch.parameters.get(f"/{DESCRIPTION}_semantic")
-        try:
-            return tuple(read_srdf(str(text), f"/{DESCRIPTION}_semantic").groups) if text else ()
-        except XmlError:
-            return ()
+    @property
+    def _robot(self) -> RobotNames:
+        urdf, srdf = (str(self.launch.parameters.get(f"/{DESCRIPTION}{end}") or "") for end in ("", "_semantic"))
+        return robot_names(urdf, srdf)
 
     def _robot_faults(self) -> Iterator[LaunchFault]:
-        """Yields the planning groups and joints that the robot does not have."""
-        groups = self._groups()
-        for name, value in self._names.naming("group") if groups else ():
-            if value not in groups:
-                yield _unknown(name, "planning group", value, groups)
-        text = self.launch.parameters.get(f"/{DESCRIPTION}")
-        try:
-            joints = tuple(joint.name for joint in read_urdf(str(text)).joints) if text else ()
-        except XmlError as error:
-            yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {error}", ARGUMENTS)
+        """Yields the planning groups, joints and links that the robot does not have."""
+        robot = self._robot
+        for name, value in self._names.naming("group") if robot.groups else ():
+            if value not in robot.groups:
+                yield _unknown(name, "planning group", value, robot.groups)
+        if robot.fault:
+            yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {robot.fault}", ARGUMENTS)
             return
-        for name, value in self._names.naming("joint") if joints else ():
-            if value not in joints:
-                yield _unknown(name, "joint", value, joints)
+        for name, value in self._names.naming("joint") if robot.joints else ():
+            if value not in robot.joints:
+                yield _unknown(name, "joint", value, robot.joints)
+        yield from self._names.below_trees(self._given, robot.by_kind())
 
     def _kinematics_faults(self) -> Iterator[LaunchFault]:
         """Yields the groups, solvers and keys of kinematics.yaml that do not exist."""
-        groups = self._groups()
+        groups = self._robot.groups
         for name, value in self.launch.parameters.items():
             _, found, rest = name.partition(f"/{DESCRIPTION}_kinematics/")
             group, _, key = rest.partition("/")
@@ -191,6 +192,15 @@ class LaunchCheck:
                     yield LaunchFault(
                         "controller_file", f"argument 'controller_file': {error}{nearest(file, there)}", ARGUMENTS
                     )
+
+    def resolved_parameters(self) -> dict[str, Any]:
+        """Returns the parameters with the defaults of those that are not set; equal for launches that run the same."""
+        parameters = self._names.effective_values()
+        if self._node is None:
+            return parameters
+        named = (DETECTOR, MANAGER)
+        rest = {name: value for name, value in parameters.items() if name.rpartition("/")[2] not in named}
+        return rest | resolved_names(self.launch, self._node)
 
     def named_solvers(self) -> list[str]:
         """Returns the kinematics solvers that kinematics.yaml names, one per group."""

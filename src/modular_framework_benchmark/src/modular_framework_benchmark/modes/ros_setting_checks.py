@@ -154,7 +154,7 @@ def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
         {
             **_plain(settings, "arguments", "parameters", "launch"),
             "nodes": sorted(map(repr, check.launch.nodes)),
-            "parameters": {**check.launch.parameters, "/planner_name": repr(check.planner())},
+            "parameters": {**check.resolved_parameters(), "/planner_name": repr(check.planner())},
         },
         (*_substitutions(check.registry(), check.planner()), *solver_substitutions(check.named_solvers())),
     )

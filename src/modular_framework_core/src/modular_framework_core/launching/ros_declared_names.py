@@ -3,14 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from modular_framework_core.files.faults import closest, nearest
+from modular_framework_core.launching.declared_trees import tree_fault
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
-from modular_framework_ros.parameter_declarations import Declaration, NodeDeclaration, node_declaration
+from modular_framework_ros.parameter_declarations import (
+    Declaration,
+    NodeDeclaration,
+    existing_declaration,
+    node_declaration,
+)
 
 ROSLAUNCH_NAMES = ("/rosdistro", "/rosversion", "/run_id", "/roslaunch")
 
@@ -81,6 +87,22 @@ class DeclaredNames:
             text = f"no node of the launch reads the parameter '{name}'{self._hint(name)}"
             yield LaunchFault(name, f"{text}; list it in extra_parameters if a node of your own reads it")
 
+    def below_trees(self, given: Mapping[str, Any], robot: Mapping[str, Collection[str]]) -> Iterator[LaunchFault]:
+        """Yields a fault for each parameter below a tree that names nothing of the robot, or is not allowed.
+
+        Args:
+            given: Parameters by whole name.
+            robot: Names of the robot by kind: joint, link, group; a kind that is missing is not known.
+        """
+        for tree, users in self.known.items():
+            declared = next((item for _, item in users if item.below), None)
+            for name, value in leaves(given).items() if declared is not None else ():
+                if name.startswith(f"{tree}/"):
+                    below = existing_declaration(*declared.below.split("/"))
+                    fault = tree_fault(name.removeprefix(f"{tree}/"), value, below, robot)
+                    if fault:
+                        yield LaunchFault(name, f"parameter '{name}' {fault}")
+
     def misspelt(self, without: Container[str] = ()) -> Iterator[LaunchFault]:
         """Yields a fault for each private parameter that its node does not read, except for names in ``without``."""
         for name in self._launch.parameters:
@@ -106,6 +128,17 @@ class DeclaredNames:
     def _parameter_value(self, node: LaunchedNode, name: str) -> Any:
         """Returns the value of a node's parameter by declared name, or None if not set."""
         return self._launch.parameters.get(_resolved_name(name, node))
+
+    def effective_values(self) -> dict[str, Any]:
+        """Returns the parameters of the launch and the declared defaults; numbers of type float are floats."""
+        values = dict(self._launch.parameters)
+        for name, users in self.known.items():
+            item = users[0][1]
+            value = values.get(name, item.default)
+            if value is not None and not item.tree:
+                is_whole = isinstance(value, int) and not isinstance(value, bool)
+                values[name] = float(value) if item.type == "float" and is_whole else value
+        return values
 
     def naming(self, kind: str) -> Iterator[tuple[str, str]]:
         """Yields resolved name and value of each parameter whose value is a name of the given kind."""

@@ -30,6 +30,13 @@ from modular_framework_planning.move_group.controllers.fake_controllers import F
 from modular_framework_planning.move_group.controllers.ros_control import RosControlControllers
 from modular_framework_planning.move_group.monitors.scene_monitor import STATE_PERIOD_S, SceneMonitor
 from modular_framework_planning.move_group.node_parameters import parameter, settings_below
+from modular_framework_planning.move_group.plugin_names import (
+    ALL_ROS_CONTROL_MANAGERS,
+    CONTROLLER_MANAGERS,
+    FAKE_MANAGER,
+    ROS_CONTROL_MANAGER,
+    SIMPLE_MANAGER,
+)
 from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, GRIPPER, choose_controllers
 from modular_framework_planning.trajectory_execution.execution_settings import ExecutionSettings
 from modular_framework_planning.trajectory_execution.path_watch import PathWatch
@@ -46,10 +53,6 @@ STALL_S = 0.25
 """Pause between two polls of a motion after which this process is taken to have stood still [s]."""
 AFTER_STALL_S = 0.5
 """Time in which the ends of motions that came during a stall are received [s]."""
-SIMPLE_MANAGER = "moveit_simple_controller_manager/MoveItSimpleControllerManager"
-FAKE_MANAGER = "moveit_fake_controller_manager/MoveItFakeControllerManager"
-ROS_CONTROL_MANAGER = "moveit_ros_control_interface/MoveItControllerManager"
-ALL_ROS_CONTROL_MANAGERS = "moveit_ros_control_interface/MoveItMultiControllerManager"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -357,5 +360,5 @@ def _load_manager(timeout_s: float, monitor: SceneMonitor) -> ControllerManager:
             return RosControlControllers(listed_controllers(), only, may_switch, timeout_s)
     raise ModelError(
         f"parameter {rospy.resolve_name('~moveit_controller_manager')}: '{name}' is not known; known: "
-        f"{', '.join((SIMPLE_MANAGER, FAKE_MANAGER, ROS_CONTROL_MANAGER, ALL_ROS_CONTROL_MANAGERS))}"
+        f"{', '.join(CONTROLLER_MANAGERS)}"
     )

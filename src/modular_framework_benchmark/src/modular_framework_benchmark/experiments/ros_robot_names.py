@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Names of a robot that parameters, controllers and files of an experiment refer to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from modular_framework_planning.robot_model.multi_dof_joint import FLOATING, PLANAR, MultiDofJoint
+from modular_framework_urdf.srdf_reader import read_srdf
+from modular_framework_urdf.urdf_reader import read_urdf
+from modular_framework_urdf.xml_text import XmlError
+
+
+@dataclass(frozen=True, slots=True)
+class RobotNames:
+    """Names of a robot; empty if its description is not there or cannot be read.
+
+    Attributes:
+        groups: Planning groups.
+        joints: All joints.
+        movable_joints: Joints that move, and the variables of a planar or floating virtual joint.
+        links: All links.
+        fault: Reason why the URDF cannot be read; empty if it can.
+    """
+
+    groups: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    movable_joints: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+    fault: str = ""
+
+    def by_kind(self) -> dict[str, tuple[str, ...]]:
+        """Returns the names that are known, by the kinds that declarations of parameters use."""
+        kinds = {"group": self.groups, "joint": self.movable_joints, "link": self.links}
+        return {kind: names for kind, names in kinds.items() if names}
+
+
+@lru_cache(maxsize=16)
+def robot_names(urdf: str, srdf: str) -> RobotNames:
+    """Returns the names in two descriptions; either may be an empty text."""
+    groups: tuple[str, ...] = ()
+    variables: tuple[str, ...] = ()
+    try:
+        if srdf:
+            semantics = read_srdf(srdf, "robot_description_semantic")
+            groups = tuple(semantics.groups)
+            for joint in semantics.virtual_joints:
+                if joint.kind in (PLANAR, FLOATING):
+                    own = MultiDofJoint(joint.name, joint.kind, joint.parent_frame, joint.child_link)
+                    variables += (*own.variables, *joint.variables)
+    except XmlError:
+        pass  # the task's check says what is wrong with it
+    try:
+        robot = read_urdf(urdf) if urdf else None
+    except XmlError as error:
+        return RobotNames(groups, fault=str(error))
+    if robot is None:
+        return RobotNames(groups)
+    movable = tuple(joint.name for joint in robot.joints if joint.kind != "fixed")
+    links = tuple(link.name for link in robot.links)
+    return RobotNames(groups, tuple(joint.name for joint in robot.joints), (*movable, *variables), links)
