@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,10 +21,12 @@ import yaml
 from modular_framework_benchmark.commands.mode_runners import known_metrics
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
+from modular_framework_benchmark.experiments.ros_controller_names import controller_faults
 from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
 from modular_framework_benchmark.experiments.ros_surroundings import RosSurroundings
 from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
 from modular_framework_core.launching.launch_arguments import check_arguments
+from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview
 from modular_framework_core.task_constructor import pipeline
 
 TASK: dict[str, Any] = {
@@ -175,6 +178,46 @@ def in_config(file: str, key: str, value: Any, words: str) -> Case:
         return in_launch(f"config_directory:={folder}", "").refused(folder)
 
     return Case(file, f"{key}: {value}", refused, words)
+
+
+def in_hardware(old: str, new: str, words: str) -> Case:
+    """Returns the case of a text in the file of the hardware of the real robot."""
+
+    def refused(folder: Path) -> str:
+        shipped = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
+        for path in shipped.iterdir():
+            (folder / path.name).write_bytes(path.read_bytes())
+        text = (folder / "connection_hardware.yaml").read_text()
+        assert old in text, old
+        (folder / "connection_hardware.yaml").write_text(text.replace(old, new, 1))
+        path = roslaunch.rlutil.resolve_launch_arguments(["modular_framework_api", "start_framework.launch"])[0]
+        arguments = [f"config_directory:={folder}", "simulation:=false", "task_constructor_script:=pick_and_hold.yaml"]
+        check_arguments(path, arguments)
+        return "\n".join(launch_faults(path, arguments))
+
+    return Case("connection_hardware.yaml", new, refused, words)
+
+
+def in_controllers(old: str, new: str, words: str) -> Case:
+    """Returns the case of a text in a controller file of a robot's package."""
+
+    def refused(folder: Path) -> str:
+        package = Path(rospkg.RosPack().get_path("ur5_ezgripper_robot"))
+        text = (package / "controllers" / "ur5_ezgripper_controller_simulation.yaml").read_text()
+        assert old in text, old
+        (folder / "controllers").mkdir()
+        (folder / "controllers" / "mine.yaml").write_text(text.replace(old, new, 1))
+        (folder / "package.xml").write_text("<package><name>my_robot</name></package>")
+        spawner = LaunchedNode("modular_framework_core", "robot_controllers_spawner", "/s", "/", "my_robot mine.yaml")
+        joints = (*yaml.safe_load(text)["arm_trajectory_controller"]["joints"], "ezgripper_knuckle_palm_L1_1")
+        before = os.environ["ROS_PACKAGE_PATH"]
+        os.environ["ROS_PACKAGE_PATH"] = f"{folder}:{before}"
+        try:
+            return "\n".join(fault.text for fault in controller_faults(LaunchPreview((spawner,), {}), joints))
+        finally:
+            os.environ["ROS_PACKAGE_PATH"] = before
+
+    return Case("controller file", new, refused, words)
 
 
 def in_task(old: str, new: str, words: str) -> Case:
@@ -391,6 +434,32 @@ CASES = [
     ),
     in_config("generative_methods_config.yaml", "top_down_grasp_generator/yaw_stp", 0.2, "did you mean.*yaw_step'"),
     in_config("generative_methods_config.yaml", "top_down_grasp_generator/max_checks", "all", "is 'all'; allowed"),
+    in_config(
+        "named_joint_states.yaml",
+        "stability_pose/elbo_joint",
+        1.0,
+        "no joint: 'elbo_joint'.*did you mean 'elbow_joint'",
+    ),
+    in_config("named_joint_states.yaml", "mine", {"elbo_joint": 1.0}, "'mine' names no joint: 'elbo_joint'"),
+    in_config(
+        "named_trajectories.yaml",
+        "mine",
+        [{"name": "stability_pos", "interpolate_time": 1.0}],
+        "no joint state: 'stability_pos'.*did you mean 'stability_pose'",
+    ),
+    # Hardware and controllers
+    in_hardware("UrArmRobotHW", "UrArmRobotHw", "did you mean 'modular_framework_drivers/UrArmRobotHW'"),
+    in_hardware("modular_framework_drivers/EzG", "modular_framework_driver/EzG", "framework_drivers/EzGripperRobotHW'"),
+    in_hardware("[ur_robot_hw,", "[ur_robot_h,", "no parameter '/ur_robot_h/type'.*did you mean 'ur_robot_hw'"),
+    in_hardware("robot_ip_address", "robot_ip_adress", "did you mean '/ur_robot_hw/robot_ip_address'"),
+    in_controllers(
+        "position_controllers/JointTrajectoryController",
+        "position_controllers/JointTrajectoryControler",
+        "did you mean 'position_controllers/JointTrajectoryController'",
+    ),
+    in_controllers("- elbow_joint", "- elbo_joint", "no joint 'elbo_joint'.*did you mean 'elbow_joint'"),
+    in_controllers("    elbow_joint:", "    elbo_joint:", "constraints names no joint of it: 'elbo_joint'"),
+    in_controllers("ezgripper_knuckle_palm_L1_1", "ezgripper_knuckle_palm_L1_", "mean 'ezgripper_knuckle_palm_L1_1'"),
     # Task scripts
     in_script(OWN_TASK.format(name="own", option="lambda: 3, "), "key 'lambda' is unknown", OWN_STATE),
     in_script(OWN_TASK.format(name="own", option="class: 3, "), "key 'class' is unknown", OWN_STATE),

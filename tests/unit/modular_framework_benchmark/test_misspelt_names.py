@@ -6,6 +6,9 @@ A third of the cases; `benchmarks/named_is_run` has all of them, and gives some 
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -23,6 +26,9 @@ from misspelt_names import (
     Case,
     changed,
     experiment_faults,
+    in_config,
+    in_controllers,
+    in_hardware,
     in_launch,
     in_script,
     write_problem,
@@ -157,6 +163,34 @@ def test_mode_planning_takes_the_parameters_that_it_reads(tmp_path: Path) -> Non
 @pytest.mark.parametrize("method", ["top_down_grasps", "antipodal_grasps", "point_cloud_grasps"])
 def test_what_is_shipped_names_only_what_is_there(package: str, method: str, tmp_path: Path) -> None:
     assert in_launch(f"method_launch_file:={method}/{method}.launch", "", package).refused(tmp_path) == ""
+
+
+def test_unchanged_hardware_and_controllers_are_in_order(tmp_path: Path) -> None:
+    (tmp_path / "config").mkdir()
+    assert in_hardware("UrArmRobotHW", "UrArmRobotHW", "").refused(tmp_path / "config") == ""
+    assert in_controllers("elbow_joint", "elbow_joint", "").refused(tmp_path) == ""
+
+
+def test_hardware_that_a_package_of_ones_own_exports_is_taken() -> None:
+    script = """
+from modular_framework_benchmark.experiments.ros_launch_check import LaunchCheck
+from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview
+node = LaunchedNode("modular_framework_control", "robot_hw", "/robot_hw", "/")
+for kind in ("my_arm/MyArm", "my_arm/MyArn"):
+    print([fault.text for fault in LaunchCheck(LaunchPreview((node,), {"/robot_hw/type": kind})).faults()])
+"""
+    examples = Path(__file__).resolve().parents[3] / "docs" / "examples"
+    environment = os.environ | {"ROS_PACKAGE_PATH": f"{examples}:{os.environ['ROS_PACKAGE_PATH']}"}
+    printed = subprocess.run(
+        [sys.executable, "-c", script], env=environment, check=True, capture_output=True, text=True
+    ).stdout
+    right, misspelt = printed.splitlines()
+    assert right == "[]" and "did you mean 'my_arm/MyArm'" in misspelt
+
+
+def test_a_state_of_another_robot_is_no_fault(tmp_path: Path) -> None:
+    case = in_config("named_joint_states.yaml", "other", {"linear_axis": 1.0}, "")
+    assert case.refused(tmp_path) == ""
 
 
 def test_an_own_state_with_free_options_is_in_order(tmp_path: Path) -> None:

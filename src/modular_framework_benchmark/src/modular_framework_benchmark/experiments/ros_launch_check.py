@@ -8,8 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import rospkg
-
+from modular_framework_benchmark.experiments.ros_controller_names import controller_faults, hardware_faults
 from modular_framework_benchmark.experiments.ros_move_group_names import (
     DETECTOR,
     MANAGER,
@@ -19,11 +18,12 @@ from modular_framework_benchmark.experiments.ros_move_group_names import (
 from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
 from modular_framework_core.files import default_folders
 from modular_framework_core.files.faults import TaskFault, listing, nearest
-from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
+from modular_framework_core.launching.launch_values import CONFIGURATION
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves, preview_launch
 from modular_framework_core.task_constructor import generator, pipeline
 from modular_framework_core.task_constructor.known_names import KnownNames, names_of_config
+from modular_framework_core.task_constructor.named_joints import named_joint_faults
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.kinematics.kinematics_settings import KEYS, NUMERIC, PLUGINS, is_known_solver
 from modular_framework_planning.planning_pipeline.planner_registry import (
@@ -69,7 +69,8 @@ class LaunchCheck:
                 *self._kinematics_faults(),
                 *move_group_faults(self._names, self._given),
                 *(self._planner_faults() if self._node is not None else ()),
-                *self._controller_faults(),
+                *controller_faults(self.launch, self._robot.movable_joints),
+                *hardware_faults(self._names, self.launch),
                 *self._task_faults(),
             ]
         except (PlanningError, ModelError) as error:
@@ -179,20 +180,6 @@ class LaunchCheck:
             elif key == "kinematics_solver" and not is_known_solver(str(value)):
                 yield _unknown(name, key, str(value), (NUMERIC, *PLUGINS))
 
-    def _controller_faults(self) -> Iterator[LaunchFault]:
-        """Yields controller files that are not there or cannot be read."""
-        for node in self.launch.nodes:
-            if node.executable == "robot_controllers_spawner" and len(node.arguments.split()) == 2:
-                package, file = node.arguments.split()
-                folder = Path(rospkg.RosPack().get_path(package)) / "controllers"
-                try:
-                    read_controller_file(folder / file)
-                except ControllerFileError as error:
-                    there = [path.name for path in folder.glob("*.yaml")]
-                    yield LaunchFault(
-                        "controller_file", f"argument 'controller_file': {error}{nearest(file, there)}", ARGUMENTS
-                    )
-
     def resolved_parameters(self) -> dict[str, Any]:
         """Returns the parameters with the defaults of those that are not set; equal for launches that run the same."""
         parameters = self._names.effective_values()
@@ -222,6 +209,7 @@ class LaunchCheck:
                 own = self.launch.below(node.name)
                 machine = str(own.get("state_machine_to_load", "")).strip()
                 yield from self._machine_faults(machine) if machine else self._script_faults(own)
+                yield from self._named_state_faults(str(own.get("config_directory", "")))
 
     def _machine_faults(self, machine: str) -> Iterator[LaunchFault]:
         folder, name = generator.default_output_directory(), "state_machine_to_load"
@@ -229,6 +217,15 @@ class LaunchCheck:
             there = sorted(path.name for path in folder.glob("*.py"))
             text = f"argument '{name}': there is no file {machine}, nor in {folder}; {listing(there, 'it is empty')}"
             yield LaunchFault(name, f"{text}{nearest(machine, there)}", ARGUMENTS)
+
+    def _named_state_faults(self, config: str) -> Iterator[LaunchFault]:
+        """Yields the joints and joint states that the files of named states and trajectories name in vain."""
+        joints = self._robot.movable_joints
+        try:
+            found = list(named_joint_faults(Path(config), joints)) if config and joints else []
+        except ValueError as error:
+            found = [str(error)]
+        yield from (LaunchFault(CONFIGURATION, text, ARGUMENTS) for text in found)
 
     def _script_faults(self, own: Mapping[str, Any]) -> Iterator[LaunchFault]:
         script = str(own.get("task_constructor_script", ""))

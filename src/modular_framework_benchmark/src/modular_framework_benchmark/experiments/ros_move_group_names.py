@@ -65,6 +65,6 @@ def resolved_names(launch: LaunchPreview, node: LaunchedNode) -> dict[str, str]:
     """
     places = (f"{node.name}/{DETECTOR}", f"{node.namespace}{DETECTOR}", f"/{DETECTOR}")
     detector = next((launch.parameters[place] for place in places if place in launch.parameters), "")
-    kind = collision_detector(str(detector))
+    kind: Any = collision_detector(str(detector))
     manager = str(launch.parameters.get(f"{node.name}/{MANAGER}") or SIMPLE_MANAGER)
     return {DETECTOR: f"{kind.__module__}/{kind.__qualname__}", MANAGER: manager.replace("::", "/")}

@@ -61,7 +61,8 @@ def _length(part: str, rest: tuple[str, ...], robot: Mapping[str, Collection[str
 
 
 def _unknown(part: str, patterns: list[_Pattern], robot: Mapping[str, Collection[str]]) -> str:
-    kinds, names = [], []
+    kinds: list[str] = []
+    names: list[str] = []
     for first in dict.fromkeys(pattern.parts[0] for pattern in patterns if pattern.parts):
         kind = first.strip("{}") if first.startswith("{") else ""
         kinds += [kind] if kind else []

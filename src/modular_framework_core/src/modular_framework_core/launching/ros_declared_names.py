@@ -66,13 +66,23 @@ class DeclaredNames:
         for node in self._launch.nodes:
             declared = node_declaration(node.package, node.executable)
             yield node, declared
-            for name, item in (declared.parameters if declared else {}).items():
-                value = self._parameter_value(node, name) if item.names == "hardware" else None
-                for part in [f"{node.namespace}{entry}" for entry in value] if isinstance(value, list) else [node.name]:
-                    package, _, kind = str(self._launch.parameters.get(f"{part}/type", "")).partition("/")
-                    hardware = node_declaration(package, kind) if value and kind else None
-                    if hardware is not None:
-                        yield replace(node, name=part), hardware
+            for part in self._hardware_of(node, declared):
+                package, _, kind = str(self._launch.parameters.get(f"{part}/type", "")).partition("/")
+                hardware = node_declaration(package, kind) if kind else None
+                if hardware is not None:
+                    yield replace(node, name=part), hardware
+
+    def _hardware_of(self, node: LaunchedNode, declared: NodeDeclaration | None) -> Iterator[str]:
+        """Yields the namespace of each hardware of a node."""
+        for name, item in (declared.parameters if declared else {}).items():
+            value = self._parameter_value(node, name) if item.names == "hardware" else None
+            if value:
+                yield from [f"{node.namespace}{part}" for part in value] if isinstance(value, list) else [node.name]
+
+    def hardware(self) -> Iterator[str]:
+        """Yields the namespace of each hardware of the launch; its class is the parameter `type` there."""
+        for node in self._launch.nodes:
+            yield from self._hardware_of(node, node_declaration(node.package, node.executable))
 
     def unread(self, names: Mapping[str, Any], extra: Container[str] = ()) -> Iterator[LaunchFault]:
         """Yields a fault for each parameter that no node reads.
@@ -95,11 +105,12 @@ class DeclaredNames:
             robot: Names of the robot by kind: joint, link, group; a kind that is missing is not known.
         """
         for tree, users in self.known.items():
-            declared = next((item for _, item in users if item.below), None)
-            for name, value in leaves(given).items() if declared is not None else ():
+            below = next((item.below for _, item in users if item.below), "")
+            for name, value in leaves(given).items() if below else ():
                 if name.startswith(f"{tree}/"):
-                    below = existing_declaration(*declared.below.split("/"))
-                    fault = tree_fault(name.removeprefix(f"{tree}/"), value, below, robot)
+                    fault = tree_fault(
+                        name.removeprefix(f"{tree}/"), value, existing_declaration(*below.split("/")), robot
+                    )
                     if fault:
                         yield LaunchFault(name, f"parameter '{name}' {fault}")
 

@@ -14,7 +14,8 @@ from modular_framework_core.files import default_folders, shallow_yaml
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_urdf.srdf_reader import read_srdf
 
-_FILES = {"joint_state": "named_joint_states.yaml", "trajectory": "named_trajectories.yaml", "pose": "named_poses.yaml"}
+JOINT_STATES_FILE, TRAJECTORIES_FILE = "named_joint_states.yaml", "named_trajectories.yaml"
+_FILES = {"joint_state": JOINT_STATES_FILE, "trajectory": TRAJECTORIES_FILE, "pose": "named_poses.yaml"}
 _MANIPULATOR_FILE = "manipulator_controller_parameters.yaml"
 _GROUP_KEY = "manipulator_group_name"
 
@@ -78,7 +79,7 @@ def names_of_config(folder: Path) -> KnownNames:
     names: dict[str, frozenset[str]] = {}
     origins: dict[str, str] = {}
     for kind, file in _FILES.items():
-        content = _mapping_in(folder / file)
+        content = mapping_in_file(folder / file)
         if content is None:
             continue
         is_pose = {name: not isinstance(entry, dict) or "position" in entry for name, entry in content.items()}
@@ -86,7 +87,7 @@ def names_of_config(folder: Path) -> KnownNames:
         origins[kind] = str(folder / file)
         if kind == "pose":
             names["robot_pose"], origins["robot_pose"] = frozenset(map(str, content)) - names[kind], origins[kind]
-    group = (_mapping_in(folder / _MANIPULATOR_FILE) or {}).get(_GROUP_KEY, "")
+    group = (mapping_in_file(folder / _MANIPULATOR_FILE) or {}).get(_GROUP_KEY, "")
     return KnownNames(names, origins, str(group))
 
 
@@ -111,7 +112,7 @@ def names_of_installation(config: Path | None, moveit_package: str = "") -> Know
     return names if srdf is None else names.with_robot(srdf.read_text(encoding="utf-8"), str(srdf))
 
 
-def _mapping_in(file: Path) -> dict[Any, Any] | None:
+def mapping_in_file(file: Path) -> dict[Any, Any] | None:
     """Returns the mapping in a YAML file, or None if the file does not exist."""
     try:
         content = shallow_yaml.load(read_text(file))

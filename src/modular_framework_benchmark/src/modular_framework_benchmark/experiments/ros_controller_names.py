@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Looks up the types and joints of controllers, and the types of hardware, that a launch names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import rospkg
+
+from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES, ControllerTypes
+from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginIndex
+from modular_framework_core.files.faults import listing, nearest
+from modular_framework_core.launching.robot_controllers_spawner import (
+    ControllerFile,
+    ControllerFileError,
+    read_controller_file,
+)
+from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
+from modular_framework_core.launching.ros_launch_preview import LaunchPreview
+
+SPAWNER, CONTROLLER_FILE, ARGUMENTS = "robot_controllers_spawner", "controller_file", "arguments"
+JOINT_KEYS = (
+    "joint", "joints", "left_wheel", "right_wheel", "front_wheel", "rear_wheel", "front_steer", "front_steering",
+    "rear_steering",
+)  # fmt: skip
+"""Keys of a controller that name joints."""
+KEYS_BY_JOINT = ("constraints", "gains", "velocity_ff")
+"""Keys of a controller below which each mapping belongs to one of its joints."""
+
+
+def controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterator[LaunchFault]:
+    """Yields controller files that cannot be read, and the types and joints in them that do not exist.
+
+    Args:
+        launch: The launch.
+        joints: Joints of the robot that move; empty if they are not known.
+    """
+    for node in launch.nodes:
+        if node.executable != SPAWNER or len(node.arguments.split()) != 2:
+            continue
+        package, file = node.arguments.split()
+        folder = Path(rospkg.RosPack().get_path(package)) / "controllers"
+        try:
+            faults = list(_faults_in(read_controller_file(folder / file), joints))
+        except ControllerFileError as error:
+            there = [path.name for path in folder.glob("*.yaml")]
+            faults = [f"{error}{nearest(file, there)}"]
+        for text in faults:
+            yield LaunchFault(CONTROLLER_FILE, f"argument '{CONTROLLER_FILE}': {text}", ARGUMENTS)
+
+
+def _faults_in(file: ControllerFile, joints: tuple[str, ...]) -> Iterator[str]:
+    known = _controller_types()
+    for name in file.controllers:
+        entry = file.parameters[name]
+        where, kind = f"{file.path}: controller '{name}'", str(entry["type"])
+        if kind not in known:
+            yield f"{where}: there is no controller type '{kind}'; {listing(known)}{nearest(kind, known)}"
+        elif kind in BUILT_IN_TYPES:
+            for joint in _unknown_joints(entry, joints):
+                yield f"{where}: the robot has no joint '{joint}'; {listing(joints)}{nearest(joint, joints)}"
+            yield from (f"{where}: {text}" for text in _misplaced_joints(entry))
+
+
+def _names(value: Any) -> list[str]:
+    return [str(name) for name in (value if isinstance(value, list) else [value]) if isinstance(name, str)]
+
+
+def _unknown_joints(entry: Mapping[str, Any], joints: tuple[str, ...]) -> list[str]:
+    named = dict.fromkeys(name for key in JOINT_KEYS for name in _names(entry.get(key)))
+    return [name for name in named if joints and name not in joints]
+
+
+def _misplaced_joints(entry: Mapping[str, Any]) -> Iterator[str]:
+    """Yields settings of a joint that is none of the controller's."""
+    own = [*_names(entry.get("joints")), *_names(entry.get("joint"))]
+    for key in KEYS_BY_JOINT if own else ():
+        below = entry.get(key)
+        for name, value in below.items() if isinstance(below, Mapping) else ():
+            if isinstance(value, Mapping) and name not in own:
+                yield f"{key} names no joint of it: '{name}'; {listing(own)}{nearest(str(name), own)}"
+
+
+def hardware_faults(names: DeclaredNames, launch: LaunchPreview) -> Iterator[LaunchFault]:
+    """Yields hardware without a section, and types of hardware that no package offers."""
+    for part in names.hardware():
+        parameter, parent = f"{part}/type", part.rpartition("/")[0]
+        sections = [
+            name.removesuffix("/type").lstrip("/")
+            for name in launch.parameters
+            if name.endswith("/type") and name.removesuffix("/type").rpartition("/")[0] == parent
+        ]
+        kind = launch.parameters.get(parameter)
+        if kind is None:
+            text = f"robot_hardware names '{part.lstrip('/')}', and there is no parameter '{parameter}'"
+            yield LaunchFault(parameter, f"{text}; {listing(sections)}{nearest(part.lstrip('/'), sections)}")
+        elif str(kind) not in _hardware_types():
+            known = _hardware_types()
+            hint = f"{listing(known)}{nearest(str(kind), known)}"
+            yield LaunchFault(parameter, f"parameter '{parameter}': there is no hardware '{kind}'; {hint}")
+
+
+@cache
+def _controller_types() -> tuple[str, ...]:
+    """Returns the types of controllers: the framework's own, and those that packages export."""
+    return tuple(ControllerTypes().names)
+
+
+@cache
+def _hardware_types() -> tuple[str, ...]:
+    """Returns the types of hardware that packages export."""
+    return tuple(PluginIndex(ROBOT_HW_BASE).names)
