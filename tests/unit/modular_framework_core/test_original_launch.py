@@ -56,6 +56,24 @@ def test_it_has_the_grasp_generator_and_a_launch_with_its_own_configuration_only
     assert found == [True, False, True, False]
 
 
+def api_launch() -> roslaunch.config.ROSLaunchConfig:
+    """What roslaunch makes of the framework's own start_framework.launch."""
+    file = Path(rospkg.RosPack().get_path("modular_framework_api")) / "launch" / "start_framework.launch"
+    return roslaunch.config.load_config_default([str(file)], None, verbose=False)
+
+
+@pytest.mark.parametrize("display", [":7", ""])
+def test_with_a_display_windows_open_and_the_framework_stays_open_after_the_task(
+    display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", display)
+    for launch in (load(tmp_path), api_launch()):
+        task = next(node for node in launch.nodes if node.type == "run_task")
+        assert any(node.package == "rviz" for node in launch.nodes) == bool(display)
+        assert launch.params["/gazebo/gui"].value == bool(display)
+        assert task.required == (not display)
+
+
 def test_its_configuration_files_are_those_of_the_api_package(config: roslaunch.config.ROSLaunchConfig) -> None:
     folder = Path(rospkg.RosPack().get_path("modular_framework_api")) / "config"
     managers = next(node for node in config.nodes if node.name == "managers")
