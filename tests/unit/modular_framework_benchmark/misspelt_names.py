@@ -348,6 +348,7 @@ CASES = [
     in_experiment(TASK, ("arguments", "time_step"), 0.05, "at most 0.01"),
     in_experiment(TASK, ("arguments", "simulation"), False, "allowed: true"),
     in_experiment(TASK, ("arguments", "seed"), 4, "each episode has its own seed"),
+    in_experiment(TASK, ("arguments", "generated_state_machine_name"), "a/b", "is 'a/b', which must be letters"),
     in_experiment(PLAIN, ("arguments", "planner_name"), "RRTConect", "no planner 'RRTConect'.*'RRTConnect'"),
     in_experiment(
         TASK, ("arguments", "controller_file"), "ur5_controllers.yaml", "ur5_ezgripper_controller_simulation"
@@ -424,6 +425,7 @@ CASES = [
     in_launch("planner_name:=BKPIECEE", "no planner 'BKPIECEE'.*did you mean 'BKPIECE'"),
     in_launch("physics_engine:=mujoko", "is 'mujoko'; allowed: pybullet, mujoco"),
     in_launch("controller_file:=no.yaml", "ur5_ezgripper_controller_simulation.yaml"),
+    in_launch("generated_state_machine_name:=rospy", "is 'rospy', which is the Python module"),
     in_launch("seed:=-4", "is -4; allowed: a whole number, at least 0"),
     in_launch("task_constructor_script:=simulation_pik.yaml", "simulation_pik.yaml"),
     in_launch("planner_name:=RRTConect", "did you mean 'RRTConnect'", "panda_hand_robot"),

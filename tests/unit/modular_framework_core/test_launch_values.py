@@ -35,6 +35,7 @@ def start() -> str:
         (["simulation:=false", "connection_file:=no.yaml"], "'no.yaml', .*allowed: .*connection_emulators.yaml"),
         (["real_time_factor:=fast"], "is 'fast'; allowed: a number, at least 0"),
         (["seed:=abc"], "is 'abc'; allowed: a whole number"),
+        (["generated_state_machine_name:=a/b"], "is 'a/b', which must be letters, digits and underscores"),
         (["physics_engine:=bulet"], "is 'bulet'; allowed: pybullet, mujoco"),
     ],
 )

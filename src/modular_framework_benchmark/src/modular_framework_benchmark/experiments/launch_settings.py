@@ -21,7 +21,7 @@ OWN_ARGUMENTS = {
     "seed": "each episode has its own seed, made from the experiment's key seed",
 }
 """Launch arguments that the episodes set, and what to do instead."""
-WORLD_ARGUMENTS = ("world_file", "scene_file")
+FILE_ARGUMENTS = ("world_file", "scene_file", "generated_state_machine_name")
 """Arguments that name a file, but decide neither the nodes that start nor the robot."""
 
 
@@ -136,7 +136,7 @@ def _sound_arguments(
         for name, text in wrong.items():
             reading.faults.add(locations.get(name, _location_of(node, "arguments")), text)
             is_truth = str(known.get(name)).lower() in ("true", "false")
-            decides = decides and (name in WORLD_ARGUMENTS or is_truth)
+            decides = decides and (name in FILE_ARGUMENTS or is_truth)
         if not wrong.keys() & sound.keys():
             break
         sound = {name: value for name, value in sound.items() if name not in wrong}

@@ -17,10 +17,11 @@ import yaml
 from modular_framework_core.files import default_folders, located_yaml, shallow_yaml
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import FaultList, TaskFault, listing, nearest
+from modular_framework_core.task_constructor.header_fields import module_name_fault
 from modular_framework_ros.parameter_declarations import node_declaration
 from modular_framework_urdf import xml_text
 
-METHOD, CONFIGURATION = "method_launch_file", "config_directory"
+METHOD, CONFIGURATION, GENERATED_NAME = "method_launch_file", "config_directory", "generated_state_machine_name"
 NO_METHOD = ("", "none")
 """Values of METHOD that start no method; roslaunch ignores an argument with an empty value."""
 PACKAGES = ("description_package", "robot_package", "moveit_config_package")
@@ -57,7 +58,12 @@ def value_faults(values: Mapping[str, str]) -> list[str]:
 
 def file_faults(values: Mapping[str, str]) -> list[str]:
     """Returns the faults of missing or unreadable packages, files and tasks; see `value_faults`."""
-    faults = [*_method_faults(values.get(METHOD, "")), *_folder_faults(values), *_task_faults(values)]
+    faults = [
+        *_method_faults(values.get(METHOD, "")),
+        *_folder_faults(values),
+        *_task_faults(values),
+        *_generated_name_faults(values),
+    ]
     return [*faults, *(_package_faults(values) if "robot_package" in values else ())]
 
 
@@ -193,6 +199,14 @@ def _task_faults(values: Mapping[str, str]) -> Iterator[str]:
         located_yaml.load(default_folders.task_script(Path(value)), FaultList())
     except TaskFault as error:
         yield f"argument '{SCRIPT}' is '{value}': {error.faults[0]}"
+
+
+def _generated_name_faults(values: Mapping[str, str]) -> Iterator[str]:
+    """Yields why the generated state machine cannot have its name."""
+    name = values.get(GENERATED_NAME, "")
+    fault = module_name_fault(name.removesuffix(".py")) if name and not values.get("state_machine_to_load") else ""
+    if fault:
+        yield f"argument '{GENERATED_NAME}' is '{name}', which {fault}"
 
 
 def _path_hint(path: Path) -> str:
