@@ -143,7 +143,7 @@ def test_a_sweep_goes_back_and_forth_and_round(robot: Robot) -> None:
 
 BROKEN = {
     "joint 'a' has the range [1.0, -1.0]; allowed": ("revolute", '<limit lower="1" upper="-1"/>'),
-    "it mimics 'nobody', which is no joint that moves": (
+    "it mimics 'nobody', which is not a movable joint": (
         "revolute",
         '<mimic joint="nobody"/><limit lower="0" upper="1"/>',
     ),

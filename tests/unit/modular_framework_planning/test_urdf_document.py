@@ -73,7 +73,7 @@ def test_collision_meshes_of_several_materials_are_whole_and_in_place(tmp_path: 
 
 def test_a_collision_mesh_that_cannot_be_read_is_refused_with_link_and_file(tmp_path: Path) -> None:
     (tmp_path / "parts.obj").write_text("v 0 0 0\n")
-    with pytest.raises(ModelError, match=r"link 'arm' collision: mesh file .*parts\.obj: holds no triangle"):
+    with pytest.raises(ModelError, match=r"link 'arm' collision: mesh file .*parts\.obj: contains no triangle"):
         RobotModel(MESH_URDF, '<robot name="r"/>', {}, lambda uri: str(tmp_path / uri))
 
 
@@ -96,5 +96,5 @@ def test_a_fixed_joint_that_mimics_is_fixed_and_noted() -> None:
 
 
 def test_a_joint_that_mimics_one_that_does_not_move_is_refused() -> None:
-    with pytest.raises(ModelError, match="'two'.*mimics 'one'.*allowed are none"):
+    with pytest.raises(ModelError, match="'two'.*mimics 'one'.*allowed: none"):
         load_urdf(PAIR.format("fixed", "prismatic"))

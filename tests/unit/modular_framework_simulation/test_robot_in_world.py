@@ -324,7 +324,10 @@ def test_a_starting_pose_with_an_unknown_joint_is_refused(world: PhysicsWorld, c
             lift_robot_urdf().replace('<mimic joint="slide_1"', '<mimic joint="slide_2"'),
             "'slide_2': it mimics itself through slide_2 -> slide_2; a joint may mimic one of lift, slide_1",
         ),
-        (lift_robot_urdf().replace('<mimic joint="slide_1"', '<mimic joint="knee"'), "'knee', which is no joint"),
+        (
+            lift_robot_urdf().replace('<mimic joint="slide_1"', '<mimic joint="knee"'),
+            "'knee', which is not a movable joint",
+        ),
         (
             "<robot name='r'><link name='a'><collision><geometry><box size='1 1e30 1'/></geometry></collision></link>"
             "</robot>",

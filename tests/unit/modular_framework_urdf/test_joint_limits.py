@@ -53,7 +53,7 @@ def test_limits_of_jerk_and_braking_are_read() -> None:
     [
         ({"max_jerk": -1}, "jerk -1"),
         ({"max_velocity": "fast"}, "joint_limits/j/max_velocity: 'fast' is not a finite number"),
-        ({"has_position_limits": True, "min_position": 2.0}, "bounds .2.0, 1.0.*must leave room"),
+        ({"has_position_limits": True, "min_position": 2.0}, "bounds .2.0, 1.0.*must not exceed"),
         ({"max_deceleration": 1.0}, "must be below 0"),
     ],
 )

@@ -246,18 +246,18 @@ STRIP = '<tristrips count="1"><input semantic="VERTEX" source="#v1" offset="0"/>
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("skinned.dae", SKINNED.encode(), "8 of the 10 triangles"),
+        ("skinned.dae", SKINNED.encode(), "8 of the 10 declared triangles"),
         ("entity.dae", b'<!DOCTYPE a [<!ENTITY b "c">]>' + COLLADA.format(more="").encode()[21:], "DOCTYPE"),
         ("other.dae", b"<robot/>", "not <COLLADA>"),
-        ("short.stl", struct.pack("<80sI", b"", 9) + bytes(100), "no whole STL"),
+        ("short.stl", struct.pack("<80sI", b"", 9) + bytes(100), "not a complete STL"),
         ("empty.stl", b"solid a\nendsolid a\n", "no triangle"),
         ("nan.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
-        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "no whole OBJ"),
+        ("beyond.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "not a complete OBJ"),
         (
             "cut.ply",
             b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
             b"element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
-            "no whole PLY",
+            "not a complete PLY",
         ),
         (
             "huge.ply",

@@ -17,13 +17,13 @@ def test_a_chain_of_mimic_joints_follows_its_first_one() -> None:
 @pytest.mark.parametrize(
     ("mimics", "said"),
     [
-        ({"a": Mimic("a", 1.0, 0.0)}, "'a': it mimics itself through a -> a; a joint may mimic one of b, c; let one"),
+        ({"a": Mimic("a", 1.0, 0.0)}, "'a': it mimics itself through a -> a; a joint may mimic one of b, c; remove"),
         (
             {"a": Mimic("b", 1.0, 0.0), "b": Mimic("a", 1.0, 0.0)},
             "itself through a -> b -> a; a joint may mimic one of c",
         ),
         ({"c": Mimic("a", 1.0, 0.0), "a": Mimic("b", 1.0, 0.0), "b": Mimic("a", 1.0, 0.0)}, "through c -> a -> b -> a"),
-        ({"a": Mimic("d", 1.0, 0.0)}, "'a': it mimics 'd', which is no joint that moves; allowed are b, c; mend"),
+        ({"a": Mimic("d", 1.0, 0.0)}, "'a': it mimics 'd', which is not a movable joint; allowed: b, c; correct"),
         ({"b": Mimic("a", 1.0, 0.0), "a": Mimic("d", 1.0, 0.0)}, "'a': it mimics 'd'"),
         ({"a": Mimic("b", 0.0, 0.0)}, "'a': it mimics 'b' by multiplier 0.0 and offset 0.0; both must be finite, the"),
         ({"a": Mimic("b", float("inf"), 0.0)}, "multiplier inf"),

@@ -129,7 +129,7 @@ def test_a_virtual_joint_needs_one_number_for_each_variable(kind: str, given: in
     with pytest.raises(XmlError) as caught:
         read_srdf(placed.replace('type="fixed"', f'type="{kind}"'))
     said = str(caught.value)
-    assert said.startswith(f"SRDF:3: a group_state holds {given} numbers for the {kind} virtual joint 'v'")
+    assert said.startswith(f"SRDF:3: a group_state contains {given} numbers for the {kind} virtual joint 'v'")
     assert f"give {needed}, separated by spaces: {' '.join(VARIABLES[kind])}" in said
 
 
@@ -137,9 +137,9 @@ def test_a_virtual_joint_needs_one_number_for_each_variable(kind: str, given: in
     ("found", "wrong", "fault"),
     [
         (' base_link="x"', "", "SRDF:1: <chain> {'tip_link': 'y'} has no attribute 'base_link'; add it"),
-        ('"0.5 "', '"high"', "SRDF:3: a group_state holds a value that is not a number ('high' for joint 'b')"),
-        ('"0.5 "', '" "', "SRDF:3: a group_state holds a value that is not a number (' ' for joint 'b')"),
-        ('"0.5 "', '""', "SRDF:3: a group_state holds a value that is not a number ('' for joint 'b')"),
+        ('"0.5 "', '"high"', "SRDF:3: a group_state contains a value that is not a number ('high' for joint 'b')"),
+        ('"0.5 "', '" "', "SRDF:3: a group_state contains a value that is not a number (' ' for joint 'b')"),
+        ('"0.5 "', '""', "SRDF:3: a group_state contains a value that is not a number ('' for joint 'b')"),
     ],
 )
 def test_a_fault_of_an_srdf_says_its_line(found: str, wrong: str, fault: str) -> None:

@@ -50,5 +50,5 @@ def test_at_the_ends_of_the_pitch_the_yaw_is_zero_and_the_rotation_the_same(pitc
 
 @pytest.mark.parametrize("quaternion", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)])
 def test_a_quaternion_without_length_is_refused(quaternion: tuple[float, float, float, float]) -> None:
-    with pytest.raises(ValueError, match="a quaternion must have a length"):
+    with pytest.raises(ValueError, match="the norm of a quaternion must be above 0"):
         rpy_from_quaternion(quaternion)

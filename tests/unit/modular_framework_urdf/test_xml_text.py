@@ -21,7 +21,7 @@ BOMB = f'<?xml version="1.0"?>\n<!DOCTYPE robot [<!ENTITY e0 "boom">{LEVELS}]>\n
 
 @pytest.mark.parametrize("kind", [str, str.encode, lambda text: text.encode("utf-16")], ids=["text", "bytes", "utf-16"])
 def test_a_doctype_is_refused_where_it_stands(kind: Callable[[str], Any]) -> None:
-    with pytest.raises(XmlError, match=r"^arm\.urdf:2: got a DOCTYPE; allowed: XML without one, .*; remove it$"):
+    with pytest.raises(XmlError, match=r"^arm\.urdf:2: got a DOCTYPE; allowed: XML without a DOCTYPE, .*; remove it$"):
         parse(kind(BOMB + "<robot>&e11;</robot>"), "arm.urdf")
     refuse_doctype(kind("<robot/><!DOCTYPE robot>"), "behind the root it is a fault that the parser names")
 
@@ -29,7 +29,7 @@ def test_a_doctype_is_refused_where_it_stands(kind: Callable[[str], Any]) -> Non
 def test_what_only_looks_like_one_is_read() -> None:
     root = parse("<!-- <!DOCTYPE a> -->\n<a b='&lt;!DOCTYPE'><![CDATA[<!DOCTYPE a>]]></a>", "x")
     assert (root.get("b"), root.text) == ("<!DOCTYPE", "<!DOCTYPE a>")
-    with pytest.raises(XmlError, match=r"^x:3: not an XML document .*; well-formed XML is needed; mend it$"):
+    with pytest.raises(XmlError, match=r"^x:3: not an XML document .*; it must be well-formed XML; correct it$"):
         parse("<a>\n\n</b>", "x")
 
 

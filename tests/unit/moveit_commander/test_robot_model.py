@@ -142,7 +142,7 @@ def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> N
             SRDF,
             "mimics itself through e_right -> e_right",
         ),
-        (URDF.replace('<mimic joint="d_left"', '<mimic joint="knee"'), SRDF, "'knee', which is no joint that moves"),
+        (URDF.replace('<mimic joint="d_left"', '<mimic joint="knee"'), SRDF, "'knee', which is not a movable joint"),
         (URDF, SRDF.replace('tip_link="flange"', 'tip_link="nowhere"'), "'nowhere' is not below link 'base'"),
         (URDF, SRDF.replace('<link name="right"/>', '<link name="nowhere"/>'), "'nowhere' is not a link"),
         (

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Readers of robot descriptions (URDF, SRDF) and of the meshes they refer to, for all packages."""
+"""Readers of robot descriptions (URDF, SRDF) and of their meshes, for all packages."""

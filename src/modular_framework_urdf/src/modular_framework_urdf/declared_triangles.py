@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Counts the triangles a mesh file declares, by the plain structure of its format and without the reader it checks."""
+"""Counts the triangles that a mesh file declares, independently of the mesh reader, to check the reader."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import struct
 
 FORMATS = ("stl", "obj", "ply")
 STL_HEADER = 84
-"""Length of what stands before the triangles of a binary STL file [bytes]."""
+"""Length of the header of a binary STL file [bytes]."""
 _STL_TRIANGLE = 50  # [bytes]
 _FACE = re.compile(rb"^[ \t]*f[ \t]+(.*)$", re.MULTILINE)
 _OBJ_LINE = re.compile(rb"^[ \t]*(v|f)[ \t]+(.*)$", re.MULTILINE)
@@ -33,10 +33,10 @@ _PLY_SIZES = {
 
 
 def declared_triangles(kind: str, content: bytes) -> int:
-    """Returns how many triangles an STL, OBJ or PLY file declares; a polygon of n corners counts as n - 2 of them.
+    """Returns the number of triangles declared in an STL, OBJ or PLY file; a polygon of n corners counts as n - 2.
 
     Raises:
-        ValueError, IndexError, KeyError, struct.error: the structure is broken before a count can be had.
+        ValueError, IndexError, KeyError, struct.error: The structure of the file is invalid.
     """
     match kind:
         case "stl":
@@ -49,7 +49,7 @@ def declared_triangles(kind: str, content: bytes) -> int:
 
 
 def is_binary_stl(content: bytes) -> bool:
-    """Returns whether an STL file is as long as its binary header says; one that is text may begin like any."""
+    """Returns whether the length of an STL file matches its binary header, because text files may begin alike."""
     if len(content) < STL_HEADER:
         return False
     return len(content) == STL_HEADER + int(struct.unpack_from("<I", content, 80)[0]) * _STL_TRIANGLE
@@ -59,36 +59,38 @@ def _stl(content: bytes) -> int:
     if is_binary_stl(content):
         return (len(content) - STL_HEADER) // _STL_TRIANGLE
     if not content.lstrip()[:5].lower() == b"solid":
-        raise ValueError(f"{len(content)} bytes hold neither the triangles of a binary header nor text")
+        raise ValueError(f"{len(content)} bytes contain neither the triangles of a binary header nor text")
     return len(re.findall(rb"\bfacet\s+normal\b", content, re.IGNORECASE))
 
 
 def _joined_lines(content: bytes) -> bytes:
-    """Joins lines that a backslash continues, and leaves comments out."""
+    """Joins lines continued by a backslash and removes comments."""
     return re.sub(rb"#[^\n]*", b"", content.replace(b"\r\n", b"\n").replace(b"\\\n", b" "))
 
 
 def with_absolute_indices(content: bytes) -> bytes:
-    """Returns an OBJ file whose faces name vertices by their number in the file.
+    """Returns an OBJ file whose faces use absolute vertex indices.
 
-    A negative index counts back from the vertices read so far; trimesh counts back from the last one of the file.
+    A negative index counts back from the vertices read so far, but trimesh counts back from the end of the file.
     """
     if not re.search(rb"^[ \t]*f[^\n]*-", content, re.MULTILINE):
         return content
-    content, seen = _joined_lines(content), 0
+    content, vertex_count = _joined_lines(content), 0
     lines = []
     for keyword, rest in _OBJ_LINE.findall(content):
         if keyword == b"v":
-            seen += 1
+            vertex_count += 1
             lines.append(b"v " + rest)
         else:
             corners = (int(corner.split(b"/")[0]) for corner in rest.split())
-            lines.append(b"f " + b" ".join(b"%d" % (one if one > 0 else seen + 1 + one) for one in corners))
+            lines.append(
+                b"f " + b" ".join(b"%d" % (index if index > 0 else vertex_count + 1 + index) for index in corners)
+            )
     return b"\n".join(lines) + b"\n"
 
 
 def _ply(content: bytes) -> int:
-    """Counts faces; the lengths of their lists are read in the body."""
+    """Counts the triangles of a PLY file from the list lengths of its faces."""
     end = content.index(b"end_header")
     body = content.index(b"\n", end) + 1
     lines = [line.split() for line in content[:end].decode("ascii").splitlines()]
@@ -107,13 +109,13 @@ def _ply(content: bytes) -> int:
 def _ply_text(words: list[bytes], elements: list[tuple[str, int, list[list[str]]]]) -> int:
     offset = triangles = 0
     for name, count, properties in elements:
-        if all(one[0] != "list" for one in properties):  # a header may declare any number
+        if all(item[0] != "list" for item in properties):  # skips the element; a header may declare any count
             offset += count * len(properties)
             continue
         for _ in range(count):
-            for one in properties:
-                length = _length(int(words[offset])) if one[0] == "list" else 0
-                triangles += length - 2 if name == "face" and one[-1].startswith("vert") else 0
+            for item in properties:
+                length = _length(int(words[offset])) if item[0] == "list" else 0
+                triangles += length - 2 if name == "face" and item[-1].startswith("vert") else 0
                 offset += 1 + length
     if offset > len(words):
         raise ValueError(f"{len(words)} values where the header declares {offset}")
@@ -129,34 +131,34 @@ def _length(length: int) -> int:
 def _ply_binary(content: bytes, offset: int, elements: list[tuple[str, int, list[list[str]]]], order: str) -> int:
     triangles = 0
     for name, count, properties in elements:
-        if all(one[0] != "list" for one in properties):
-            offset += count * struct.calcsize(order + "".join(_PLY_SIZES[one[0]] for one in properties))
+        if all(item[0] != "list" for item in properties):
+            offset += count * struct.calcsize(order + "".join(_PLY_SIZES[item[0]] for item in properties))
             continue
         for _ in range(count):
-            for one in properties:
-                if one[0] != "list":
-                    offset += struct.calcsize(_PLY_SIZES[one[0]])
+            for item in properties:
+                if item[0] != "list":
+                    offset += struct.calcsize(_PLY_SIZES[item[0]])
                     continue
-                length = _length(struct.unpack_from(order + _PLY_SIZES[one[1]], content, offset)[0])
-                triangles += length - 2 if name == "face" and one[-1].startswith("vert") else 0
-                offset += struct.calcsize(_PLY_SIZES[one[1]]) + length * struct.calcsize(_PLY_SIZES[one[2]])
+                length = _length(struct.unpack_from(order + _PLY_SIZES[item[1]], content, offset)[0])
+                triangles += length - 2 if name == "face" and item[-1].startswith("vert") else 0
+                offset += struct.calcsize(_PLY_SIZES[item[1]]) + length * struct.calcsize(_PLY_SIZES[item[2]])
     if offset > len(content):
         raise ValueError(f"{len(content)} bytes where the header declares {offset}")
     return triangles
 
 
 def keep_obj_part(content: bytes, name: str) -> tuple[bytes, list[str]]:
-    """Returns an OBJ file without the faces of other objects and groups, and the names of all that have faces."""
+    """Returns an OBJ file with the faces of one object or group only, and the names of all parts with faces."""
     names: dict[str, None] = {}
     kept: list[bytes] = []
-    here = ""
+    current_name = ""
     for line in content.splitlines():
         words = line.split(maxsplit=1)
         if words and words[0] in (b"o", b"g"):
-            here = words[1].decode(errors="replace").strip() if len(words) > 1 else ""
+            current_name = words[1].decode(errors="replace").strip() if len(words) > 1 else ""
         if words and words[0] == b"f":
-            names[here] = None
-            if here != name:
+            names[current_name] = None
+            if current_name != name:
                 continue
         kept.append(line)
     return b"\n".join(kept) + b"\n", list(names)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Limits of joints for planning: those of the URDF, overwritten by joint_limits.yaml as in MoveIt."""
+"""Joint limits for planning: the URDF's limits, overridden by joint_limits.yaml as in MoveIt."""
 
 from __future__ import annotations
 
@@ -10,19 +10,24 @@ from typing import Any
 
 from modular_framework_urdf.robot import Joint
 
-DEFAULT_VELOCITY = 1.0  # [rad/s] or [m/s] where no source names one
-NO_VELOCITY_LIMIT = 1.0e6  # [rad/s] or [m/s]; a velocity from here on is none
-DEFAULT_ACCELERATION = 1.0  # [rad/s^2] or [m/s^2] where no source names one
-DEFAULT_JERK = 1000.0  # [rad/s^3] or [m/s^3] where no source names one
-ROUNDING = 1.0e-3  # share of a limit; a limit this little above the URDF's is that limit, rounded
+DEFAULT_VELOCITY = 1.0  # [rad/s or m/s]
+NO_VELOCITY_LIMIT = 1.0e6  # [rad/s or m/s]; larger velocities count as no limit
+DEFAULT_ACCELERATION = 1.0  # [rad/s^2 or m/s^2]
+DEFAULT_JERK = 1000.0  # [rad/s^3 or m/s^3]
+ROUNDING_TOLERANCE = 1.0e-3  # absolute for positions [rad or m], relative for velocities; covers rounded values
 
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Limits of one joint; positions [rad or m], velocity [1/s], acceleration [1/s^2], jerk [1/s^3].
+    """Limits of a joint.
 
     Attributes:
-        deceleration: largest deceleration, above 0; None if it equals the acceleration.
+        lower: Lower position limit [rad or m].
+        upper: Upper position limit [rad or m].
+        velocity: Velocity limit [rad/s or m/s].
+        acceleration: Acceleration limit [rad/s^2 or m/s^2].
+        deceleration: Deceleration limit above 0 [rad/s^2 or m/s^2]; None if equal to the acceleration limit.
+        jerk: Jerk limit [rad/s^3 or m/s^3].
     """
 
     lower: float
@@ -34,12 +39,12 @@ class JointLimits:
 
     @property
     def braking(self) -> float:
-        """Largest deceleration [1/s^2], above 0."""
+        """Deceleration limit above 0 [rad/s^2 or m/s^2]."""
         return self.acceleration if self.deceleration is None else self.deceleration
 
 
 def described_limits(joint: Joint) -> JointLimits:
-    """Returns the limits of a joint's description, soft ones included; without bounds for a continuous joint."""
+    """Returns a joint's limits in the URDF, including soft limits; the position of a continuous joint is unlimited."""
     lower, upper = (0.0, 0.0) if joint.limit is None else (joint.limit.lower, joint.limit.upper)
     if joint.safety is not None:
         lower = lower if joint.safety.soft_lower_limit is None else max(lower, joint.safety.soft_lower_limit)
@@ -63,16 +68,17 @@ def _value(name: str, entry: Mapping[str, Any], flag: bool, key: str) -> float |
 def overwritten(
     name: str, limits: JointLimits, entry: Mapping[str, Any], is_endless: bool = False
 ) -> tuple[JointLimits, tuple[str, ...]]:
-    """Returns the limits after the file's entry for this joint, and notes on what is looser or ignored.
+    """Returns the limits overridden by joint_limits.yaml, and notes about looser and ignored limits.
 
     Args:
-        name: joint, for error texts.
-        limits: of the description.
-        entry: of joint_limits.yaml. Bounds count with `has_position_limits`, other limits unless their flag is false.
-        is_endless: whether the joint cannot have bounds.
+        name: Joint name, for error messages.
+        limits: Limits in the URDF.
+        entry: Entry of joint_limits.yaml. Position limits require `has_position_limits`; other limits apply unless
+            their flag is false.
+        is_endless: Whether the joint is continuous and cannot have position limits.
 
     Raises:
-        ValueError: a value is not a number, has the wrong sign, or leaves no room between the bounds.
+        ValueError: A value is not a number, has the wrong sign, or the position range is empty.
     """
     has_bounds = bool(entry.get("has_position_limits", False))
     low, high = (_value(name, entry, has_bounds and not is_endless, key) for key in ("min_position", "max_position"))
@@ -88,7 +94,7 @@ def overwritten(
     if lower > upper or any(value is not None and value <= 0 for value in (velocity, acceleration, jerk)):
         raise ValueError(
             f"joint_limits/{name}: bounds [{lower}, {upper}], velocity {velocity}, acceleration "
-            f"{acceleration}, jerk {jerk}; the bounds must leave room and the rest must be above 0"
+            f"{acceleration}, jerk {jerk}; the lower bound must not exceed the upper, and the rest must be above 0"
         )
     result = JointLimits(
         lower,
@@ -99,11 +105,16 @@ def overwritten(
         DEFAULT_JERK if jerk is None else jerk,
     )
     notes = [
-        f"joint_limits/{name}: {key} {new:g} is looser than the URDF's {old:g}; it counts all the same"
+        f"joint_limits/{name}: {key} {new:g} is looser than the URDF's {old:g}, but is used"
         for key, new, old, is_looser in (
-            ("min_position", lower, limits.lower, lower < limits.lower - ROUNDING),
-            ("max_position", upper, limits.upper, upper > limits.upper + ROUNDING),
-            ("max_velocity", result.velocity, limits.velocity, result.velocity > limits.velocity * (1.0 + ROUNDING)),
+            ("min_position", lower, limits.lower, lower < limits.lower - ROUNDING_TOLERANCE),
+            ("max_position", upper, limits.upper, upper > limits.upper + ROUNDING_TOLERANCE),
+            (
+                "max_velocity",
+                result.velocity,
+                limits.velocity,
+                result.velocity > limits.velocity * (1.0 + ROUNDING_TOLERANCE),
+            ),
         )
         if is_looser
     ]

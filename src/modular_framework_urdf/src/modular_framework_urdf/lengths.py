@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The largest length a description or a scene may give."""
+"""Maximum length in descriptions and scenes."""
 
 from __future__ import annotations
 
-LARGEST_LENGTH_M = 1.0e4
-"""Of a shape's size and of a mesh's coordinates: beyond it, collision checks and physics lose the millimetre [m]."""
+MAX_LENGTH_M = 1.0e4
+"""Maximum size of a shape and coordinate of a mesh, which keeps collision checks and physics precise to 1 mm [m]."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the file that a description names as a mesh: package://, file:// or a path."""
+"""Resolves mesh URIs: package://, file:// or a path."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from pathlib import Path
 from modular_framework_urdf.mesh_reader import MeshError
 
 PackageFinder = Callable[[str], str]
-"""Returns the folder of a ROS package; raises an exception naming the package when it is not there."""
+"""Function that returns the folder of a ROS package, or raises an exception if the package is not found."""
 
 
 def mesh_path(uri: str, find_package: PackageFinder) -> Path:
-    """Returns the file of a mesh.
+    """Returns the path of a mesh file.
 
     Args:
-        uri: package://, file:// or an absolute path.
-        find_package: looks up the packages of package:// URIs.
+        uri: Mesh URI: package://, file:// or an absolute path.
+        find_package: Function that returns the folder of a ROS package.
 
     Raises:
-        MeshError: the URI has another scheme, or leads nowhere.
+        MeshError: The scheme is unknown, or the file does not exist.
     """
     scheme, separator, rest = uri.partition("://")
     if separator and scheme == "package":
         package, _, relative = rest.partition("/")
         try:
             path = Path(find_package(package)) / relative
-        except Exception as error:  # the finder is the caller's: whatever it raises means "not there"
+        except Exception as error:  # the caller's function may raise any exception for a missing package
             raise MeshError(uri, f"package '{package}' is not found ({error})", "install it") from error
     elif separator and scheme == "file":
         path = Path(rest)
@@ -36,5 +36,5 @@ def mesh_path(uri: str, find_package: PackageFinder) -> Path:
     else:
         path = Path(uri)
     if not path.is_file():
-        raise MeshError(uri, f"'{path}' does not exist", "check the name, and that its package is installed")
+        raise MeshError(uri, f"'{path}' does not exist", "check the name and the installation of its package")
     return path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads collision meshes: one reader for planning, simulation and clients, so that all of them see the same body."""
+"""Reads collision meshes, with one reader for planning, simulation and clients, so that all use the same shapes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from modular_framework_urdf.declared_triangles import (
     keep_obj_part,
     with_absolute_indices,
 )
-from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.lengths import MAX_LENGTH_M
 
 ALLOWED = (*FORMATS, "dae")
 BINARY_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
@@ -28,12 +28,12 @@ Scale = tuple[float, float, float]
 
 
 class MeshError(Exception):
-    """A mesh file cannot be used.
+    """A mesh file is invalid.
 
     Args:
-        path: the file, or the URI that names it.
-        found: what is wrong with it.
-        allowed: what would do, and what to do about it.
+        path: Path or URI of the file.
+        found: Fault.
+        allowed: Allowed content and remedy.
     """
 
     def __init__(self, path: Path | str, found: str, allowed: str) -> None:
@@ -43,11 +43,11 @@ class MeshError(Exception):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriangleMesh:
-    """Triangles in the frame of the shape.
+    """Triangles in the shape frame.
 
     Attributes:
-        vertices: shape (n, 3) [m], no two alike.
-        triangles: indices of vertices, shape (m, 3), counter-clockwise seen from outside.
+        vertices: Distinct vertices, shape (n, 3) [m].
+        triangles: Vertex indices, shape (m, 3), counter-clockwise as seen from outside.
     """
 
     vertices: NDArray[np.float64]
@@ -55,16 +55,16 @@ class TriangleMesh:
 
 
 def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0), part: str = "", centred: bool = False) -> TriangleMesh:
-    """Reads every triangle of a mesh file, or of a part of it.
+    """Reads all triangles of a mesh file or of a part of the file.
 
     Args:
-        path: an STL, OBJ, PLY or COLLADA file.
-        scale: of the description that names the file, along x, y and z; a negative one mirrors.
-        part: name of the COLLADA node or OBJ group to read; empty for the whole file.
-        centred: whether the middle of its bounding box is moved to the origin.
+        path: STL, OBJ, PLY or COLLADA file.
+        scale: Scale factors along x, y and z; negative factors mirror the mesh.
+        part: COLLADA node or OBJ group to read; "" for the whole file.
+        centred: Whether to move the centre of the bounding box to the origin.
 
     Raises:
-        MeshError: the file cannot be read, holds no triangle, or lost triangles while it was read.
+        MeshError: The file cannot be read, contains no triangle, or could not be read completely.
     """
     path = Path(path)
     factors = np.array(scale, dtype=float)
@@ -74,27 +74,27 @@ def read_mesh(path: str | Path, scale: Scale = (1.0, 1.0, 1.0), part: str = "", 
     if len(triangles) != declared:
         raise MeshError(
             path,
-            f"{len(triangles)} of the {declared} triangles it declares could be read",
-            "all are needed; export the mesh again as plain triangles",
+            f"only {len(triangles)} of the {declared} declared triangles could be read",
+            "all are required; export the mesh again as plain triangles",
         )
     if declared == 0:
-        raise MeshError(path, "holds no triangle", "at least one is needed; give a triangle mesh")
+        raise MeshError(path, "contains no triangle", "at least one is required; give a triangle mesh")
     if not np.isfinite(vertices).all():
-        raise MeshError(path, "a vertex is not finite", "every coordinate must be a finite number; mend the file")
+        raise MeshError(path, "a vertex is not finite", "every coordinate must be a finite number; correct the file")
     if centred:
         vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     vertices, triangles = _merged(vertices * (unit * factors), triangles)
-    if np.abs(vertices).max() > LARGEST_LENGTH_M:
+    if np.abs(vertices).max() > MAX_LENGTH_M:
         raise MeshError(
             path,
             f"a vertex is {np.abs(vertices).max():.3g} m from the origin",
-            f"allowed: at most {LARGEST_LENGTH_M:g} m; mend the file, its unit or the scale",
+            f"allowed: at most {MAX_LENGTH_M:g} m; correct the file, its unit or the scale",
         )
     return TriangleMesh(vertices, triangles if np.prod(factors) > 0.0 else np.ascontiguousarray(triangles[:, ::-1]))
 
 
 def _read(path: Path, part: str) -> tuple[int, float, NDArray[np.float64], NDArray[np.int64]]:
-    """Returns the number of triangles a file declares, its unit [m], its vertices and triangles."""
+    """Returns declared number of triangles, unit [m], vertices and triangles of a file."""
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ALLOWED:
         raise MeshError(path, f"is a '{path.suffix}' file", f"allowed: {', '.join(ALLOWED)}; convert the mesh")
@@ -111,29 +111,29 @@ def _read(path: Path, part: str) -> tuple[int, float, NDArray[np.float64], NDArr
             content, names = keep_obj_part(content, part)
             _require_part(path, part, names)
         declared = declared_triangles(kind, content)
-        if kind == "stl" and is_binary_stl(content):  # what most robots have: without trimesh, which loads for 0.6 s
+        if kind == "stl" and is_binary_stl(content):  # common case without trimesh, whose import takes 0.6 s
             return declared, 1.0, *_corners(np.frombuffer(content, BINARY_STL, offset=STL_HEADER)["corners"])
         return declared, 1.0, *_load(kind, with_absolute_indices(content) if kind == "obj" else content)
     except MeshError:
         raise
     except OSError as error:
-        raise MeshError(path, f"cannot be read ({error})", "give a mesh file that is there and readable") from error
-    except Exception as error:  # noqa: BLE001 - the readers behind trimesh raise what they like on a broken file
+        raise MeshError(path, f"cannot be read ({error})", "give an existing, readable mesh file") from error
+    except Exception as error:  # noqa: BLE001 - the readers behind trimesh can raise anything for an invalid file
         raise MeshError(
             path,
-            f"is no whole {kind.upper()} file ({type(error).__name__}: {error})",
+            f"is not a complete {kind.upper()} file ({type(error).__name__}: {error})",
             f"allowed: well-formed {', '.join(ALLOWED)}; export the mesh again",
         ) from error
 
 
 def _require_part(path: Path, part: str, names: list[str]) -> None:
     if part not in names:
-        raise MeshError(path, f"has no part '{part}'", f"allowed: {', '.join(names) or 'none, it has no names'}")
+        raise MeshError(path, f"has no part '{part}'", f"allowed: {', '.join(names) or 'none, it has no named parts'}")
 
 
 def _load(kind: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Returns vertices and triangles of all parts, as trimesh reads them and in the file's own unit."""
-    import trimesh  # slow to load
+    """Returns vertices and triangles of all parts, read by trimesh, in the unit of the file."""
+    import trimesh  # slow import
 
     options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
     loaded: Any = trimesh.load(io.BytesIO(content), file_type=kind, process=False, **options)
@@ -147,7 +147,7 @@ def _load(kind: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.in
 
 
 def _corners(corners: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Returns vertices and triangles of the corners of triangles, shape (m, 3, 3)."""
+    """Returns vertices and triangles from the corners of triangles, shape (m, 3, 3)."""
     vertices = corners.reshape(-1, 3).astype(np.float64)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
@@ -155,6 +155,6 @@ def _corners(corners: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.int
 def _merged(
     vertices: NDArray[np.float64], triangles: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Makes vertices at the same position one vertex."""
-    unique, numbers = np.unique(vertices + 0.0, axis=0, return_inverse=True)
-    return np.ascontiguousarray(unique), np.asarray(numbers.reshape(-1)[triangles], dtype=np.int64)
+    """Merges vertices at the same position."""
+    unique, indices = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    return np.ascontiguousarray(unique), np.asarray(indices.reshape(-1)[triangles], dtype=np.int64)

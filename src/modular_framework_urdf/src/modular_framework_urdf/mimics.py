@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mimic joints: the leader at the end of each chain, and the leader's position for a position of the mimic joint."""
+"""Resolves chains of mimic joints and computes positions of leading joints."""
 
 from __future__ import annotations
 
@@ -10,67 +10,67 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """A joint that follows another: position = multiplier * leader + offset."""
+    """Relation of a mimic joint to its leading joint: position = multiplier * leader position + offset."""
 
     leader: str
     multiplier: float
     offset: float
 
-    def leads_to(self, position: float) -> float:
-        """Returns the leader's position [rad or m] that brings the joint to a position."""
+    def leader_position(self, position: float) -> float:
+        """Returns the leader's position for a position of the mimic joint [rad or m]."""
         return (position - self.offset) / self.multiplier
 
 
 def resolved(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dict[str, Mimic]:
-    """Returns what each joint follows that follows no other joint itself.
+    """Returns the relation of each mimic joint to an independent leading joint.
 
     Args:
-        mimics: what each joint follows in the description.
-        movable: names of all joints that move.
+        mimics: Relations as written in the URDF, by mimic joint.
+        movable: Names of all movable joints.
 
     Raises:
-        ValueError: a joint follows one that does not move or is not there, joints follow each other in a loop, or a
-            multiplier is 0 or a number is not finite.
+        ValueError: A leading joint is unknown or not movable, the relations form a cycle, a multiplier is 0, or a
+            number is not finite.
     """
     independent = sorted(set(movable) - mimics.keys())
     result: dict[str, Mimic] = {}
     for name in mimics:
-        way, found = [name], Mimic(name, 1.0, 0.0)
-        while found.leader in mimics:
-            direct = mimics[found.leader]
-            if direct.leader in way:
+        path, total = [name], Mimic(name, 1.0, 0.0)
+        while total.leader in mimics:
+            direct = mimics[total.leader]
+            if direct.leader in path:
                 raise ValueError(
-                    f"URDF joint '{name}': it mimics itself through {' -> '.join([*way, direct.leader])}; "
-                    f"a joint may mimic one of {', '.join(independent) or 'none'}; let one of the loop "
-                    "mimic none"
+                    f"URDF joint '{name}': it mimics itself through {' -> '.join([*path, direct.leader])}; "
+                    f"a joint may mimic one of {', '.join(independent) or 'none'}; remove <mimic> from a joint of the "
+                    "cycle"
                 )
-            way.append(direct.leader)
-            found = Mimic(
-                direct.leader, found.multiplier * direct.multiplier, found.multiplier * direct.offset + found.offset
+            path.append(direct.leader)
+            total = Mimic(
+                direct.leader, total.multiplier * direct.multiplier, total.multiplier * direct.offset + total.offset
             )
-        if not (math.isfinite(found.multiplier) and math.isfinite(found.offset) and found.multiplier):
+        if not (math.isfinite(total.multiplier) and math.isfinite(total.offset) and total.multiplier):
             raise ValueError(
-                f"URDF joint '{name}': it mimics '{found.leader}' by multiplier {found.multiplier} and "
-                f"offset {found.offset}; both must be finite, the multiplier not 0; make a joint that "
-                "never moves a fixed one"
+                f"URDF joint '{name}': it mimics '{total.leader}' by multiplier {total.multiplier} and "
+                f"offset {total.offset}; both must be finite, the multiplier not 0; make a joint that "
+                "never moves fixed"
             )
-        if found.leader not in movable:
+        if total.leader not in movable:
             raise ValueError(
-                f"URDF joint '{way[-2]}': it mimics '{found.leader}', which is no joint that moves; "
-                f"allowed are {', '.join(independent) or 'none'}; mend the name or remove <mimic>"
+                f"URDF joint '{path[-2]}': it mimics '{total.leader}', which is not a movable joint; "
+                f"allowed: {', '.join(independent) or 'none'}; correct the name or remove <mimic>"
             )
-        result[name] = found
+        result[name] = total
     return result
 
 
 def with_leaders(values: Mapping[str, float], mimics: Mapping[str, Mimic]) -> dict[str, float]:
-    """Returns the positions with those of mimic joints replaced by their leaders'; a leader's own goes before.
+    """Returns joint positions with mimic joints replaced by their leaders. A leader's given position takes precedence.
 
     Args:
-        values: positions by joint [rad or m].
-        mimics: as `resolved` returns them.
+        values: Positions by joint [rad or m].
+        mimics: Relations from `resolved`.
     """
     result = {name: value for name, value in values.items() if name not in mimics}
     for name in values.keys() & mimics.keys():
-        result.setdefault(mimics[name].leader, mimics[name].leads_to(values[name]))
+        result.setdefault(mimics[name].leader, mimics[name].leader_position(values[name]))
     return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The contents of a URDF as plain records; `urdf_reader.read_urdf` makes them."""
+"""Content of a URDF as plain records, created by `urdf_reader.read_urdf`."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ MOVABLE_KINDS = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """A pose in the frame of the parent.
+    """A pose in the parent frame.
 
     Attributes:
-        xyz: position [m].
-        rpy: turns about the fixed axes x, y and z, in this order [rad].
+        xyz: Position [m].
+        rpy: Rotations about the fixed axes x, y and z, in this order [rad].
     """
 
     xyz: Vector = (0.0, 0.0, 0.0)
@@ -39,7 +39,11 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Its edges along x, y and z [m]."""
+    """A box.
+
+    Attributes:
+        size: Edge lengths along x, y and z [m].
+    """
 
     tag: ClassVar[str] = "box"
     size: Vector
@@ -47,7 +51,11 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Sphere:
-    """Its radius [m]."""
+    """A sphere.
+
+    Attributes:
+        radius: Radius [m].
+    """
 
     tag: ClassVar[str] = "sphere"
     radius: float
@@ -55,7 +63,7 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class _RoundShape:
-    """A shape around the z axis, by its radius and its length [m]."""
+    """A round shape along the z axis, with radius and length [m]."""
 
     radius: float
     length: float
@@ -68,14 +76,19 @@ class Cylinder(_RoundShape):
 
 
 class Capsule(_RoundShape):
-    """A cylinder with half spheres on both ends, which its length leaves out."""
+    """A cylinder with hemispheres on both ends; the length excludes the hemispheres."""
 
     tag: ClassVar[str] = "capsule"
 
 
 @dataclass(frozen=True, slots=True)
 class MeshFile:
-    """URI of a mesh file, and by what it is scaled along x, y and z."""
+    """A mesh file.
+
+    Attributes:
+        uri: URI of the file.
+        scale: Scale factors along x, y and z.
+    """
 
     tag: ClassVar[str] = "mesh"
     uri: str
@@ -84,7 +97,7 @@ class MeshFile:
 
 @dataclass(frozen=True, slots=True)
 class UnknownShape:
-    """A shape that URDF does not have."""
+    """A shape that is not part of URDF."""
 
     tag: str
 
@@ -94,14 +107,23 @@ Shape = Box | Sphere | Cylinder | Capsule | MeshFile | UnknownShape
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrdfElement:
-    """Base of what is an element of the description; `line` is where it begins."""
+    """Base class of records with a line.
+
+    Attributes:
+        line: First line of the element, from 1.
+    """
 
     line: int
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedShapes(UrdfElement):
-    """A <visual> or <collision>: its shapes (one, in a correct description), and their pose in the link."""
+    """A <visual> or <collision>.
+
+    Attributes:
+        shapes: Shapes of the element; a valid URDF has one.
+        origin: Pose in the link frame.
+    """
 
     shapes: tuple[Shape, ...]
     origin: Origin
@@ -112,9 +134,9 @@ class Link(UrdfElement):
     """A link.
 
     Attributes:
-        name: of the link.
-        visuals: its <visual> elements.
-        collisions: its <collision> elements.
+        name: Name of the link.
+        visuals: <visual> elements.
+        collisions: <collision> elements.
     """
 
     name: str
@@ -124,13 +146,13 @@ class Link(UrdfElement):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A <limit>; None is not given.
+    """A <limit>.
 
     Attributes:
-        lower: the least position [rad or m].
-        upper: the greatest position [rad or m].
-        effort: the largest [N m or N].
-        velocity: the largest [rad/s or m/s].
+        lower: Lower position limit [rad or m].
+        upper: Upper position limit [rad or m].
+        effort: Effort limit [N m or N]; None if not given.
+        velocity: Velocity limit [rad/s or m/s]; None if not given.
     """
 
     lower: float
@@ -141,7 +163,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class SafetyController:
-    """A <safety_controller>: the range [rad or m] and gains of ros_control's soft limits; None is not given."""
+    """A <safety_controller>: range [rad or m] and gains of ros_control's soft limits; None if not given."""
 
     soft_lower_limit: float | None
     soft_upper_limit: float | None
@@ -154,15 +176,15 @@ class Joint(UrdfElement):
     """A joint.
 
     Attributes:
-        name: of the joint.
-        kind: the URDF type.
-        parent: link it hangs on; empty when the description names none.
-        child: link it carries; empty when the description names none.
-        origin: pose in the parent link.
-        axis: in the joint's own frame.
-        limit: None without the element.
-        safety: None without the element.
-        mimic: the joint it follows directly; None when it follows none.
+        name: Name of the joint.
+        kind: URDF type.
+        parent: Parent link; "" if not given.
+        child: Child link; "" if not given.
+        origin: Pose in the parent frame.
+        axis: Axis in the joint frame.
+        limit: Limits, or None.
+        safety: Soft limits, or None.
+        mimic: Relation to the leading joint, or None.
     """
 
     name: str
@@ -177,12 +199,12 @@ class Joint(UrdfElement):
 
     @property
     def movable(self) -> bool:
-        """Whether it is of a kind that moves."""
+        """Whether the joint type is movable."""
         return self.kind in MOVABLE_KINDS
 
 
 class LocatedText(NamedTuple):
-    """Text of an element, without the white space around it, and its line."""
+    """Stripped text of an element and its line."""
 
     text: str
     line: int
@@ -190,7 +212,7 @@ class LocatedText(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TransmissionPart(UrdfElement):
-    """A <joint> or <actuator> of a transmission; None is not given."""
+    """A <joint> or <actuator> of a transmission; None if not given."""
 
     tag: str
     name: str
@@ -202,7 +224,7 @@ class TransmissionPart(UrdfElement):
 
 @dataclass(frozen=True, slots=True)
 class Transmission(UrdfElement):
-    """A <transmission>, in the words of the file."""
+    """A <transmission> as written in the URDF."""
 
     name: str
     kind: str
@@ -212,7 +234,7 @@ class Transmission(UrdfElement):
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot; everything in the order of the file."""
+    """A robot with its elements in file order."""
 
     name: str
     links: tuple[Link, ...]
@@ -220,10 +242,10 @@ class Robot:
     transmissions: tuple[Transmission, ...]
 
     def movable_joints(self) -> Iterator[Joint]:
-        """Yields the joints of kinds that move."""
+        """Yields the movable joints."""
         return (joint for joint in self.joints if joint.movable)
 
     def root_links(self) -> list[str]:
-        """Returns the names of the links that no joint carries; a correct description has one."""
-        carried = {joint.child for joint in self.joints}
-        return [link.name for link in self.links if link.name not in carried]
+        """Returns the names of the links without parent joint; a valid URDF has one."""
+        children = {joint.child for joint in self.joints}
+        return [link.name for link in self.links if link.name not in children]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads `<ros2_control>` of a robot description: which hardware its joints have, and how they are commanded."""
+"""Reads the hardware and the command interfaces of joints from the `<ros2_control>` tags of a URDF."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from modular_framework_urdf import xml_text
 
 MOCK_PLUGINS = ("mock_components/GenericSystem", "fake_components/GenericSystem")
-"""Names of hardware that follows its commands exactly."""
+"""Plugins of hardware that follows its commands exactly."""
 SIMULATION_PLUGINS = (
     "gz_ros2_control/GazeboSimSystem",
     "ign_ros2_control/IgnitionSystem",
     "gazebo_ros2_control/GazeboSystem",
 )
-"""Names of hardware that is simulated: those of Gazebo, of its time as Ignition, and of Gazebo classic."""
+"""Plugins of simulated hardware: Gazebo, Ignition and Gazebo classic."""
 
 Value = bool | int | float | str
 
@@ -25,10 +25,10 @@ class Ros2ControlJoint:
     """A joint of a `<ros2_control>` tag.
 
     Attributes:
-        name: Its name.
-        command_interfaces: What it is commanded, in alphabetical order; none for a joint that is only read.
-        initial_position: Where it begins [rad|m].
-        line: Of the description.
+        name: Name of the joint.
+        command_interfaces: Command interfaces in alphabetical order; empty for a joint that is only read.
+        initial_position: Initial position [rad or m].
+        line: Line in the URDF.
     """
 
     name: str
@@ -42,10 +42,10 @@ class Ros2ControlHardware:
     """A `<ros2_control>` tag.
 
     Attributes:
-        name: Its name.
-        plugin: Its hardware.
+        name: Name of the hardware.
+        plugin: Plugin of the hardware.
         parameters: Parameters of the hardware.
-        joints: Its joints, without those that follow another one.
+        joints: Joints without mimic joints.
     """
 
     name: str
@@ -55,19 +55,19 @@ class Ros2ControlHardware:
 
     @property
     def simulated(self) -> bool:
-        """Whether it is a simulation."""
+        """Whether the hardware is simulated."""
         return self.plugin in SIMULATION_PLUGINS
 
 
 def read_ros2_control(text: str, where: str = "robot_description") -> tuple[Ros2ControlHardware, ...]:
-    """Returns the `<ros2_control>` tags of a robot description, in its order.
+    """Returns the `<ros2_control>` tags of a URDF in file order.
 
     Args:
-        text: The description.
-        where: What to call it in messages.
+        text: URDF text.
+        where: Name of the file or parameter, for messages.
 
     Raises:
-        XmlError: It is no XML, a tag names no hardware, or the initial value of a joint is no number.
+        XmlError: The text is not XML, a tag has no plugin, or the initial value of a joint is not a number.
     """
     return tuple(_hardware(tag, where) for tag in xml_text.parse(text, where).iter("ros2_control"))
 
@@ -82,15 +82,15 @@ def _hardware(tag: xml_text.Element, where: str) -> Ros2ControlHardware:
             f"allowed: {MOCK_PLUGINS[0]}, {SIMULATION_PLUGINS[0]}, or package/Class of a RobotHW; add it",
         )
     parameters = {
-        each.get("name", ""): _number_or_text((each.text or "").strip()) for each in tag.findall("hardware/param")
+        item.get("name", ""): _number_or_text((item.text or "").strip()) for item in tag.findall("hardware/param")
     }
-    joints = [_joint(each, where) for each in tag.findall("joint") if each.find("param[@name='mimic']") is None]
+    joints = [_joint(item, where) for item in tag.findall("joint") if item.find("param[@name='mimic']") is None]
     return Ros2ControlHardware(name, plugin, parameters, tuple(joints))
 
 
 def _joint(tag: xml_text.Element, where: str) -> Ros2ControlJoint:
     name = tag.get("name", "")
-    interfaces = tuple(sorted(each.get("name", "") for each in tag.findall("command_interface")))
+    interfaces = tuple(sorted(item.get("name", "") for item in tag.findall("command_interface")))
     text = tag.findtext("state_interface[@name='position']/param[@name='initial_value']")
     text = text or tag.findtext("param[@name='initial_position']") or "0"
     try:
@@ -106,9 +106,9 @@ def _joint(tag: xml_text.Element, where: str) -> Ros2ControlJoint:
 def _number_or_text(text: str) -> Value:
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
-    for number in (int, float):
+    for convert in (int, float):
         try:
-            return number(text)
+            return convert(text)
         except ValueError:
             continue
     return text

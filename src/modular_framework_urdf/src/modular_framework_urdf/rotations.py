@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rotations as quaternions xyzw and as roll, pitch and yaw: turns about the fixed axes x, then y, then z [rad].
+"""Rotations as quaternions xyzw and as roll, pitch and yaw: rotations about the fixed axes x, then y, then z [rad].
 
-Written out, and tested against SciPy: importing SciPy would cost every node a third of a second at its start, and it
-takes ten times as long for a single rotation, of which the simulation composes thousands a second.
+Implemented without SciPy, whose import delays the start of every node by 0.3 s and whose single rotations take ten
+times as long; the simulation composes thousands of rotations per second. Tested against SciPy.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-POLE_RAD = 1e-7  # roll and yaw cannot be told apart where the pitch is so near to its ends
+POLE_RAD = 1e-7  # distance of the pitch from +-pi/2 below which roll and yaw are not distinguishable
 
 
 def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
@@ -42,16 +42,17 @@ def matrix_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[Vector3, Vec
 
 
 def rpy_from_quaternion(quaternion: Sequence[float]) -> Vector3:
-    """Returns roll, pitch and yaw [rad], pitch within [-pi/2, pi/2]; at its ends the yaw is chosen as 0.
+    """Returns roll, pitch and yaw [rad], with pitch in [-pi/2, pi/2]. At the limits of the pitch, the yaw is 0.
 
-    Sum and difference of roll and yaw come first (Bernardes and Viollet, 2022): no digits are lost near the ends.
+    Computes sum and difference of roll and yaw first (Bernardes and Viollet, 2022), which keeps the precision near the
+    limits of the pitch.
 
     Raises:
-        ValueError: the quaternion has no length.
+        ValueError: The norm of the quaternion is 0.
     """
     x, y, z, w = quaternion
     if not math.hypot(x, y, z, w) > 0.0:
-        raise ValueError(f"({x}, {y}, {z}, {w}) is no rotation: a quaternion must have a length")
+        raise ValueError(f"({x}, {y}, {z}, {w}) is not a rotation; the norm of a quaternion must be above 0")
     upper, lower = math.hypot(w + y, z - x), math.hypot(w - y, x + z)
     pitch = 2 * math.atan2(upper, lower) - math.pi / 2
     half_sum, half_difference = math.atan2(x + z, w - y), math.atan2(z - x, w + y)
@@ -75,7 +76,7 @@ def multiply_quaternions(a: Sequence[float], b: Sequence[float]) -> Quaternion:
 
 
 def rotate_vector(quaternion: Sequence[float], vector: Sequence[float]) -> Vector3:
-    """Returns the vector turned by a unit quaternion."""
+    """Returns a vector rotated by a unit quaternion."""
     x, y, z, w = quaternion
     vx, vy, vz = vector
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)

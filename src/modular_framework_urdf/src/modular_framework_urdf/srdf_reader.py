@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one reader of the semantic description (SRDF) of a robot; it knows nothing of the robot's joints."""
+"""Reads SRDF, the semantic description of a robot, independently of the URDF."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from modular_framework_urdf import xml_text
 from modular_framework_urdf.xml_text import Element, XmlError
 
 MemberKind = Literal["joint", "link", "chain", "group"]
-VARIABLES = {  # of virtual joints by their type, in MoveIt's order: m, rad, and the four numbers of a quaternion
+VARIABLES = {  # variables of virtual joints by type, in MoveIt's order [m, rad, quaternion]
     "planar": ("x", "y", "theta"),
     "floating": ("trans_x", "trans_y", "trans_z", "rot_x", "rot_y", "rot_z", "rot_w"),
 }
@@ -19,7 +19,7 @@ VARIABLES = {  # of virtual joints by their type, in MoveIt's order: m, rad, and
 
 @dataclass(frozen=True, slots=True)
 class GroupMember:
-    """One element of a <group>: a joint, link or group by its name, or a chain by its two links."""
+    """A member of a <group>: a joint, link or group by name, or a chain by base and tip link."""
 
     kind: MemberKind
     name: str = ""
@@ -29,7 +29,7 @@ class GroupMember:
 
 @dataclass(frozen=True, slots=True)
 class GroupSpec:
-    """A <group>, its members in the order of the file."""
+    """A <group> with its members in file order."""
 
     name: str
     members: tuple[GroupMember, ...] = ()
@@ -39,17 +39,17 @@ class GroupSpec:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of its joints."""
+        """Names of the joint members."""
         return self._names("joint")
 
     @property
     def links(self) -> tuple[str, ...]:
-        """Names of its links, each of which stands for the joint above it."""
+        """Names of the link members, each of which includes its parent joint."""
         return self._names("link")
 
     @property
     def subgroups(self) -> tuple[str, ...]:
-        """Names of the groups in it."""
+        """Names of the subgroups."""
         return self._names("group")
 
     @property
@@ -60,7 +60,7 @@ class GroupSpec:
 
 @dataclass(frozen=True, slots=True)
 class EndEffector:
-    """A gripper group fixed to a link of another group."""
+    """An end-effector group fixed to a parent link."""
 
     name: str
     group: str
@@ -79,20 +79,25 @@ class VirtualJoint:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Names of its variables as clients use them, "joint/variable"; none of a fixed joint."""
+        """Names of the variables as used by clients, "joint/variable"; empty for a fixed joint."""
         return tuple(f"{self.name}/{variable}" for variable in VARIABLES.get(self.kind, ()))
 
 
 @dataclass(frozen=True, slots=True)
 class SemanticDescription:
-    """Everything of an SRDF that the framework uses.
+    """Content of an SRDF.
 
     Attributes:
-        group_states: {group: {state: {joint: position}}} [rad or m]; a planar or floating virtual joint stands there
-            as its variables, "joint/variable".
-        touching_links: links that may touch anything by default (<disable_default_collisions>).
-        enabled_pairs: pairs that are checked all the same (<enable_collisions>).
-        disabled_pairs: pairs that may touch, and the reason the file gives (<disable_collisions>).
+        robot_name: Name of the robot.
+        groups: Planning groups by name.
+        group_states: Named states, {group: {state: {joint: position}}} [rad or m]. A planar or floating virtual joint
+            is represented by its variables, "joint/variable".
+        end_effectors: End effectors.
+        virtual_joints: Virtual joints.
+        passive_joints: Names of the passive joints.
+        touching_links: Links that may touch any other link by default (<disable_default_collisions>).
+        enabled_pairs: Pairs that are checked despite ``touching_links`` (<enable_collisions>).
+        disabled_pairs: Pairs that may touch, with their reasons (<disable_collisions>).
     """
 
     robot_name: str
@@ -110,26 +115,28 @@ def read_srdf(text: str | bytes, where: str = "SRDF") -> SemanticDescription:
     """Reads an SRDF.
 
     Args:
-        text: the document.
-        where: file or parameter it comes from, for messages.
+        text: SRDF text.
+        where: Name of the file or parameter, for messages.
 
     Raises:
-        XmlError: the text is not XML, has a DOCTYPE, an element lacks an attribute, a position is no number, or a
-            virtual joint in a group_state has not one number for each of its variables.
+        XmlError: The text is not XML or has a DOCTYPE, an attribute is missing, a position is not a number, or the
+            number of values of a virtual joint in a group_state is wrong.
     """
     return _Reader(where).read(xml_text.parse(text, where))
 
 
 class _Reader:
-    """Reads one document; `where` is what to call it in messages."""
+    """Reads one SRDF; `where` is its name in messages."""
 
     def __init__(self, where: str) -> None:
         self._where = where
 
     def read(self, root: Element) -> SemanticDescription:
-        need = self._need
+        required = self._required
         virtual_joints = tuple(
-            VirtualJoint(need(e, "name"), need(e, "type"), need(e, "parent_frame"), need(e, "child_link"))
+            VirtualJoint(
+                required(e, "name"), required(e, "type"), required(e, "parent_frame"), required(e, "child_link")
+            )
             for e in root.findall("virtual_joint")
         )
         return SemanticDescription(
@@ -137,19 +144,21 @@ class _Reader:
             groups={spec.name: spec for spec in map(self._group, root.findall("group"))},
             group_states=self._group_states(root, {joint.name: joint for joint in virtual_joints}),
             end_effectors=tuple(
-                EndEffector(need(e, "name"), need(e, "group"), need(e, "parent_link"), e.get("parent_group", ""))
+                EndEffector(
+                    required(e, "name"), required(e, "group"), required(e, "parent_link"), e.get("parent_group", "")
+                )
                 for e in root.findall("end_effector")
             ),
             virtual_joints=virtual_joints,
-            passive_joints=frozenset(need(e, "name") for e in root.findall("passive_joint")),
+            passive_joints=frozenset(required(e, "name") for e in root.findall("passive_joint")),
             touching_links=tuple(
-                dict.fromkeys(need(e, "link").strip() for e in root.findall("disable_default_collisions"))
+                dict.fromkeys(required(e, "link").strip() for e in root.findall("disable_default_collisions"))
             ),
             enabled_pairs=frozenset(map(self._pair, root.findall("enable_collisions"))),
             disabled_pairs={self._pair(e): e.get("reason", "") for e in root.findall("disable_collisions")},
         )
 
-    def _need(self, element: Element, attribute: str) -> str:
+    def _required(self, element: Element, attribute: str) -> str:
         value = element.get(attribute)
         if value is None:
             raise XmlError(
@@ -161,11 +170,11 @@ class _Reader:
 
     def _group(self, element: Element) -> GroupSpec:
         return GroupSpec(
-            self._need(element, "name"),
+            self._required(element, "name"),
             tuple(
-                GroupMember("chain", "", self._need(item, "base_link"), self._need(item, "tip_link"))
+                GroupMember("chain", "", self._required(item, "base_link"), self._required(item, "tip_link"))
                 if item.tag == "chain"
-                else GroupMember(item.tag, self._need(item, "name"))
+                else GroupMember(item.tag, self._required(item, "name"))
                 for item in element
                 if item.tag in ("joint", "link", "chain", "group")
             ),
@@ -178,37 +187,37 @@ class _Reader:
         for element in root.findall("group_state"):
             values: dict[str, float] = {}
             for item in element.findall("joint"):
-                name, numbers = self._need(item, "name"), self._positions(item)
+                name, numbers = self._required(item, "name"), self._positions(item)
                 joint = virtual_joints.get(name.strip())
                 values |= self._variables(item, joint, numbers) if joint else {name: numbers[0]}
-            states.setdefault(self._need(element, "group"), {})[self._need(element, "name")] = values
+            states.setdefault(self._required(element, "group"), {})[self._required(element, "name")] = values
         return states
 
     def _positions(self, element: Element) -> list[float]:
-        text = self._need(element, "value")
+        text = self._required(element, "value")
         try:
             numbers = [float(word) for word in text.split()]
             numbers[0]
         except (ValueError, IndexError) as error:
             raise XmlError(
                 f"{self._where}:{element.sourceline}",
-                f"a group_state holds a value that is not a number ('{text}' for joint '{element.get('name')}')",
+                f"a group_state contains a value that is not a number ('{text}' for joint '{element.get('name')}')",
                 "give a position in rad or m",
             ) from error
         return numbers
 
     def _variables(self, element: Element, joint: VirtualJoint, numbers: list[float]) -> dict[str, float]:
-        """Returns the position of a virtual joint by its variables; none of a fixed one."""
+        """Returns the positions of a virtual joint by variable; empty for a fixed joint."""
         names = VARIABLES.get(joint.kind)
         if names is None:
             return {}
         if len(numbers) != len(names):
             raise XmlError(
                 f"{self._where}:{element.sourceline}",
-                f"a group_state holds {len(numbers)} numbers for the {joint.kind} virtual joint '{joint.name}'",
+                f"a group_state contains {len(numbers)} numbers for the {joint.kind} virtual joint '{joint.name}'",
                 f"give {len(names)}, separated by spaces: {' '.join(names)} [m, rad]",
             )
         return dict(zip(joint.variables, numbers, strict=True))
 
     def _pair(self, element: Element) -> frozenset[str]:
-        return frozenset((self._need(element, "link1").strip(), self._need(element, "link2").strip()))
+        return frozenset((self._required(element, "link1").strip(), self._required(element, "link2").strip()))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one reader of URDF; every fault says its line.
+"""Reads URDF and reports faults with line numbers.
 
-It is written here because the readers that others maintain do not read what the framework needs: urdf_parser_py keeps
-no lines and knows no capsule; urdfdom and Pinocchio leave out the transmissions.
+Existing readers lack required features: urdf_parser_py has no line numbers and no capsules; urdfdom and Pinocchio skip
+transmissions.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from modular_framework_urdf.xml_text import XACRO_TAGS, Element, XmlError
 
 
 class AttributeFault(XmlError):
-    """An attribute of a description is not what it has to be.
+    """An attribute in a URDF is invalid.
 
     Attributes:
-        tag: of the element that has the attribute.
-        owner: what the element belongs to: "joint 'elbow'".
-        key: name of the attribute.
-        text: its value.
-        expected: what is allowed.
+        tag: Tag of the element.
+        owner: Owner of the element, such as "joint 'elbow'".
+        key: Name of the attribute.
+        text: Value of the attribute.
+        expected: Allowed values.
     """
 
     def __init__(self, where: str, tag: str, owner: str, key: str, text: str, expected: str) -> None:
@@ -53,15 +53,15 @@ class AttributeFault(XmlError):
 
 
 def read_urdf(text: str | bytes, where: str = "robot_description") -> Robot:
-    """Reads a URDF, xacro already expanded.
+    """Reads a URDF with expanded xacro.
 
     Args:
-        text: the document.
-        where: file or parameter it comes from, for messages.
+        text: URDF text.
+        where: Name of the file or parameter, for messages.
 
     Raises:
-        AttributeFault: something is no number.
-        XmlError: not well-formed XML, a DOCTYPE, or xacro that is not expanded.
+        AttributeFault: A number is invalid.
+        XmlError: The text is not well-formed XML, has a DOCTYPE, or contains xacro.
     """
     root = xml_text.parse(text, where)
     for element in root.iter():
@@ -78,7 +78,7 @@ def read_urdf(text: str | bytes, where: str = "robot_description") -> Robot:
 
 
 class _Attributes:
-    """The attributes of an element, as numbers; without an element none is given."""
+    """Reads the attributes of an optional element as numbers."""
 
     def __init__(self, element: Element | None, owner: str, where: str) -> None:
         self._element, self._owner, self._where = element, owner, where
@@ -94,13 +94,13 @@ class _Attributes:
         value = self.optional(key)
         return default if value is None else value
 
-    def needed(self, key: str) -> float:
+    def required(self, key: str) -> float:
         return self._numbers(key, self.text(key) or "", 1, "a number")[0]
 
     def vector(self, key: str, default: Vector) -> Vector:
-        return self.needed_vector(key) if (self.text(key) or "").strip() else default
+        return self.required_vector(key) if (self.text(key) or "").strip() else default
 
-    def needed_vector(self, key: str) -> Vector:
+    def required_vector(self, key: str) -> Vector:
         text = self.text(key) or ""
         x, y, z = self._numbers(key, text, 3, "three numbers")
         if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
@@ -124,7 +124,7 @@ class _Attributes:
 def _link(element: Element, where: str) -> Link:
     name = element.get("name", "")
 
-    def placed(role: str) -> tuple[PlacedShapes, ...]:
+    def shapes(role: str) -> tuple[PlacedShapes, ...]:
         owner = f"{role} shape of link '{name}'"
         return tuple(
             PlacedShapes(
@@ -135,7 +135,7 @@ def _link(element: Element, where: str) -> Link:
             for item in element.findall(role)
         )
 
-    return Link(name, placed("visual"), placed("collision"), line=element.sourceline)
+    return Link(name, shapes("visual"), shapes("collision"), line=element.sourceline)
 
 
 def _origin(element: Element, owner: str, where: str) -> Origin:
@@ -147,13 +147,13 @@ def _shape(element: Element, owner: str, where: str) -> Shape:
     attributes = _Attributes(element, owner, where)
     match element.tag:
         case "box":
-            return Box(attributes.needed_vector("size"))
+            return Box(attributes.required_vector("size"))
         case "sphere":
-            return Sphere(attributes.needed("radius"))
+            return Sphere(attributes.required("radius"))
         case "cylinder":
-            return Cylinder(attributes.needed("radius"), attributes.needed("length"))
+            return Cylinder(attributes.required("radius"), attributes.required("length"))
         case "capsule":
-            return Capsule(attributes.needed("radius"), attributes.needed("length"))
+            return Capsule(attributes.required("radius"), attributes.required("length"))
         case "mesh":
             return MeshFile(element.get("filename", ""), attributes.vector("scale", (1.0, 1.0, 1.0)))
         case tag:
@@ -163,17 +163,17 @@ def _shape(element: Element, owner: str, where: str) -> Shape:
 def _joint(element: Element, where: str) -> Joint:
     name = element.get("name", "")
 
-    def inner(tag: str) -> _Attributes:
+    def attributes_of(tag: str) -> _Attributes:
         return _Attributes(element.find(tag), f"joint '{name}'", where)
 
-    limit, safety, mimic = inner("limit"), inner("safety_controller"), inner("mimic")
+    limit, safety, mimic = attributes_of("limit"), attributes_of("safety_controller"), attributes_of("mimic")
     return Joint(
         name,
         element.get("type", ""),
-        inner("parent").text("link") or "",
-        inner("child").text("link") or "",
+        attributes_of("parent").text("link") or "",
+        attributes_of("child").text("link") or "",
         _origin(element, f"joint '{name}'", where),
-        inner("axis").vector("xyz", (1.0, 0.0, 0.0)),
+        attributes_of("axis").vector("xyz", (1.0, 0.0, 0.0)),
         None
         if element.find("limit") is None
         else Limit(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parses the XML of descriptions so that each element knows its line, and refuses every document type.
+"""Parses the XML of robot descriptions with line numbers and refuses document types.
 
-The entities of a document type may grow without bound. Elements of a default namespace (`<robot xmlns="...">`), and
-those whose prefix is not declared (`<ignition:topic>`), are called as they are written.
+A document type is refused because its entities may expand without bound. Elements in a default namespace
+(`<robot xmlns="...">`) and elements with an undeclared prefix (`<ignition:topic>`) keep their names as written.
 """
 
 from __future__ import annotations
@@ -14,18 +14,20 @@ from xml.parsers import expat
 from lxml import etree
 
 XACRO_TAGS = ("xacro:", "{http://www.ros.org/wiki/xacro", "{http://ros.org/wiki/xacro")
-"""Beginnings of the tags of xacro, which are gone in an expanded file."""
+"""Prefixes of xacro tags, which do not occur in an expanded file."""
 Element = Any
-"""An lxml element; `sourceline` is the line where its start tag begins, from 1."""
-_LAST_LINE = 65_534
-"""libxml2 keeps larger lines in another place, which lxml does not set; there it is about where the tag ends."""
+"""An lxml element; `sourceline` is the first line of its start tag, from 1."""
+_MAX_LINE = 65_534
+"""Largest line number that lxml can set; beyond, `sourceline` is approximately the end of the tag."""
 
 
 class XmlError(ValueError):
-    """A text is no XML this project reads.
+    """A document is invalid.
 
     Args:
-        where: the text and its line; found: what is wrong there; allowed: what would do, and what to do about it.
+        where: Name of the document and line.
+        found: Fault.
+        allowed: Allowed content and remedy.
     """
 
     def __init__(self, where: str, found: str, allowed: str) -> None:
@@ -34,17 +36,17 @@ class XmlError(ValueError):
 
 
 def refuse_doctype(text: str | bytes, where: str) -> None:
-    """Raises XmlError where a document has a DOCTYPE; nothing of it is read, no entity expanded.
+    """Raises XmlError if a document has a DOCTYPE, without expanding any entity.
 
     Args:
-        text: the document; whether the rest of it is well-formed does not matter.
-        where: file or parameter the text comes from, for the message.
+        text: XML text, which need not be well-formed.
+        where: Name of the file or parameter, for messages.
     """
     _scan(text, where)
 
 
 def _scan(text: str | bytes, where: str) -> tuple[list[int], Exception | None]:
-    """Returns the line where each start tag begins, and what is not well-formed; raises XmlError at a DOCTYPE."""
+    """Returns the line of each start tag and a syntax error, if any; raises XmlError for a DOCTYPE."""
     parser = expat.ParserCreate()
     lines: list[int] = []
 
@@ -52,7 +54,7 @@ def _scan(text: str | bytes, where: str) -> tuple[list[int], Exception | None]:
         raise XmlError(
             f"{where}:{parser.CurrentLineNumber}",
             "got a DOCTYPE",
-            "allowed: XML without one, whose entities could fill the memory; remove it",
+            "allowed: XML without a DOCTYPE, because its entities could fill the memory; remove it",
         )
 
     parser.StartDoctypeDeclHandler = refuse
@@ -61,32 +63,32 @@ def _scan(text: str | bytes, where: str) -> tuple[list[int], Exception | None]:
         parser.Parse(text, True)
     except XmlError:
         raise
-    except (expat.ExpatError, LookupError, ValueError) as fault:  # the last two: an encoding that expat does not know
+    except (expat.ExpatError, LookupError, ValueError) as fault:  # LookupError, ValueError: unknown encoding
         return lines, fault
     return lines, None
 
 
 def parse(text: str | bytes, where: str) -> Element:
-    """Returns the root element of a document; comments and processing instructions are left out.
+    """Returns the root element of a document without comments and processing instructions.
 
     Args:
-        text: the document.
-        where: file or parameter it comes from, for the message.
+        text: XML text.
+        where: Name of the file or parameter, for messages.
 
     Raises:
-        XmlError: it is not well-formed XML, or has a DOCTYPE.
+        XmlError: The text is not well-formed XML or has a DOCTYPE.
     """
     lines, error = _scan(text, where)
     if error is not None:
         raise _syntax_error(where, getattr(error, "lineno", 1), error) from error
     is_text = isinstance(text, str)
     parser = etree.XMLParser(
-        encoding="utf-8" if is_text else None,  # a declared one does not hold for decoded text
+        encoding="utf-8" if is_text else None,  # a declared encoding does not apply to decoded text
         remove_comments=True,
         remove_pis=True,
         resolve_entities=False,
-        huge_tree=not is_text,  # mesh files are larger than libxml2 allows by default
-        recover=True,  # from prefixes that are not declared
+        huge_tree=not is_text,  # mesh files exceed libxml2's default size limit
+        recover=True,  # accepts undeclared prefixes
     )
     try:
         root = etree.fromstring(text.encode() if isinstance(text, str) else text, parser)
@@ -97,10 +99,10 @@ def parse(text: str | bytes, where: str) -> Element:
             raise _syntax_error(where, entry.line, entry.message)
     try:
         _name_as_written(root)
-    except ValueError as wrong:  # a name such as `a::b`
-        raise _syntax_error(where, 1, wrong) from wrong
+    except ValueError as error:  # a name such as `a::b`
+        raise _syntax_error(where, 1, error) from error
     for element, line in zip(root.iter(), lines, strict=True):
-        if line <= _LAST_LINE:
+        if line <= _MAX_LINE:
             element.sourceline = line
     return root
 
@@ -109,12 +111,12 @@ def _syntax_error(where: str, line: int | None, fault: object) -> XmlError:
     return XmlError(
         f"{where}:{line or 1}",
         f"not an XML document (not well-formed XML: {fault})",
-        "well-formed XML is needed; mend it",
+        "it must be well-formed XML; correct it",
     )
 
 
 def _name_as_written(root: Element) -> None:
-    """Takes the default namespaces out of the names of the elements."""
+    """Removes default namespaces from the element names."""
     for element in root.iter():
         if element.prefix is None and element.tag.startswith("{"):
             element.tag = etree.QName(element).localname
@@ -125,14 +127,14 @@ def read(path: Path) -> Element:
     """Returns the root element of a file.
 
     Raises:
-        OSError: the file cannot be read.
-        XmlError: it is not well-formed XML, or has a DOCTYPE.
+        OSError: The file cannot be read.
+        XmlError: The file is not well-formed XML or has a DOCTYPE.
     """
     return parse(path.read_bytes(), str(path))
 
 
 def add_child(parent: Element, tag: str, **attributes: str) -> Element:
-    """Appends an element to a parsed document and returns it."""
+    """Appends an element to a parent element and returns the new element."""
     return etree.SubElement(parent, tag, attributes)
 
 

@@ -12,17 +12,17 @@ import numpy as np
 
 from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.lengths import MAX_LENGTH_M
 
 MAX_TRIANGLES = 2_000_000
 
 
 def _require_positive(kind: str, **dimensions: float) -> None:
     for name, value in dimensions.items():
-        if not 0.0 < value <= LARGEST_LENGTH_M:
+        if not 0.0 < value <= MAX_LENGTH_M:
             raise GeometryError(
                 f"{kind}: {name} is {value} m; allowed are lengths above 0 m and up to "
-                f"{LARGEST_LENGTH_M:g} m; use a plane for what has no end"
+                f"{MAX_LENGTH_M:g} m; use a plane for what has no end"
             )
 
 
@@ -147,10 +147,10 @@ class Mesh(Shape):
             )
         if count > MAX_TRIANGLES:
             raise GeometryError(f"mesh: {count} triangles; allowed are {MAX_TRIANGLES}; simplify the mesh")
-        if not (np.abs(self.vertices) <= LARGEST_LENGTH_M).all():
+        if not (np.abs(self.vertices) <= MAX_LENGTH_M).all():
             raise GeometryError(
                 "mesh: a vertex is not finite or beyond all reach; allowed are coordinates of at most "
-                f"{LARGEST_LENGTH_M:g} m"
+                f"{MAX_LENGTH_M:g} m"
             )
         if int(np.min(self.triangles)) < 0 or int(np.max(self.triangles)) >= len(self.vertices):
             raise GeometryError(

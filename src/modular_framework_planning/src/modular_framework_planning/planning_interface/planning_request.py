@@ -45,16 +45,17 @@ class JointGoal:
         for name in self.positions.keys() & mimics.keys():
             mimic, value = mimics[name], self.positions[name]
             ends = sorted(
-                mimic.leads_to(end) for end in (value - self.below.get(name, 0.0), value + self.above.get(name, 0.0))
+                mimic.leader_position(end)
+                for end in (value - self.below.get(name, 0.0), value + self.above.get(name, 0.0))
             )
             leader = mimic.leader
             low[leader], high[leader] = max(low.get(leader, -np.inf), ends[0]), min(high.get(leader, np.inf), ends[1])
-            targets.setdefault(leader, mimic.leads_to(value))
+            targets.setdefault(leader, mimic.leader_position(value))
             if low[leader] > high[leader] + SAME_POSITION:
                 raise PlanningError(
                     ErrorCode.INVALID_GOAL_CONSTRAINTS,
                     f"goal: joint '{name}' at {value:.4f} asks "
-                    f"'{leader}', which it mimics, to be at {mimic.leads_to(value):.4f}; the goal asks "
+                    f"'{leader}', which it mimics, to be at {mimic.leader_position(value):.4f}; the goal asks "
                     f"another position of '{leader}', too; give positions that fit, or leave joints "
                     "that mimic out",
                 )

@@ -18,10 +18,10 @@ from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import load_mesh
 from modular_framework_simulation.models.poses import Pose, normalised_quaternion
 from modular_framework_simulation.physics.simulated_body import BodyState, Twist
-from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_reader import TriangleMesh
 
-LARGEST_COORDINATE_M = LARGEST_LENGTH_M
+LARGEST_COORDINATE_M = MAX_LENGTH_M
 LARGEST_VELOCITY = 1e3
 """Largest values with which the physics engine stays stable; larger ones in requests are refused [m/s, rad/s]."""
 LARGEST_FORCE = 1e5

@@ -15,7 +15,7 @@ from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.sdf_specs import UNLIMITED_FRICTION, Mesh
 from modular_framework_urdf import xml_text
-from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_paths import PackageFinder, mesh_path
 from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.mimics import Mimic, resolved
@@ -239,9 +239,9 @@ def _require_sizes(link: str, shape: Element) -> None:
                 largest = max((abs(float(word)) for word in (text or "").split()), default=0.0)
             except ValueError:
                 largest = math.inf
-            if not largest <= LARGEST_LENGTH_M:
+            if not largest <= MAX_LENGTH_M:
                 where = f"robot_description: <{shape.tag}> of link '{link}', <{element.tag} {key}=...>"
-                raise DescriptionError(where, f"got '{text}'", f"allowed: lengths of at most {LARGEST_LENGTH_M:g} m")
+                raise DescriptionError(where, f"got '{text}'", f"allowed: lengths of at most {MAX_LENGTH_M:g} m")
 
 
 def _give_frames_no_weight(root: Element) -> None:

@@ -16,7 +16,7 @@ from modular_framework_simulation.models.sdf_resources import Resources
 from modular_framework_simulation.models.sdf_surface import read_bounce, read_friction, read_surface_contact
 from modular_framework_simulation.models.visual_meshes import missing_pictures
 from modular_framework_simulation.models.xml_nodes import XmlNode
-from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.mesh_reader import ALLOWED as MESH_FORMATS
 
 _GEOMETRIES = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
@@ -187,6 +187,6 @@ def _positive(node: XmlNode, count: int) -> tuple[float, ...]:
 
 def _sizes(node: XmlNode, count: int) -> tuple[float, ...]:
     values = _positive(node, count)
-    if max(values) > LARGEST_LENGTH_M:
-        raise DescriptionError(node.where, f"got '{node.text.strip()}'", f"allowed: at most {LARGEST_LENGTH_M:g} m")
+    if max(values) > MAX_LENGTH_M:
+        raise DescriptionError(node.where, f"got '{node.text.strip()}'", f"allowed: at most {MAX_LENGTH_M:g} m")
     return values

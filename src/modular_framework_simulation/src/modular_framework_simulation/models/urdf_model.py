@@ -18,7 +18,7 @@ from modular_framework_simulation.models.sdf_shapes import MissingMeshError
 from modular_framework_simulation.models.sensor_elements import urdf_sensor_elements
 from modular_framework_simulation.models.urdf_extensions import UrdfExtensions
 from modular_framework_simulation.models.xml_nodes import XmlNode, parse_numbers, parse_xml
-from modular_framework_urdf.lengths import LARGEST_LENGTH_M
+from modular_framework_urdf.lengths import MAX_LENGTH_M
 from modular_framework_urdf.rotations import Vector3
 from modular_framework_urdf.xml_text import XACRO_TAGS
 
@@ -237,9 +237,9 @@ def _geometry(node: XmlNode, resources: Resources) -> specs.Geometry:
             return values
         if min(values) <= 0:
             raise DescriptionError(shape.where, f"got {attribute}='{values}'", "allowed: greater than 0")
-        if max(values) > LARGEST_LENGTH_M:
+        if max(values) > MAX_LENGTH_M:
             problem = f"got {attribute}='{shape.attributes.get(attribute)}'"
-            raise DescriptionError(shape.where, problem, f"allowed: at most {LARGEST_LENGTH_M:g} m")
+            raise DescriptionError(shape.where, problem, f"allowed: at most {MAX_LENGTH_M:g} m")
         return values
 
     match shape.tag:
