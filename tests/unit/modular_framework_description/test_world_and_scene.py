@@ -128,14 +128,14 @@ def test_a_shape_a_scene_cannot_hold_is_refused(tmp_path: Path) -> None:
             "</geometry></collision></link></model>"
         )
     )
-    with pytest.raises(WorldError, match="heightmap, allowed"):
+    with pytest.raises(WorldError, match="heightmap; allowed"):
         read_world(path, tmp_path)
 
 
 def test_a_pose_with_five_numbers_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "short.world"
     path.write_text(WORLD.format('<model name="m"><pose>0 0 0 0 0</pose></model>'))
-    with pytest.raises(WorldError, match="5 numbers, allowed 6"):
+    with pytest.raises(WorldError, match="5 numbers; it must have 6"):
         read_world(path, tmp_path)
 
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tools that write the data of a description package: models with exact inertia, and scenes that match worlds."""
+"""Generates the data of a description package: models with exact inertia, and scenes that match worlds."""

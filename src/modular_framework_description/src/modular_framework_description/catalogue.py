@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads a catalogue of models by their shapes, such as ``config/catalogue.yaml``; its keys are those of `Body`."""
+"""Reads a catalogue of models, such as ``config/catalogue.yaml``, whose keys are the attributes of `Body`."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from modular_framework_description.solids import Body, Part, ring_of_boxes
 
 
 class CatalogueError(ValueError):
-    """A catalogue cannot be used; the text names the file and the model."""
+    """A catalogue is invalid; the message names the file and the model."""
 
 
 def read_catalogue(path: Path) -> dict[str, tuple[Body, ...]]:
-    """Returns the bodies of a catalogue by their group.
+    """Returns the bodies of a catalogue by group.
 
     Args:
-        path: YAML file: lists of models by group, and below ``sources`` the texts that a model's ``source`` may name.
+        path: YAML file with a list of models per group, and below ``sources`` the texts for the key ``source``.
 
     Raises:
-        CatalogueError: The file is no catalogue, or a model has a key or value that is not allowed.
+        CatalogueError: The file is not a catalogue, or a model has an invalid key or value.
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -44,6 +44,6 @@ def _body(entry: dict[str, Any], sources: dict[str, str]) -> Body:
 
 
 def _parts(item: dict[str, Any]) -> tuple[Part, ...]:
-    place = {key: tuple(item.pop(key)) for key in ("xyz", "rpy") if key in item}
+    pose = {key: tuple(item.pop(key)) for key in ("xyz", "rpy") if key in item}
     ((kind, size),) = item.items()
-    return ring_of_boxes(**size) if kind == "ring" else (Part(kind, tuple(size), **place),)
+    return ring_of_boxes(**size) if kind == "ring" else (Part(kind, tuple(size), **pose),)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes a body as a Gazebo model: model.config, model.sdf (SDF 1.5) and, where it has one, its visual mesh."""
+"""Writes a body as a Gazebo model: model.config, model.sdf (SDF 1.5) and an optional visual mesh."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _inertial(link: ElementTree.Element, body: Body) -> None:
 
 
 def sdf_of(body: Body) -> ElementTree.Element:
-    """Return the SDF document of a body; its only link is called ``link``."""
+    """Returns the SDF document of a body with the single link ``link``."""
     sdf = ElementTree.Element("sdf", version="1.5")
     model = _child(sdf, "model", name=body.name)
     if body.mass == 0.0:
@@ -97,7 +97,7 @@ def _visuals(link: ElementTree.Element, body: Body) -> None:
 
 
 def config_of(body: Body) -> ElementTree.Element:
-    """Return the model.config document of a body."""
+    """Returns the model.config document of a body."""
     model = ElementTree.Element("model")
     _child(model, "name", body.name)
     _child(model, "version", "1.0")
@@ -109,7 +109,7 @@ def config_of(body: Body) -> ElementTree.Element:
 
 
 def write_model(body: Body, models_dir: Path) -> None:
-    """Write the folder of a model, replacing its files."""
+    """Writes the folder of a model and replaces existing files."""
     folder = models_dir / body.name
     folder.mkdir(parents=True, exist_ok=True)
     for name, document in (("model.sdf", sdf_of(body)), ("model.config", config_of(body))):

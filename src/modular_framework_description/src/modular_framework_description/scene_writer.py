@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes MoveIt's text scene of a world, so that a planner on the real robot knows the same furniture.
+"""Writes a world as MoveIt's text scene, so that planning on the real robot uses the same obstacles.
 
-The text has the layout MoveIt read before objects had poses of their own: shapes are placed in the world directly.
+The text has the old layout without object poses: shape poses are relative to the world.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _shape_lines(shape: PlacedShape) -> list[str]:
     quaternion_xyzw = Rotation.from_matrix(shape.pose[:3, :3]).as_quat(canonical=True)
-    # A scene's plane is a x + b y + c z + d = 0 in its own frame; the frame carries the distance, so d is 0.
+    # A scene's plane is a x + b y + c z + d = 0 in its own frame, whose pose includes the distance, so d is 0.
     size = (*shape.size, 0.0) if shape.kind == "plane" else shape.size
     return [shape.kind, _numbers(size), _numbers(shape.pose[:3, 3]), _numbers(quaternion_xyzw), _NO_COLOUR]
 
 
 def scene_text(name: str, links: Iterable[PlacedLink]) -> str:
-    """Return the text of a scene.
+    """Returns the text of a scene.
 
     Args:
-        name: of the scene, its first line.
-        links: what is in it; links without shapes are left out.
+        name: Name of the scene.
+        links: Links in the scene; links without shapes are omitted.
     """
     lines = [name]
     for link in links:

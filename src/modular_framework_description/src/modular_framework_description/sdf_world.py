@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads which collision shapes an SDF world puts where, following its ``model://`` includes.
+"""Reads the collision shapes of an SDF world and of the models that it includes.
 
-Covers what set-up worlds are made of: models written out or included, their links, and box, cylinder, sphere and
-plane shapes. Anything else is refused by name, because a planning scene with a hole in it is worse than none.
+Supports inline and included models with box, cylinder, sphere and plane shapes. Other shapes raise an error, because an
+incomplete planning scene is worse than none.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 
 class WorldError(ValueError):
-    """A world or model file cannot be read; the message says where, what was got and what is allowed."""
+    """A world or model file is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +29,9 @@ class PlacedShape:
     """A collision shape in the world.
 
     Attributes:
-        kind: "box", "cylinder", "sphere" or "plane".
-        size: (x, y, z), (radius, length), (radius,) [m], or the normal of a plane.
-        pose: 4x4 transform of the shape in the world frame.
+        kind: Shape type: "box", "cylinder", "sphere" or "plane".
+        size: Box (x, y, z), cylinder (radius, length) or sphere (radius,) [m], or unit normal of a plane.
+        pose: Pose in the world frame, shape (4, 4) [m].
     """
 
     kind: str
@@ -44,10 +44,10 @@ class PlacedLink:
     """A link of a model in the world.
 
     Attributes:
-        model: instance name of the model.
-        link: name of the link in the model.
-        pose: 4x4 transform of the link in the world frame.
-        shapes: its collision shapes.
+        model: Name of the model in the world.
+        link: Name of the link in the model.
+        pose: Pose in the world frame, shape (4, 4) [m].
+        shapes: Collision shapes.
     """
 
     model: str
@@ -57,15 +57,15 @@ class PlacedLink:
 
     @property
     def object_id(self) -> str:
-        """Name of the link's object in a planning scene, ``<model>__<link>``."""
+        """ID of the link's object in a planning scene, ``<model>__<link>``."""
         return f"{self.model}__{self.link}"
 
 
 def transform_from_pose_text(text: str, where: str) -> Array:
-    """Return the 4x4 transform of an SDF pose "x y z roll pitch yaw" [m, rad]; an empty text is the identity."""
+    """Returns the matrix of an SDF pose "x y z roll pitch yaw" [m, rad], shape (4, 4); identity for an empty text."""
     values = [float(value) for value in text.split()] or [0.0] * 6
     if len(values) != 6:
-        raise WorldError(f"{where}: pose has {len(values)} numbers, allowed 6 (x y z roll pitch yaw)")
+        raise WorldError(f"{where}: pose has {len(values)} numbers; it must have 6 (x y z roll pitch yaw)")
     transform = np.eye(4)
     transform[:3, :3] = rotation_from_rpy((values[3], values[4], values[5]))
     transform[:3, 3] = values[:3]
@@ -86,7 +86,7 @@ def _shape_of(collision: Element, pose: Array, where: str) -> PlacedShape:
     kind = "nothing" if shape is None else shape.tag
     tags = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "plane": ("normal",)}
     if shape is None or kind not in tags:
-        raise WorldError(f"{where}: collision geometry is {kind}, allowed {sorted(tags)}")
+        raise WorldError(f"{where}: collision geometry is {kind}; allowed: {sorted(tags)}")
     size = tuple(value for tag in tags[kind] for value in _floats(shape, tag))
     return PlacedShape(kind, size, pose @ _pose_of(collision, where))
 
@@ -113,7 +113,7 @@ def _included_model(include: Element, models_dir: Path) -> Element:
     folder = models_dir / uri.removeprefix("model://")
     if not uri.startswith("model://") or not (folder / "model.sdf").is_file():
         available = sorted(path.parent.name for path in models_dir.glob("*/model.sdf"))
-        raise WorldError(f"include '{uri}': no such model under {models_dir}, allowed model:// and one of {available}")
+        raise WorldError(f"include '{uri}': no such model in {models_dir}; allowed: model:// and one of {available}")
     model = _read(folder / "model.sdf").find("model")
     if model is None:
         raise WorldError(f"{folder / 'model.sdf'}: no <model> element")
@@ -121,14 +121,14 @@ def _included_model(include: Element, models_dir: Path) -> Element:
 
 
 def read_world(world_file: Path, models_dir: Path) -> list[PlacedLink]:
-    """Return every link of a world in file order.
+    """Returns all links of a world in file order.
 
     Args:
-        world_file: the ``.world`` file.
-        models_dir: folder that ``model://`` stands for.
+        world_file: Path of the ``.world`` file.
+        models_dir: Folder of the ``model://`` URIs.
 
     Raises:
-        WorldError: when a model is missing or uses a shape that cannot be put into a scene.
+        WorldError: A model is missing or has an unsupported shape.
     """
     world = _read(world_file).find("world")
     if world is None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rigid bodies made of boxes, cylinders and spheres: their volume, centre of mass and inertia tensor.
+"""Rigid bodies made of boxes, cylinders and spheres, with centre of mass and inertia tensor.
 
-A model file must state mass and inertia; computing both from the same shapes that collide keeps them true.
-Lengths in metres, angles in radians, masses in kilograms; every pose is that of a part in the body's frame.
+Mass properties are computed from the collision shapes, which keeps them consistent. Lengths are in metres, angles in
+radians, masses in kilograms. Poses of parts are in the body frame.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ Array = npt.NDArray[np.float64]
 
 
 def rotation_from_rpy(rpy: tuple[float, float, float]) -> Array:
-    """Return the 3x3 rotation Rz(yaw) Ry(pitch) Rx(roll) of fixed-axis angles [rad]."""
+    """Returns the rotation matrix Rz(yaw) Ry(pitch) Rx(roll) of fixed-axis angles [rad], shape (3, 3)."""
     return np.asarray(Rotation.from_euler("xyz", rpy).as_matrix(), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One convex piece of a body.
+    """A convex part of a body.
 
     Attributes:
-        kind: "box", "cylinder" (axis along z) or "sphere".
-        size: (x, y, z) of a box, (radius, length) of a cylinder, (radius,) of a sphere [m].
-        xyz: centre of the part in the body's frame [m].
-        rpy: fixed-axis rotation of the part in the body's frame [rad].
+        kind: Shape type: "box", "cylinder" (axis along z) or "sphere".
+        size: Box (x, y, z), cylinder (radius, length) or sphere (radius,) [m].
+        xyz: Centre of the part in the body frame [m].
+        rpy: Fixed-axis rotation of the part in the body frame [rad].
     """
 
     kind: str
@@ -40,14 +40,14 @@ class Part:
     rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        lengths = {"box": 3, "cylinder": 2, "sphere": 1}
-        if self.kind not in lengths:
-            raise ValueError(f"part kind: got '{self.kind}', allowed {sorted(lengths)}")
-        if len(self.size) != lengths[self.kind] or min(self.size) <= 0.0:
-            raise ValueError(f"size of a {self.kind}: got {self.size}, allowed {lengths[self.kind]} positive lengths")
+        counts = {"box": 3, "cylinder": 2, "sphere": 1}
+        if self.kind not in counts:
+            raise ValueError(f"part kind: got '{self.kind}', allowed {sorted(counts)}")
+        if len(self.size) != counts[self.kind] or min(self.size) <= 0.0:
+            raise ValueError(f"size of a {self.kind}: got {self.size}, allowed {counts[self.kind]} positive lengths")
 
     def mesh(self) -> trimesh.Trimesh:
-        """Return the surface of the part in the body's frame (curved faces as fine polygons)."""
+        """Returns the surface of the part in the body frame, with curved faces as fine polygons."""
         match self.kind:
             case "box":
                 surface = trimesh.creation.box(extents=self.size)
@@ -67,15 +67,16 @@ class Body:
     """A rigid body of uniform density.
 
     Attributes:
-        name: name of its model folder.
-        description: one sentence for model.config.
-        mass: [kg]; 0 for a body that never moves.
-        parts: the convex pieces it consists of.
-        friction: Coulomb coefficient of its surface.
-        rolling_friction: resistance to rolling [m]; 0 for shapes that do not roll.
-        colour: red, green, blue in [0, 1].
-        mesh_name: file name of a visual mesh of the whole body, "" to show the parts themselves.
-        centre_offset: how far the centre of mass is from where even filling puts it [m]; the inertia about it stays.
+        name: Name of the model folder.
+        description: Sentence for model.config.
+        mass: Mass [kg]; 0 for a static body.
+        parts: Convex parts.
+        friction: Coulomb friction coefficient.
+        rolling_friction: Rolling friction coefficient [m]; 0 for shapes that do not roll.
+        colour: Red, green, blue in [0, 1].
+        mesh_name: File name of a visual mesh of the whole body; "" to show the parts.
+        centre_offset: Offset of the centre of mass from its position at uniform density [m]. The inertia about the
+            centre of mass is unchanged.
     """
 
     name: str
@@ -89,12 +90,12 @@ class Body:
     centre_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def mesh(self) -> trimesh.Trimesh:
-        """Return the outer surface of all parts together."""
+        """Returns the outer surface of the union of all parts."""
         meshes = [part.mesh() for part in self.parts]
         return meshes[0] if len(meshes) == 1 else trimesh.boolean.union(meshes, engine="manifold")
 
     def mass_properties(self) -> MassProperties:
-        """Return mass properties: closed form for one part, integrals over the joined surface for several."""
+        """Returns the mass properties, in closed form for one part and by surface integrals for several parts."""
         if len(self.parts) == 1:
             part, rotation = self.parts[0], rotation_from_rpy(self.parts[0].rpy)
             inertia = self.mass * rotation @ unit_inertia(part) @ rotation.T
@@ -107,7 +108,13 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class MassProperties:
-    """Mass [kg], centre of mass [m] and inertia about it [kg m^2], in the axes of the body."""
+    """Mass properties in the body axes.
+
+    Attributes:
+        mass: Mass [kg].
+        centre: Centre of mass, shape (3,) [m].
+        inertia: Inertia tensor about the centre of mass, shape (3, 3) [kg m^2].
+    """
 
     mass: float
     centre: Array
@@ -115,7 +122,7 @@ class MassProperties:
 
 
 def unit_inertia(part: Part) -> Array:
-    """Return the inertia about the centre of a solid part of 1 kg, in its own axes [m^2]."""
+    """Returns the inertia per mass of a solid part about its centre, in the part axes, shape (3, 3) [m^2]."""
     match part.kind:
         case "box":
             x, y, z = part.size
@@ -123,23 +130,23 @@ def unit_inertia(part: Part) -> Array:
             return np.diag(diagonal) / 12.0
         case "cylinder":
             radius, length = part.size
-            across = (3.0 * radius**2 + length**2) / 12.0
-            return np.diag([across, across, radius**2 / 2.0])
+            transverse = (3.0 * radius**2 + length**2) / 12.0
+            return np.diag([transverse, transverse, radius**2 / 2.0])
         case "sphere":
             return np.eye(3) * 0.4 * part.size[0] ** 2
     raise ValueError(f"part kind: got '{part.kind}', allowed box, cylinder, sphere")
 
 
 def ring_of_boxes(radius: float, thickness: float, height: float, count: int, z: float) -> tuple[Part, ...]:
-    """Return boxes standing in a circle, as the wall of a hollow cylinder.
+    """Returns boxes on a circle as the wall of a hollow cylinder.
 
     Args:
-        radius: outer radius, reached by the middle of each outer face [m].
-        thickness: of the wall [m].
-        height: of the wall [m].
-        count: number of boxes; each is 2 % too narrow to meet its neighbours outside, which keeps the joined
-            surface free of edges that coincide.
-        z: height of the wall's centre in the body's frame [m].
+        radius: Outer radius, at the middle of each outer face [m].
+        thickness: Thickness of the wall [m].
+        height: Height of the wall [m].
+        count: Number of boxes. Each box is 2 % narrower than a closed wall requires, which avoids coincident edges in
+            the union.
+        z: Height of the wall's centre in the body frame [m].
     """
     width = 0.98 * 2.0 * radius * math.tan(math.pi / count)
     middle = radius - thickness / 2.0
