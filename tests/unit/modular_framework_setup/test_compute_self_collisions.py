@@ -137,7 +137,7 @@ def test_an_srdf_without_a_matrix_gets_one_at_its_end(package: Path) -> None:
     ("file", "text", "options", "message"),
     [
         ("folder.srdf", SRDF, ["--samples", "0"], "--samples is 0; allowed: 1 or more"),
-        ("folder.srdf", '<robot name="folder"/>', ["--write"], r"folder.srdf: no </robot> at its end"),
+        ("folder.srdf", '<robot name="folder"/>', ["--write"], r"folder.srdf: the SRDF has no closing </robot> tag"),
         (
             "folder.srdf",
             '<robot name="folder" xmlns:xacro="http://www.ros.org/wiki/xacro"><!-- of two arms --></robot>',
@@ -162,4 +162,4 @@ def test_what_cannot_be_computed_is_refused_and_nothing_is_written(
 
 def test_a_package_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["no_such_moveit_config"]) == 1
-    assert "'no_such_moveit_config' is no folder and no ROS package" in capsys.readouterr().err
+    assert "'no_such_moveit_config' is neither a folder nor a ROS package" in capsys.readouterr().err

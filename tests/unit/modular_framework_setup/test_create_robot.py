@@ -309,7 +309,7 @@ def test_nothing_is_overwritten(package_path: Path, capsys: pytest.CaptureFixtur
     source = write(package_path, CRANE)
     (package_path / "crane_1_robot").mkdir()
     assert main([source, "--into", str(package_path), "--yes"]) == 1
-    assert "nothing is overwritten" in capsys.readouterr().err
+    assert "will not be overwritten" in capsys.readouterr().err
     assert list((package_path / "crane_1_robot").iterdir()) == []
 
 
@@ -317,9 +317,9 @@ def test_nothing_is_overwritten(package_path: Path, capsys: pytest.CaptureFixtur
     ("text", "options", "says"),
     [
         (CRANE, ("--arm", "base", "plam"), "link 'plam' is not in the URDF"),
-        (CRANE, ("--arm", "palm", "base"), "'base' must hang below 'palm'"),
+        (CRANE, ("--arm", "palm", "base"), "'base' must be a descendant of 'palm'"),
         (CRANE, ("--gripper", "turet"), "did you mean 'turret'?"),
-        (CRANE, ("--name", "My Robot"), "allowed: small letters"),
+        (CRANE, ("--name", "My Robot"), "allowed: lower-case letters"),
         (CRANE, ("--samples", "0"), "allowed: 1 or more"),
         (CRANE, ("speed",), "NAME:=VALUE"),
         (CRANE.replace("<box size=", '<mesh filename="a/b.stl" size='), (), "mesh files are not found: a/b.stl"),

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Why a command of this package cannot do what was asked."""
+"""Errors of the commands of this package."""
 
 from __future__ import annotations
 
 
 class SetupError(Exception):
-    """Base; the text says what was found, what is allowed and what to do."""
+    """Base class; the message contains the found value, the allowed values and the remedy."""
 
 
 class NoConfigPackageError(SetupError):
-    """What was named is no folder and no ROS package."""
+    """The given name is neither a folder nor a ROS package."""
 
 
 class CreationError(SetupError):
-    """The packages of a robot, or its collision matrix, cannot be made."""
+    """The packages or the collision matrix of a robot cannot be created."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The checks of a config package, one subject a module."""
+"""Checks of a config package, one module per subject."""

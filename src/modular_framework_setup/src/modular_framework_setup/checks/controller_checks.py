@@ -18,7 +18,7 @@ from modular_framework_setup.checks.controller_records import (
     names_moveit_controllers,
 )
 from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
-from modular_framework_setup.config_files.yaml_files import is_open, plain_text
+from modular_framework_setup.config_files.yaml_files import has_argument, plain_text
 
 KINDS = (*ACTION_KINDS, "ParallelGripperCommand")
 ACTIONS = ("follow_joint_trajectory", "gripper_cmd", "gripper_action", "joint_trajectory_action")
@@ -64,14 +64,14 @@ class ControllerChecker:
         moving = [item for item in self._hardware if item.moves]
         for controllers in self._moveit_files:
             for controller in controllers:
-                if moving and not is_open(controller.name):
+                if moving and not has_argument(controller.name):
                     self._check_hardware(controller, moving)
         self._check_groups()
 
     def _check_joints(self, owner: str, joints: Sequence[Located]) -> None:
         seen = set()
         for name, where in joints:
-            if is_open(name):
+            if has_argument(name):
                 continue
             if name not in self._tree.joints:
                 movable = [joint.name for joint in self._tree.robot.movable_joints()]
@@ -88,12 +88,12 @@ class ControllerChecker:
             owner = f"controller '{item.name}'"
             self._check_joints(owner, item.joints)
             kind, where = item.kind
-            if not is_open(kind) and kind not in kinds and not (is_fake and not kind):
+            if not has_argument(kind) and kind not in kinds and not (is_fake and not kind):
                 self._faults.add_unknown(where, f"{owner}: type", kind, kinds)
             self._check_action(item)
             for joint, location in item.joints if item.is_default else ():
                 other = claims.setdefault(joint, item)
-                if other is not item and not is_open(joint):
+                if other is not item and not has_argument(joint):
                     self._faults.add(
                         location,
                         f"{owner}: joint '{joint}' also belongs to default controller '{other.name}' "
@@ -106,7 +106,7 @@ class ControllerChecker:
         if item.action_ns is None:
             return
         action, where = item.action_ns
-        if action not in ACTIONS and not is_open(action) and closest(action, ACTIONS):
+        if action not in ACTIONS and not has_argument(action) and closest(action, ACTIONS):
             self._faults.add_unknown(where, f"controller '{item.name}': action_ns", action, ACTIONS)
 
     def _check_initial(self, top: Mapping) -> None:
@@ -118,7 +118,7 @@ class ControllerChecker:
             if not isinstance(entry, Mapping):
                 continue
             group, pose = plain_text(entry.entries.get("group")), plain_text(entry.entries.get("pose"))
-            if is_open(group) or is_open(pose):
+            if has_argument(group) or has_argument(pose):
                 continue
             if group not in self._semantics.groups:
                 self._faults.add_unknown(entry.location, "initial: group", group, self._semantics.groups)
@@ -157,7 +157,9 @@ class ControllerChecker:
 
     def _check_same_joints(self, controller: MoveItController, hardware: HardwareController) -> None:
         moveit_joints, hardware_joints = ({name for name, _ in item.joints} for item in (controller, hardware))
-        if any(map(is_open, moveit_joints)) or (controller.kind[0] != TRAJECTORY and hardware_joints <= moveit_joints):
+        if any(map(has_argument, moveit_joints)) or (
+            controller.kind[0] != TRAJECTORY and hardware_joints <= moveit_joints
+        ):
             return  # a gripper is commanded by one of its joints
         only = (
             [f"only here: {', '.join(sorted(moveit_joints - hardware_joints))}"]

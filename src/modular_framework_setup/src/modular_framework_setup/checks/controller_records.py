@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Sequence, kind_of
-from modular_framework_setup.config_files.yaml_files import is_open, mappings, plain_text, read_truth, texts
+from modular_framework_setup.config_files.yaml_files import has_argument, mappings, plain_text, read_truth, texts
 
 Located = tuple[str, SourceLocation]
 SIMPLE = "moveit_simple_controller_manager"
@@ -148,4 +148,4 @@ def _joints(entry: Mapping | None) -> tuple[Located, ...]:
     if entry is None:
         return ()
     joints = texts(entry.entries.get("joints")) + texts(entry.entries.get("joint"))
-    return tuple((name, where) for name, where in joints if not is_open(name))
+    return tuple((name, where) for name, where in joints if not has_argument(name))

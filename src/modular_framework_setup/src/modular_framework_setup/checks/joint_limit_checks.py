@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, kind_of
-from modular_framework_setup.config_files.robot_tree import END_M, RobotTree
-from modular_framework_setup.config_files.yaml_files import is_open, read_number, read_truth
+from modular_framework_setup.config_files.robot_tree import LIMIT_TOLERANCE, RobotTree
+from modular_framework_setup.config_files.yaml_files import has_argument, read_number, read_truth
 from modular_framework_urdf.robot import Joint
 
 # flag: required keys
@@ -50,7 +50,7 @@ def check_joint_limits(top: Mapping, tree: RobotTree, faults: FaultList) -> None
     movable = [joint.name for joint in tree.robot.joints if joint.kind != "fixed"]
     for name, node in limits.entries.items():
         where = limits.keys[name]
-        if is_open(name):
+        if has_argument(name):
             continue
         if name not in tree.joints:
             faults.add_unknown(where, "joint_limits: joint", name, movable)
@@ -109,9 +109,9 @@ class _JointChecker:
             self._faults.add(where, f"{wider} {limit.velocity:g}; {rule}; allowed: at most {limit.velocity:g}")
         if self._joint.kind not in ("revolute", "prismatic"):
             return
-        if key == "min_position" and value < limit.lower - END_M:
+        if key == "min_position" and value < limit.lower - LIMIT_TOLERANCE:
             self._faults.add(where, f"{wider} {limit.lower:g}; {rule}; allowed: at least {limit.lower:g}")
-        if key == "max_position" and value > limit.upper + END_M:
+        if key == "max_position" and value > limit.upper + LIMIT_TOLERANCE:
             self._faults.add(where, f"{wider} {limit.upper:g}; {rule}; allowed: at most {limit.upper:g}")
         is_outside = (key == "min_position" and value > limit.upper) or (key == "max_position" and value < limit.lower)
         if is_outside:

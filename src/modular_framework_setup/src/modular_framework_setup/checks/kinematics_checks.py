@@ -7,7 +7,13 @@ from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, kind_of
 from modular_framework_planning.kinematics.kinematics_settings import KEYS, NUMERIC, PLUGINS, is_known_solver
 from modular_framework_setup.config_files.robot_tree import Semantics
-from modular_framework_setup.config_files.yaml_files import is_open, parameters_of, plain_text, read_number, read_truth
+from modular_framework_setup.config_files.yaml_files import (
+    has_argument,
+    parameters_of,
+    plain_text,
+    read_number,
+    read_truth,
+)
 
 NUMBERS = ("kinematics_solver_search_resolution", "kinematics_solver_timeout", "kinematics_solver_attempts")
 
@@ -24,7 +30,7 @@ def check_kinematics(top: Mapping, semantics: Semantics, faults: FaultList) -> N
     nested = top.entries.get("robot_description_kinematics")
     for group, node in (nested if isinstance(nested, Mapping) else top).entries.items():
         where = (nested if isinstance(nested, Mapping) else top).keys[group]
-        if is_open(group):
+        if has_argument(group):
             continue
         if group not in semantics.groups:
             faults.add_unknown(where, "group", group, semantics.groups)
@@ -51,5 +57,5 @@ def _check_group(group: str, entry: Mapping, faults: FaultList) -> None:
 
 def _check_solver(group: str, entry: Mapping, faults: FaultList) -> None:
     solver, where = plain_text(entry.entries["kinematics_solver"]), entry.keys["kinematics_solver"]
-    if not (is_known_solver(solver) or is_open(solver)):
+    if not (is_known_solver(solver) or has_argument(solver)):
         faults.add_unknown(where, f"group '{group}': kinematics_solver", solver, (NUMERIC, *PLUGINS))

@@ -26,7 +26,7 @@ from modular_framework_setup.config_files.config_package import (
 )
 from modular_framework_setup.config_files.description_files import XmlDocument, package_document, parse_document
 from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
-from modular_framework_setup.config_files.yaml_files import is_open, load_yaml
+from modular_framework_setup.config_files.yaml_files import has_argument, load_yaml
 from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.srdf_reader import SemanticDescription, read_srdf
 from modular_framework_urdf.xml_text import XmlError
@@ -130,6 +130,6 @@ def _check_file(
 def _check_initial_positions(top: Mapping, tree: RobotTree, faults: FaultList) -> None:
     positions = top.entries.get("initial_positions")
     for name in positions if isinstance(positions, Mapping) else ():
-        if isinstance(positions, Mapping) and name not in tree.joints and not is_open(name):
+        if isinstance(positions, Mapping) and name not in tree.joints and not has_argument(name):
             movable = [joint.name for joint in tree.robot.movable_joints()]
             faults.add_unknown(positions.keys[name], "initial_positions: joint", name, movable)

@@ -8,7 +8,7 @@ import re
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node
 from modular_framework_setup.config_files.robot_tree import RobotTree, Semantics
-from modular_framework_setup.config_files.yaml_files import is_open, mappings, parameters_of, plain_text, texts
+from modular_framework_setup.config_files.yaml_files import has_argument, mappings, parameters_of, plain_text, texts
 
 GROUP_KEYS = ("default_planner_config", "planner_configs", "projection_evaluator", "longest_valid_segment_fraction")
 PLANNER_TYPES = tuple(
@@ -47,7 +47,7 @@ class _Planners:
     def check(self) -> None:
         for name, where, entry in mappings(self._top.entries.get("planner_configs")):
             kind = plain_text(entry.entries.get("type"))
-            if kind and not is_open(kind) and kind not in PLANNER_TYPES:
+            if kind and not has_argument(kind) and kind not in PLANNER_TYPES:
                 location = entry.keys.get("type", where)
                 self._faults.add_unknown(location, f"planner configuration '{name}': type", kind, PLANNER_TYPES)
         for name, where, entry in mappings(self._top):
@@ -56,7 +56,7 @@ class _Planners:
         self._check_stomp(self._top.entries.get("stomp"))
 
     def _check_group(self, name: str, where: SourceLocation, entry: Mapping) -> None:
-        if is_open(name):
+        if has_argument(name):
             return
         if name not in self._semantics.groups:
             self._faults.add_unknown(where, "group", name, self._semantics.groups)
@@ -70,7 +70,7 @@ class _Planners:
 
     def _check_projection(self, group: str, text: str, where: SourceLocation) -> None:
         match = _PROJECTION.fullmatch(text.strip())
-        if is_open(text):
+        if has_argument(text):
             return
         if match is None:
             allowed = "allowed: joints(NAME,NAME) or link(NAME)"
@@ -92,5 +92,5 @@ class _Planners:
         """Checks the groups of MoveIt 1's stomp_planning.yaml."""
         for _, _, entry in mappings(node):
             for group, where in texts(entry.entries.get("group_name")):
-                if group not in self._semantics.groups and not is_open(group):
+                if group not in self._semantics.groups and not has_argument(group):
                     self._faults.add_unknown(where, "group_name: group", group, self._semantics.groups)

@@ -8,7 +8,7 @@ import re
 from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, Scalar, Sequence, kind_of
 from modular_framework_planning.perception.sensor_settings import read_sensors
-from modular_framework_setup.config_files.yaml_files import is_open, parameters_of
+from modular_framework_setup.config_files.yaml_files import has_argument, parameters_of
 
 _INDEX_PREFIX = re.compile(r"sensors\[\d+\]: ")
 
@@ -28,7 +28,7 @@ def check_sensors(top: Mapping, faults: FaultList) -> None:
                 faults.add_unknown(item.location, "sensors: sensor", item.value, [k for k in top if k != "sensors"])
                 continue
             entry = top.entries[item.value]
-        if isinstance(entry, Mapping) and any(isinstance(v, str) and is_open(v) for v in entry.plain().values()):
+        if isinstance(entry, Mapping) and any(isinstance(v, str) and has_argument(v) for v in entry.plain().values()):
             continue
         for text in read_sensors([entry.plain()], None)[1]:
             faults.add(entry.location, f"sensor: {_INDEX_PREFIX.sub('', text)}; correct it")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_setup.checks.group_checks import GroupChecker
-from modular_framework_setup.config_files.robot_tree import END_M, PlanningGroup, RobotTree, Semantics
+from modular_framework_setup.config_files.robot_tree import LIMIT_TOLERANCE, PlanningGroup, RobotTree, Semantics
 from modular_framework_urdf.srdf_reader import VARIABLES
 from modular_framework_urdf.xml_text import Element
 
@@ -135,7 +135,7 @@ class _SrdfChecker:
         if joint is None or joint.limit is None or joint.kind not in ("revolute", "prismatic"):
             return
         lower, upper = joint.limit.lower, joint.limit.upper
-        if not lower - END_M <= values[0] <= upper + END_M:
+        if not lower - LIMIT_TOLERANCE <= values[0] <= upper + LIMIT_TOLERANCE:
             self._faults.add(
                 self._location(item),
                 f"{owner}: '{name}' is at {values[0]:g}; allowed by the URDF: {lower:g} to {upper:g}; correct it",

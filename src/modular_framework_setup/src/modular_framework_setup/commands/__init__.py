@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The commands of this package."""
+"""Command-line programs of this package."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says what is inconsistent in a config package, of MoveIt 1 or MoveIt 2, before anything starts.
+"""Reports all faults of a MoveIt 1 or MoveIt 2 config package before anything starts.
 
-It reads URDF, SRDF, joint limits, kinematics, controllers, planning pipelines, sensors and launch files.
+Checks URDF, SRDF, joint limits, kinematics, controllers, planning pipelines, sensors and launch files.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from modular_framework_setup.page.robot_page import page_text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Checks a config package and prints its faults; returns 0 when it has none, else 1."""
+    """Checks a config package, prints its faults and returns 1 if there are any, else 0."""
     return Command("check_config", __doc__, _add_arguments, _check).run(arguments)
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("package", help="a ROS package, or a folder; it need not be built")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="also write a page that shows the robot")
+    parser.add_argument("package", help="ROS package or folder, which need not be built")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page about the robot")
 
 
 def _check(given: argparse.Namespace) -> int:
@@ -38,7 +38,7 @@ def _check(given: argparse.Namespace) -> int:
         try:
             given.html.write_text(page_text(checked), encoding="utf-8")
         except OSError as error:
-            raise SetupError(f"--html: {error}; name a file that can be written") from error
+            raise SetupError(f"--html: {error}; name a writable file") from error
     count = f"{len(faults)} fault{'' if len(faults) == 1 else 's'}" if faults else "no fault"
     print(f"check_config: {folder}: {count}", file=sys.stderr)
     return 1 if faults else 0

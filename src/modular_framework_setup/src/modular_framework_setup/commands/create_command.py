@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the packages of a robot from its URDF: ROBOT_robot and ROBOT_moveit_config.
+"""Creates the packages of a robot from its URDF: ROBOT_robot and ROBOT_moveit_config.
 
-The first has description and controllers, the second the configuration for planning. On a terminal it shows what it
-found and asks; otherwise options decide.
+The first contains the description and controllers, the second the planning configuration. On a terminal, the command
+asks the user to confirm the parts it found; otherwise the options decide.
 """
 
 from __future__ import annotations
@@ -30,40 +30,40 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Makes the packages of a robot; returns 0, or 1 when it could not."""
+    """Creates the packages of a robot and returns the exit code."""
     return Command("create_robot", __doc__, _add_arguments, _create).run(arguments)
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("urdf", type=Path, help="URDF or xacro file")
     parser.add_argument("arguments", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro file")
-    parser.add_argument("--name", help="of the robot, in the packages' names; default: the URDF's")
-    parser.add_argument("--into", type=Path, default=Path(), help="folder that gets the packages; default: this one")
+    parser.add_argument("--name", help="robot name for the package names; default: the name in the URDF")
+    parser.add_argument("--into", type=Path, default=Path(), help="parent folder of the packages; default: this folder")
     parser.add_argument(
         "--arm",
         nargs=2,
         action="append",
         default=[],
         metavar=("BASE", "TIP"),
-        help="links; once an arm; default: found",
+        help="links of an arm; repeat for each arm; default: found in the URDF",
     )
     parser.add_argument(
         "--gripper", nargs="+", action="append", default=[], metavar="LINK",
-        help="links of the fingers; once a gripper; default: found by mimic joints and pairs of equal joints",
+        help="links of the fingers; repeat for each gripper; default: found by mimic joints and pairs of equal joints",
     )  # fmt: skip
     add_sampling_arguments(parser)
     parser.add_argument("--author", default="maintainer", help="maintainer in package.xml")
     parser.add_argument("--email", default="maintainer@example.com", help="maintainer's address in package.xml")
-    parser.add_argument("--yes", action="store_true", help="ask nothing: take what is found")
+    parser.add_argument("--yes", action="store_true", help="do not ask; confirm the parts found")
 
 
 def _create(given: argparse.Namespace) -> int:
     if not given.urdf.is_file():
-        raise CreationError(f"{given.urdf} is no file; give the path of a URDF or xacro file")
+        raise CreationError(f"{given.urdf} is not a file; give the path of a URDF or xacro file")
     check_sampling(given)
-    is_asking = not given.yes and sys.stdin.isatty()
+    interactive = not given.yes and sys.stdin.isatty()
     choices = Choices(
-        _name(given, is_asking), [tuple(chain) for chain in given.arm], given.gripper, given.samples, given.seed,
+        _name(given, interactive), [tuple(chain) for chain in given.arm], given.gripper, given.samples, given.seed,
         given.author, given.email,
     )  # fmt: skip
     refuse_existing(given.into, (choices.robot_package, choices.config_package))
@@ -71,7 +71,7 @@ def _create(given: argparse.Namespace) -> int:
     bar = ProgressBar("self collisions", sys.stderr)
 
     def confirm(tree: RobotTree, parts: RobotParts) -> RobotParts:
-        return confirm_parts(tree, parts, choices) if is_asking else parts
+        return confirm_parts(tree, parts, choices) if interactive else parts
 
     plan = make_plan(source, choices, confirm, bar.show)
     folders = write_packages(plan, given.into)
@@ -84,23 +84,23 @@ def _create(given: argparse.Namespace) -> int:
 
 def _mappings(arguments: Sequence[str]) -> dict[str, str]:
     pairs = [argument.partition(":=") for argument in arguments]
-    wrong = [name for name, sign, _ in pairs if not sign]
-    if wrong:
-        raise CreationError(f"got '{wrong[0]}'; arguments of the xacro file are written NAME:=VALUE")
+    invalid = [name for name, sign, _ in pairs if not sign]
+    if invalid:
+        raise CreationError(f"got '{invalid[0]}'; write arguments of the xacro file as NAME:=VALUE")
     return {name: value for name, _, value in pairs}
 
 
-def _name(given: argparse.Namespace, is_asking: bool) -> str:
-    found = given.name or _name_in(given.urdf)
-    if not given.name and is_asking:
-        found = ask_name(found)
-    if not _NAME.fullmatch(found):
-        raise CreationError(f"--name is '{found}'; allowed: small letters, digits and '_', a letter first")
-    return str(found)
+def _name(given: argparse.Namespace, interactive: bool) -> str:
+    name = given.name or _name_in(given.urdf)
+    if not given.name and interactive:
+        name = ask_name(name)
+    if not _NAME.fullmatch(name):
+        raise CreationError(f"--name is '{name}'; allowed: lower-case letters, digits and '_', a letter first")
+    return str(name)
 
 
 def _name_in(path: Path) -> str:
-    """Returns the name the URDF gives the robot, as a package may be called."""
+    """Returns the robot name in the URDF, converted to a valid package name."""
     try:
         name = xml_text.read(path).get("name", "")
     except (OSError, xml_text.XmlError):
@@ -117,11 +117,11 @@ def _report(plan: RobotPlan, folders: Sequence[Path]) -> None:
         print(f"{arm.name}: {arm.base} -> {arm.tip}, joints {', '.join(arm.joints)}{hand}")
     for gripper in plan.parts.grippers:
         print(f"{gripper.name}: on {gripper.palm}, driven by {gripper.driver}, fingers {', '.join(gripper.links)}")
-    off = sum(bool(verdict.reason) for verdict in plan.verdicts)
-    print(f"self collisions: {off} of {len(plan.verdicts)} pairs of links need no check")
+    disabled = sum(bool(verdict.reason) for verdict in plan.verdicts)
+    print(f"self collisions: {disabled} of {len(plan.verdicts)} pairs of links need no check")
     for note in plan.notes:
         print(f"note: {note}")
-    print(f"made {folders[0]} and {folders[1]}; start with")
+    print(f"created {folders[0]} and {folders[1]}; start with")
     folder = folders[0].resolve().parent
     paths = [Path(path).resolve() for path in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if path]
     if not any(folder.is_relative_to(path) for path in paths):

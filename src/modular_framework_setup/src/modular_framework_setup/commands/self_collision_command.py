@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Computes which pairs of links of a robot need no collision check, for the SRDF of a config package.
+"""Computes the pairs of links without collision check for the SRDF of a MoveIt 1 or MoveIt 2 config package.
 
-The reasons are those of the MoveIt Setup Assistant, found on the exact shapes. The package may be of MoveIt 1 or
-MoveIt 2.
+Uses the exact shapes and the reasons of the MoveIt Setup Assistant.
 """
 
 from __future__ import annotations
@@ -37,9 +36,9 @@ class LoadedRobot:
     """The robot of a config package.
 
     Attributes:
-        model: of URDF and SRDF.
-        srdf: file of the SRDF.
-        srdf_text: with xacro expanded.
+        model: Robot model of URDF and SRDF.
+        srdf: Path of the SRDF.
+        srdf_text: SRDF text with xacro expanded.
     """
 
     model: RobotModel
@@ -48,12 +47,12 @@ class LoadedRobot:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Computes the collision matrix of a config package, and prints or writes it; returns 0, or 1 when it could not."""
+    """Computes the collision matrix of a config package, prints or writes it, and returns the exit code."""
     return Command("compute_self_collisions", __doc__, _add_arguments, _compute).run(arguments)
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("package", help="a ROS package, or a folder; it need not be built")
+    parser.add_argument("package", help="ROS package or folder, which need not be built")
     add_sampling_arguments(parser)
     parser.add_argument("--write", action="store_true", help="replace the matrix in the SRDF; default: print it")
 
@@ -63,18 +62,18 @@ def _compute(given: argparse.Namespace) -> int:
     folder = folder_of(given.package)
     with packages_beside(folder):
         robot = _load(folder)
-    made = f"{given.samples} random states, seed {given.seed}, exact meshes"
+    origin = f"{given.samples} random states, seed {given.seed}, exact meshes"
     if given.write:
-        _changed(robot, {}, made)  # refuses a file that cannot take a matrix before the work
+        _updated_srdf(robot, {}, origin)  # raises before the computation if the file cannot be changed
     bar = ProgressBar("self collisions", sys.stderr)
     verdicts = find_verdicts(robot.model, hands_of(robot.model), given.samples, given.seed, bar.show)
     disabled = {verdict.pair: verdict.reason for verdict in verdicts if verdict.reason}
     for pair, reason in robot.model.semantics.disabled_pairs.items():
-        one, other = sorted(pair) if len(pair) == 2 else 2 * tuple(pair)
+        first, second = sorted(pair) if len(pair) == 2 else 2 * tuple(pair)
         if reason not in REASONS:
-            disabled.setdefault((one, other), reason)
+            disabled.setdefault((first, second), reason)
     if given.write:
-        robot.srdf.write_text(_changed(robot, disabled, made), encoding="utf-8")
+        robot.srdf.write_text(_updated_srdf(robot, disabled, origin), encoding="utf-8")
     else:
         print(matrix_text(disabled), end="")
         _print_checked([verdict for verdict in verdicts if verdict.pair not in disabled])
@@ -86,7 +85,7 @@ def _load(folder: Path) -> LoadedRobot:
     """Reads the robot of a config package.
 
     Raises:
-        CreationError: a file is missing or cannot be used.
+        CreationError: A file is missing or invalid.
     """
     faults = FaultList()
     package = read_config_package(folder, faults)
@@ -100,16 +99,16 @@ def _load(folder: Path) -> LoadedRobot:
     return LoadedRobot(model, package.srdf, srdf.text)
 
 
-def _changed(robot: LoadedRobot, disabled: dict[tuple[str, str], str], made: str) -> str:
-    """Returns the text of the SRDF with another matrix."""
+def _updated_srdf(robot: LoadedRobot, disabled: dict[tuple[str, str], str], origin: str) -> str:
+    """Returns the SRDF text with a new matrix."""
     if robot.srdf.read_text(encoding="utf-8") != robot.srdf_text:
-        raise CreationError(f"--write: {robot.srdf} is a xacro file; print the matrix, and put it where it belongs")
+        raise CreationError(f"--write: {robot.srdf} is a xacro file; print the matrix and insert it yourself")
     try:
-        return with_matrix(robot.srdf_text, disabled, made)
+        return with_matrix(robot.srdf_text, disabled, origin)
     except MatrixError as error:
         raise CreationError(f"--write: {robot.srdf}: {error}") from error
 
 
 def _print_checked(verdicts: Sequence[PairVerdict]) -> None:
     for verdict in verdicts:
-        print(f"  <!-- checked: {verdict.pair[0]} {verdict.pair[1]} ({verdict.share:.2%}) -->")
+        print(f"  <!-- checked: {verdict.pair[0]} {verdict.pair[1]} ({verdict.collision_fraction:.2%}) -->")

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The files of a config package, read with their lines."""
+"""Reads the files of a config package with line numbers."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the files of a config package in the layout of the MoveIt Setup Assistant, of MoveIt 1 or MoveIt 2."""
+"""Finds the files of a MoveIt 1 or MoveIt 2 config package in the layout of the MoveIt Setup Assistant."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class ConfigPackage:
     """A config package.
 
     Attributes:
-        folder: where it is.
-        name: of the ROS package; that of the folder where there is no package.xml.
-        urdf: file of the robot description, which may be xacro; None when none was found.
-        srdf: file of the semantic description, which may be xacro; None when none was found.
-        xacro_arguments: of the robot description, from `.setup_assistant`.
-        urdf_package: folder of the package that has the robot description; None for this one.
+        folder: Folder of the package.
+        name: Name of the ROS package, or of the folder if there is no package.xml.
+        urdf: URDF or xacro file of the robot; None if not found.
+        srdf: SRDF or xacro file of the semantics; None if not found.
+        xacro_arguments: Xacro arguments of the URDF, from `.setup_assistant`.
+        urdf_package: Folder of the package with the URDF; None for this package.
     """
 
     folder: Path
@@ -45,32 +45,32 @@ class ConfigPackage:
     urdf_package: Path | None = None
 
     def yaml_files(self) -> list[Path]:
-        """Returns the YAML files of its folder config, and the controllers of the robot's own package."""
+        """Returns the YAML files in the folder config and the controller files of the robot's package."""
         files = _yaml_files(self.folder / "config")
         if self.urdf_package is not None:
             files += _yaml_files(self.urdf_package / "controllers")
         return files
 
     def launch_files(self) -> list[Path]:
-        """Returns its launch files of ROS 1, those that load the robot first."""
+        """Returns the ROS 1 launch files; files that load the robot come first."""
         return launch_files(self.folder)
 
     def launch_arguments(self) -> dict[str, str]:
-        """Returns the defaults of the launch files' arguments, as far as they are plain text."""
-        found: dict[str, str] = {}
+        """Returns the plain-text defaults of the launch files' arguments."""
+        defaults: dict[str, str] = {}
         for item in (argument for root in self._launch_roots() for argument in root.iter("arg")):
             value = item.get("default") or item.get("value") or ""
             if value and "$(" not in value:
-                found.setdefault(item.get("name", ""), value)
-        return found
+                defaults.setdefault(item.get("name", ""), value)
+        return defaults
 
     def launch_mappings(self, file_name: str) -> dict[str, str]:
-        """Returns the xacro arguments that the launch files give a description, those whose values are known here."""
+        """Returns the xacro arguments with known values that the launch files pass to a description file."""
         return xacro_arguments(self._launch_roots(), file_name, self.launch_arguments())
 
     def _launch_roots(self) -> Iterator[xml_text.Element]:
         for path in self.launch_files():
-            with suppress(OSError, xml_text.XmlError):  # the check of launch files says so
+            with suppress(OSError, xml_text.XmlError):  # reported by the check of launch files
                 yield xml_text.read(path)
 
 
@@ -82,10 +82,10 @@ def folder_of(name: str) -> Path:
     """Returns the folder of a config package.
 
     Args:
-        name: a folder, or a ROS package on ROS_PACKAGE_PATH.
+        name: Folder, or ROS package on ROS_PACKAGE_PATH.
 
     Raises:
-        NoConfigPackageError: it is neither.
+        NoConfigPackageError: The name is neither a folder nor a ROS package.
     """
     if Path(name).is_dir():
         return Path(name)
@@ -95,38 +95,38 @@ def folder_of(name: str) -> Path:
     except rospkg.ResourceNotFound as error:
         known = [item for item in packages.list() if item.endswith("_config")]
         raise NoConfigPackageError(
-            f"'{name}' is no folder and no ROS package; allowed: a folder, or a package on ROS_PACKAGE_PATH (config "
-            f"packages there: {', '.join(known) or 'none'}){nearest(name, packages.list())}; "
-            "correct the name, or source the setup.bash of the workspace that has it"
+            f"'{name}' is neither a folder nor a ROS package; allowed: a folder, or a package on ROS_PACKAGE_PATH "
+            f"(config packages there: {', '.join(known) or 'none'}){nearest(name, packages.list())}; "
+            "correct the name, or source the setup.bash of the package's workspace"
         ) from error
 
 
 @contextmanager
 def packages_beside(folder: Path) -> Iterator[None]:
-    """Also finds the package around a folder and those beside it, for as long as the context lasts.
+    """Context manager that adds the package of a folder and its sibling packages to ROS_PACKAGE_PATH.
 
-    They need not be built. The packages beside it lie in the same folder, or in a folder of that one.
+    The packages need not be built. Siblings are in the package's parent folder or one level below it.
     """
-    own = next((place for place in (folder, *folder.parents) if (place / "package.xml").is_file()), folder).resolve()
-    before = os.environ.get("ROS_PACKAGE_PATH")
+    own = next((parent for parent in (folder, *folder.parents) if (parent / "package.xml").is_file()), folder).resolve()
+    old_path = os.environ.get("ROS_PACKAGE_PATH")
     known = {Path(path).resolve() for path in _package_paths()}
     if own in known:
         yield
         return
-    found = [own, *(file.parent for depth in ("*", "*/*") for file in own.parent.glob(f"{depth}/package.xml"))]
-    os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join([*map(str, found), *([before] if before else [])])
+    added = [own, *(file.parent for depth in ("*", "*/*") for file in own.parent.glob(f"{depth}/package.xml"))]
+    os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join([*map(str, added), *([old_path] if old_path else [])])
     try:
         yield
     finally:
-        if before is None:
+        if old_path is None:
             del os.environ["ROS_PACKAGE_PATH"]
         else:
-            os.environ["ROS_PACKAGE_PATH"] = before
+            os.environ["ROS_PACKAGE_PATH"] = old_path
 
 
 @functools.cache
 def _packages_on(paths: tuple[str, ...]) -> rospkg.RosPack:
-    """Returns the packages on search paths; cached, because each RosPack walks through all folders once."""
+    """Returns the packages on search paths; cached, because each RosPack crawls all folders."""
     return rospkg.RosPack(list(paths))
 
 
@@ -140,7 +140,11 @@ def _package_paths() -> list[str]:
 
 
 def find_package(name: str) -> str:
-    """Returns the folder of a ROS package; raises KeyError naming the nearest one when it is not there."""
+    """Returns the folder of a ROS package.
+
+    Raises:
+        KeyError: The package is not found; the message names the closest package.
+    """
     packages = _packages()
     try:
         return str(packages.get_path(name))
@@ -150,7 +154,7 @@ def find_package(name: str) -> str:
 
 
 def package_name(folder: Path) -> str:
-    """Returns the name in a folder's package.xml, else the folder's."""
+    """Returns the name in a folder's package.xml, or the folder name."""
     try:
         name = xml_text.read(folder / "package.xml").findtext("name")
     except (OSError, xml_text.XmlError):
@@ -159,11 +163,11 @@ def package_name(folder: Path) -> str:
 
 
 def read_config_package(folder: Path, faults: FaultList) -> ConfigPackage:
-    """Finds the files of a config package; notes what is missing.
+    """Finds the files of a config package. Missing files add faults.
 
-    The robot description is config/ROBOT.urdf.xacro where there is one, ROBOT being the package's name without
-    `_moveit_config`; else the one `.setup_assistant` names; else the only one in the folder config. The semantic
-    description is the one `.setup_assistant` names, else the only one in the folder config.
+    The URDF is config/ROBOT.urdf.xacro, with ROBOT the package name without `_moveit_config`, or else the file named in
+    `.setup_assistant`, or else the only URDF in the folder config. The SRDF is the file named in `.setup_assistant`, or
+    else the only SRDF in the folder config.
     """
     name = package_name(folder)
     settings = _Settings(folder, faults)
@@ -179,19 +183,19 @@ def read_config_package(folder: Path, faults: FaultList) -> ConfigPackage:
 
 
 def _only(folder: Path, patterns: tuple[str, ...], what: str, faults: FaultList) -> Path | None:
-    found = sorted(path for pattern in patterns for path in (folder / "config").glob(pattern))
-    if len(found) == 1:
-        return found[0]
+    files = sorted(path for pattern in patterns for path in (folder / "config").glob(pattern))
+    if len(files) == 1:
+        return files[0]
     faults.add(
         SourceLocation(str(folder / "config"), 1, 1),
-        f"{len(found)} files may be the {what} ({', '.join(path.name for path in found) or 'none is there'}); needed "
-        f"is one {' or '.join(patterns)}; name it in {SETTINGS}",
+        f"{len(files)} files may be the {what} ({', '.join(path.name for path in files) or 'none is there'}); exactly "
+        f"one {' or '.join(patterns)} is required; name it in {SETTINGS}",
     )
     return None
 
 
 class _Settings:
-    """The file `.setup_assistant`, which may be missing."""
+    """Content of the optional file `.setup_assistant`."""
 
     def __init__(self, folder: Path, faults: FaultList) -> None:
         self._folder, self._path, self._faults = folder, folder / SETTINGS, faults
@@ -216,12 +220,12 @@ class _Settings:
         return self._entry("SRDF", "relative_path") is not None
 
     def xacro_arguments(self, values: Mapping[str, str]) -> dict[str, str]:
-        """Returns the arguments, with `$(arg NAME)` as the launch files' arguments are by default."""
-        given = self._entry("URDF", "xacro_args")
-        return known_arguments(command_words(str(given.value), values)) if given else {}
+        """Returns the xacro arguments, with `$(arg NAME)` replaced by the given values."""
+        entry = self._entry("URDF", "xacro_args")
+        return known_arguments(command_words(str(entry.value), values)) if entry else {}
 
     def urdf(self) -> tuple[Path | None, Path | None]:
-        """Returns the robot description, and the folder of its package when that is another one."""
+        """Returns the URDF file, and the folder of its package if that is not this package."""
         path, package = self._entry("URDF", "relative_path"), self._entry("URDF", "package")
         if path is None:
             return None, None
@@ -246,6 +250,6 @@ class _Settings:
         path = folder / str(relative.value)
         if path.is_file():
             return path
-        there = [str(item.relative_to(folder)) for item in path.parent.glob("*") if item.is_file()]
-        self._faults.add_unknown(relative.location, f"in {folder} the file", str(relative.value), there)
+        files = [str(item.relative_to(folder)) for item in path.parent.glob("*") if item.is_file()]
+        self._faults.add_unknown(relative.location, f"in {folder} the file", str(relative.value), files)
         return None

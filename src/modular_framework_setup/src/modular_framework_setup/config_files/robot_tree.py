@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The kinematic tree of a robot description that may be faulty, and the planning groups on it."""
+"""The kinematic tree of a possibly faulty URDF, and its planning groups."""
 
 from __future__ import annotations
 
@@ -9,15 +9,21 @@ from dataclasses import dataclass, field
 from modular_framework_core.files.faults import SourceLocation
 from modular_framework_urdf.robot import Joint, Link, Robot
 
-END_M = 1.0e-4
-"""A position this little beyond a limit counts as the limit, as at run time [rad or m]."""
+LIMIT_TOLERANCE = 1.0e-4
+"""Tolerance of position limits, the same as at run time [rad or m]."""
 
 
 class RobotTree:
-    """Links and joints by name; a name that occurs twice means the first one.
+    """Links and joints of a URDF by name. A duplicate name refers to the first element.
+
+    Args:
+        robot: Content of the URDF.
+        file: Name of the URDF in messages.
 
     Attributes:
-        file: what to call the description in messages.
+        links: Links by name.
+        joints: Joints by name.
+        parent_joint: Parent joint of each link.
     """
 
     def __init__(self, robot: Robot, file: str = "robot_description") -> None:
@@ -33,11 +39,11 @@ class RobotTree:
 
     @property
     def roots(self) -> list[str]:
-        """Links that no joint carries."""
+        """Links without a parent joint."""
         return self.robot.root_links()
 
     def up(self, link: str) -> Iterator[Joint]:
-        """Yields the joints from a link to the root; a loop ends it."""
+        """Yields the joints from a link up to the root, or to the end of a cycle."""
         seen = set()
         while (joint := self.parent_joint.get(link)) is not None and link not in seen:
             seen.add(link)
@@ -45,35 +51,36 @@ class RobotTree:
             link = joint.parent
 
     def chain(self, base: str, tip: str) -> tuple[Joint, ...] | None:
-        """Returns the joints from base to tip, fixed ones too; None when the tip does not hang below the base."""
-        found: list[Joint] = []
+        """Returns all joints from base to tip, or None if the tip is not a descendant of the base."""
+        joints: list[Joint] = []
         if base == tip:
             return ()
         for joint in self.up(tip):
-            found.append(joint)
+            joints.append(joint)
             if joint.parent == base:
-                return tuple(reversed(found))
+                return tuple(reversed(joints))
         return None
 
     def children(self, link: str) -> list[Joint]:
-        """Returns the joints that hang on a link, in the order of the file."""
+        """Returns the child joints of a link, in file order."""
         return [joint for joint in self.robot.joints if joint.parent == link]
 
     def location(self, line: int) -> SourceLocation:
-        """Returns the location of a line of the description."""
+        """Returns the location of a line in the URDF."""
         return SourceLocation(self.file, line, 1)
 
 
 @dataclass(frozen=True, slots=True)
 class PlanningGroup:
-    """A group of the SRDF with everything its members stand for.
+    """A planning group with its resolved members.
 
     Attributes:
-        joints: all of them, fixed ones too.
-        links: links above or below those joints, and those it names.
-        active: joints a planner moves: no fixed, mimic or passive ones.
-        location: of the group in the SRDF.
-        is_whole: whether the robot has everything the group names.
+        name: Name of the group.
+        joints: All joints, including fixed joints.
+        links: Links of the group, and parent and child links of its joints.
+        active: Joints that a planner moves, without fixed, mimic and passive joints.
+        location: Location of the group in the SRDF.
+        is_whole: Whether all members exist in the URDF.
     """
 
     name: str
@@ -86,12 +93,12 @@ class PlanningGroup:
 
 @dataclass(frozen=True, slots=True)
 class Semantics:
-    """What the checks of other files need of the SRDF.
+    """Names in the SRDF that other files refer to.
 
     Attributes:
-        groups: planning groups by name.
-        states: {group: names of its states}.
-        virtual_joints: names of the joints that connect the robot to the world.
+        groups: Planning groups by name.
+        states: Names of the named states by group.
+        virtual_joints: Names of the virtual joints.
     """
 
     groups: Mapping[str, PlanningGroup] = field(default_factory=dict)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the two packages of a robot from its URDF."""
+"""Creates the two packages of a robot from its URDF."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the links of a gripper's fingers are, as points on their shapes."""
+"""Computes points on the shapes of a gripper's fingers."""
 
 from __future__ import annotations
 
@@ -14,42 +14,67 @@ from modular_framework_setup.creation.robot_parts import Gripper
 
 
 def with_gripper(model: RobotModel, state: Array, gripper: Gripper, position: float) -> Array:
-    """Returns a state with a gripper at a position of its driver."""
+    """Returns joint positions with a gripper moved.
+
+    Args:
+        model: Robot model.
+        state: Joint positions, shape (joints,) [rad or m].
+        gripper: Gripper to move.
+        position: Position of the gripper's driven joint [rad or m].
+    """
     result = np.array(state, dtype=float)
     result[model.joint_index(gripper.driver)] = position
     return model.with_mimics(result)
 
 
 def finger_of(model: RobotModel, gripper: Gripper, link: str) -> str:
-    """Returns the link of the same finger that hangs on the palm."""
-    above = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
-    while above.get(link, gripper.palm) != gripper.palm:
-        link = above[link]
+    """Returns the first link of the finger that contains a link.
+
+    Args:
+        model: Robot model.
+        gripper: Gripper of the finger.
+        link: Link of the finger.
+    """
+    parents = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
+    while parents.get(link, gripper.palm) != gripper.palm:
+        link = parents[link]
     return link
 
 
 def link_points(model: RobotModel, gripper: Gripper, position: float) -> Mapping[str, Array]:
-    """Returns points on the shapes of each link of the fingers in the palm's frame, shape (n, 3) [m]."""
+    """Returns points on the shapes of each finger link in the palm frame, shape (n, 3) [m].
+
+    Args:
+        model: Robot model.
+        gripper: Gripper.
+        position: Position of the gripper's driven joint [rad or m].
+    """
     poses = model.link_transforms(with_gripper(model, model.default_positions(), gripper, position))
-    found: dict[str, list[Array]] = {}
+    points: dict[str, list[Array]] = {}
     for item in model.link_geometries:
         if item.link in gripper.links:
-            in_link = model.pin_model.frames[item.frame_id].placement.inverse() * item.placement
-            pose = poses[gripper.palm].inverse() * poses[item.link] * in_link
-            found.setdefault(item.link, []).append(_points(item) @ pose.rotation.T + pose.translation)
-    return {name: np.concatenate(items) for name, items in found.items()}
+            pose_in_link = model.pin_model.frames[item.frame_id].placement.inverse() * item.placement
+            pose_in_palm = poses[gripper.palm].inverse() * poses[item.link] * pose_in_link
+            points.setdefault(item.link, []).append(_points(item) @ pose_in_palm.rotation.T + pose_in_palm.translation)
+    return {name: np.concatenate(items) for name, items in points.items()}
 
 
 def finger_points(model: RobotModel, gripper: Gripper, position: float) -> Mapping[str, Array]:
-    """Returns points on the shapes of each finger in the palm's frame, shape (n, 3) [m]."""
-    found: dict[str, list[Array]] = {}
+    """Returns points on the shapes of each finger in the palm frame, by first link, shape (n, 3) [m].
+
+    Args:
+        model: Robot model.
+        gripper: Gripper.
+        position: Position of the gripper's driven joint [rad or m].
+    """
+    fingers: dict[str, list[Array]] = {}
     for link, points in link_points(model, gripper, position).items():
-        found.setdefault(finger_of(model, gripper, link), []).append(points)
-    return {name: np.concatenate(items) for name, items in found.items()}
+        fingers.setdefault(finger_of(model, gripper, link), []).append(points)
+    return {name: np.concatenate(items) for name, items in fingers.items()}
 
 
 def _points(item: LinkGeometry) -> Array:
-    """Returns the vertices of a mesh, or the corners of the box around another shape."""
+    """Returns the vertices of a mesh, or the corners of the bounding box of any other shape."""
     if isinstance(item.shape, Mesh):
         return np.asarray(item.shape.vertices)
     item.geometry.computeLocalAABB()

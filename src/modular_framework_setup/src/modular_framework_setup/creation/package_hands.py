@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The grippers that the SRDF of a config package names, as the self-collision matrix needs them."""
+"""Reads the grippers in the SRDF of a config package, for the self-collision matrix."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from modular_framework_urdf.srdf_reader import EndEffector
 def hands_of(model: RobotModel) -> list[Hand]:
     """Returns the hand of each end effector, with the named states of its group.
 
-    A hand is the group, the link it is fixed to, what is between them, and joints that mimic one of the group. A group
-    without named states is open and closed at the ends of its joints' ranges.
+    A hand consists of the group's links, the parent link, the links between them, and the links of joints that mimic
+    the group's joints. Without named states, the joint limits count as open and closed.
 
     Args:
-        model: of the robot, with the SRDF of the package.
+        model: Robot model with the SRDF of the package.
 
     Raises:
-        UnknownNameError: a group is not there.
+        UnknownNameError: A group is unknown.
     """
-    return [Hand(_links(model, each), _states(model, each.group)) for each in model.semantics.end_effectors]
+    return [Hand(_links(model, item), _states(model, item.group)) for item in model.semantics.end_effectors]
 
 
 def _links(model: RobotModel, effector: EndEffector) -> frozenset[str]:

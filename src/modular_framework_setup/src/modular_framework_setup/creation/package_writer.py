@@ -25,27 +25,27 @@ FRAMEWORK_FILES = (
 
 
 def refuse_existing(into: Path, names: tuple[str, ...]) -> None:
-    """Raises CreationError when one of the packages is there already."""
-    there = [str(into / name) for name in names if (into / name).exists()]
-    if there:
+    """Raises CreationError if one of the packages exists already."""
+    existing = [str(into / name) for name in names if (into / name).exists()]
+    if existing:
         raise CreationError(
-            f"{' and '.join(there)} {'is' if len(there) == 1 else 'are'} there already, and nothing is overwritten; "
-            "choose another --name or --into, or move it away"
+            f"{' and '.join(existing)} {'exists' if len(existing) == 1 else 'exist'} already and will not be "
+            "overwritten; choose a different --name or --into, or move the folder"
         )
 
 
 def write_packages(plan: RobotPlan, into: Path) -> tuple[Path, Path]:
-    """Writes the package of the description and the config package.
+    """Writes the robot package and the config package.
 
     Args:
-        plan: what they say.
-        into: folder that gets both.
+        plan: Content of the packages.
+        into: Parent folder of both packages.
 
     Returns:
-        Their folders.
+        The folders of the robot package and of the config package.
 
     Raises:
-        CreationError: one of them is there already.
+        CreationError: One of the packages exists already.
     """
     names = plan.choices.robot_package, plan.choices.config_package
     refuse_existing(into, names)
@@ -65,7 +65,15 @@ def write_packages(plan: RobotPlan, into: Path) -> tuple[Path, Path]:
 
 @dataclass(frozen=True, slots=True)
 class Controller:
-    """A controller of both packages; `stroke` is the range of its first joint [rad or m]."""
+    """A controller in both packages.
+
+    Attributes:
+        name: Name of the controller.
+        kind: Type of the controller in MoveIt.
+        action: Name of the action.
+        joints: Joint names.
+        stroke: Range of the first joint [rad or m].
+    """
 
     name: str
     kind: str
@@ -123,20 +131,20 @@ def _controllers(plan: RobotPlan) -> list[Controller]:
 
     chains = [(f"{arm.name}_trajectory_controller", arm.joints) for arm in plan.parts.arms]
     chains += [("torso_trajectory_controller", plan.parts.torso)] if plan.parts.torso else []
-    found = [
+    controllers = [
         Controller(name, "FollowJointTrajectory", "follow_joint_trajectory", joints, stroke(joints[0]))
         for name, joints in chains
     ]
     for item in plan.parts.grippers:
         joints = (item.driver,)
-        found.append(
+        controllers.append(
             Controller(f"{item.name}_controller", "GripperCommand", "gripper_cmd", joints, stroke(item.driver))
         )
-    return found
+    return controllers
 
 
 def _hand_words(plan: RobotPlan) -> str:
-    """Returns the names of the links of all grippers, separated by spaces."""
+    """Returns the link names of all grippers, separated by spaces."""
     return " ".join(link for gripper in plan.parts.grippers for link in (gripper.palm, *gripper.links))
 
 
@@ -158,8 +166,8 @@ def _render(templates: Path, folder: Path, values: dict[str, Any]) -> None:
 
 
 def _write_framework_files(plan: RobotPlan, folder: Path) -> None:
-    """Copies the shipped configuration with the names of this robot."""
-    shipped = Path(find_package("modular_framework_api")) / "config"
+    """Copies the default configuration and inserts the names of this robot."""
+    source = Path(find_package("modular_framework_api")) / "config"
     arm = next(item for item in plan.parts.arms if item.gripper)
     hand = plan.parts.gripper_of(arm)
     names = {
@@ -169,12 +177,12 @@ def _write_framework_files(plan: RobotPlan, folder: Path) -> None:
     }
     folder.mkdir(exist_ok=True)
     for name in FRAMEWORK_FILES:
-        text = (shipped / name).read_text()
+        text = (source / name).read_text()
         for key, value in names.items():
             text = _with_value(text, key, value)
         (folder / name).write_text(text)
 
 
 def _with_value(text: str, key: str, value: str) -> str:
-    """Returns the text of a YAML file with another text as the value of a key."""
+    """Returns a YAML text with a replaced text value of a key."""
     return re.sub(rf'^(\s*{key}: )"[^"]*"', rf'\g<1>"{value}"', text, flags=re.M)

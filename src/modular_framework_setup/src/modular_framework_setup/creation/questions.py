@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Asks a person on the terminal what cannot be known from a URDF; Enter takes what was found."""
+"""Asks the user on the terminal to confirm or correct the parts found in a URDF; Enter confirms."""
 
 from __future__ import annotations
 
@@ -9,28 +9,34 @@ from modular_framework_setup.creation.robot_plan import Choices
 from modular_framework_setup.errors import CreationError
 
 
-def ask_name(found: str) -> str:
-    """Returns the name of the robot."""
-    return input(f"Name of the robot, in the names of the packages [{found}]: ").strip() or found
+def ask_name(default: str) -> str:
+    """Returns the robot name that the user enters, or the default."""
+    return input(f"Name of the robot, used in the package names [{default}]: ").strip() or default
 
 
 def confirm_parts(tree: RobotTree, parts: RobotParts, choices: Choices) -> RobotParts:
-    """Shows the arms and grippers, and takes other links until the person is content."""
+    """Asks for the links of arms and grippers until the user confirms the parts.
+
+    Args:
+        tree: Kinematic tree of the robot.
+        parts: Parts found in the URDF.
+        choices: Command-line options of the user.
+    """
     while True:
         fingers = [_ask_links(f"Fingers of {item.name} on {item.palm}", item.links) for item in parts.grippers]
         if not parts.grippers:
-            given = input("No gripper was found. Links of its fingers, separated by spaces [none]: ").split()
-            fingers = [given] if given else []
+            links = input("No gripper was found. Links of its fingers, separated by spaces [none]: ").split()
+            fingers = [links] if links else []
         chains = []
         for arm in parts.arms:
             base, tip = _ask_links(
                 f"Base and tip link of {arm.name} ({len(arm.joints)} joints)", (arm.base, arm.tip), 2
             )
             chains.append((base, tip))
-        is_as_found = chains == [(arm.base, arm.tip) for arm in parts.arms] and fingers == [
+        is_confirmed = chains == [(arm.base, arm.tip) for arm in parts.arms] and fingers == [
             list(item.links) for item in parts.grippers
         ]
-        if is_as_found:
+        if is_confirmed:
             return parts
         try:
             return find_parts(tree, chains, fingers)
@@ -38,9 +44,9 @@ def confirm_parts(tree: RobotTree, parts: RobotParts, choices: Choices) -> Robot
             print(error)
 
 
-def _ask_links(question: str, found: tuple[str, ...], count: int | None = None) -> list[str]:
+def _ask_links(question: str, default: tuple[str, ...], count: int | None = None) -> list[str]:
     while True:
-        answer = input(f"{question} [{' '.join(found)}]: ").split() or list(found)
-        if count is None or len(answer) == count:
-            return answer
-        print(f"got {len(answer)} links; give {count}")
+        links = input(f"{question} [{' '.join(default)}]: ").split() or list(default)
+        if count is None or len(links) == count:
+            return links
+        print(f"got {len(links)} links; give {count}")

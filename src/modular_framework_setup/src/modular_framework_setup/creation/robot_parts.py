@@ -12,21 +12,22 @@ from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.errors import CreationError
 from modular_framework_urdf.robot import Joint
 
-LEAST_JOINTS = 2
-"""A serial chain of fewer joints is no arm: a wheel, a lid."""
+MIN_ARM_JOINTS = 2
+"""Minimum number of joints of an arm; shorter chains are wheels or lids."""
 FLANGES = ("tool0", "tcp", "tool", "flange", "ee_link", "ee", "link_ee", "tip")
 
 
 @dataclass(frozen=True, slots=True)
 class Gripper:
-    """Fingers that one joint drives.
+    """A gripper driven by one joint.
 
     Attributes:
-        palm: link that carries the fingers.
-        driver: joint that is commanded.
-        joints: all its joints, the driver first.
-        links: links of the fingers.
-        twin: joint that does as the driver does, though the URDF does not say so; empty for none.
+        name: Name of the gripper.
+        palm: Parent link of the fingers.
+        driver: Commanded joint.
+        joints: All joints, the driver first.
+        links: Links of the fingers.
+        twin: Second finger joint that must mimic the driver but has no <mimic> in the URDF; "" for none.
     """
 
     name: str
@@ -42,8 +43,11 @@ class Arm:
     """A serial chain.
 
     Attributes:
-        joints: that are driven, from base to tip.
-        gripper: name of the one at its end; empty for none.
+        name: Name of the arm.
+        base: Base link.
+        tip: Tip link.
+        joints: Driven joints from base to tip.
+        gripper: Name of the gripper at the tip; "" for none.
     """
 
     name: str
@@ -55,66 +59,72 @@ class Arm:
 
 @dataclass(frozen=True, slots=True)
 class RobotParts:
-    """Arms, grippers and the joints that several arms hang on."""
+    """Arms and grippers of a robot.
+
+    Attributes:
+        arms: Arms.
+        grippers: Grippers.
+        torso: Joints shared by several arms.
+    """
 
     arms: tuple[Arm, ...]
     grippers: tuple[Gripper, ...]
     torso: tuple[str, ...] = ()
 
     def gripper_of(self, arm: Arm) -> Gripper | None:
-        """Returns the gripper at the end of an arm."""
+        """Returns the gripper of an arm, or None."""
         return next((item for item in self.grippers if item.name == arm.gripper), None)
 
 
-def below(tree: RobotTree, link: str) -> list[Joint]:
+def joints_below(tree: RobotTree, link: str) -> list[Joint]:
     """Returns all joints below a link."""
-    found = []
+    joints = []
     for joint in tree.children(link):
-        found += [joint, *below(tree, joint.child)]
-    return found
+        joints += [joint, *joints_below(tree, joint.child)]
+    return joints
 
 
 def is_driven(joint: Joint) -> bool:
-    """Whether a joint moves by itself."""
+    """Returns whether a joint is movable and not a mimic joint."""
     return joint.movable and joint.mimic is None
 
 
 def find_parts(
     tree: RobotTree, chains: Sequence[tuple[str, str]] = (), fingers: Sequence[Sequence[str]] = ()
 ) -> RobotParts:
-    """Finds arms and grippers.
+    """Finds the arms and grippers of a robot.
 
     Args:
-        tree: of the robot.
-        chains: base and tip link of each arm; none: they are found.
-        fingers: finger links of each gripper; none: they are found, by mimic joints or by pairs of equal joints.
+        tree: Kinematic tree of the robot.
+        chains: Base and tip link of each arm; empty to find the arms.
+        fingers: Finger links of each gripper; empty to find grippers by mimic joints or pairs of equal joints.
 
     Raises:
-        CreationError: an option names no link of the robot or no chain, or there is no arm.
+        CreationError: An option names an unknown link or an invalid chain, or there is no arm.
     """
     for name in (*(link for chain in chains for link in chain), *(link for links in fingers for link in links)):
         if name not in tree.links:
             raise CreationError(f"link '{name}' is not in the URDF; {listing(tree.links)}{nearest(name, tree.links)}")
-    sets = [_fingers(tree, links) for links in fingers] if fingers else _mimic_sets(tree) + _twins(tree)
-    grippers = _named_grippers([_gripper(tree, joints) for joints in sets])
+    joint_sets = [_finger_joints(tree, links) for links in fingers] if fingers else _mimic_sets(tree) + _twins(tree)
+    grippers = _named_grippers([_gripper(tree, joints) for joints in joint_sets])
     if chains:
         return RobotParts(_given_arms(tree, chains, grippers), grippers)
     return _found_arms(tree, grippers)
 
 
-def _fingers(tree: RobotTree, links: Sequence[str]) -> list[Joint]:
-    joints = [joint for link in links if (joint := tree.parent_joint.get(link)) is not None and joint.movable]
-    more = [joint for link in links for joint in below(tree, link) if joint.movable]
-    found = list({joint.name: joint for joint in (*joints, *more)}.values())
-    if not any(map(is_driven, found)):
+def _finger_joints(tree: RobotTree, links: Sequence[str]) -> list[Joint]:
+    parents = [joint for link in links if (joint := tree.parent_joint.get(link)) is not None and joint.movable]
+    descendants = [joint for link in links for joint in joints_below(tree, link) if joint.movable]
+    joints = list({joint.name: joint for joint in (*parents, *descendants)}.values())
+    if not any(map(is_driven, joints)):
         raise CreationError(
-            f"--gripper {' '.join(links)}: no joint drives these links; name the links that the fingers' joints carry"
+            f"--gripper {' '.join(links)}: no joint drives these links; name the child links of the fingers' joints"
         )
-    return found
+    return joints
 
 
 def _mimic_sets(tree: RobotTree) -> list[list[Joint]]:
-    """Returns leaders with their followers, where nothing else is driven below the leader."""
+    """Returns each leading joint with its mimic joints, unless the leading joint has other driven joints below it."""
     followers: dict[str, list[Joint]] = {}
     for joint in tree.robot.joints:
         leader = joint
@@ -127,57 +137,59 @@ def _mimic_sets(tree: RobotTree) -> list[list[Joint]]:
     return [
         [tree.joints[leader], *items]
         for leader, items in followers.items()
-        if is_driven(tree.joints[leader]) and not any(map(is_driven, below(tree, tree.joints[leader].child)))
+        if is_driven(tree.joints[leader]) and not any(map(is_driven, joints_below(tree, tree.joints[leader].child)))
     ]
 
 
 def _twins(tree: RobotTree) -> list[list[Joint]]:
-    """Returns pairs of equal joints on one link, below which nothing else is driven: fingers without a mimic joint."""
-    found = []
-    followed = {joint.mimic.leader for joint in tree.robot.joints if joint.mimic}
+    """Returns pairs of equal, last driven joints on the same link, which are fingers without a mimic joint."""
+    twins = []
+    leaders = {joint.mimic.leader for joint in tree.robot.joints if joint.mimic}
     for link in tree.links:
         ends = [
             joint
             for joint in tree.children(link)
-            if is_driven(joint) and joint.name not in followed and not any(map(is_driven, below(tree, joint.child)))
+            if is_driven(joint)
+            and joint.name not in leaders
+            and not any(map(is_driven, joints_below(tree, joint.child)))
         ]
         if len(ends) == 2 and ends[0].kind == ends[1].kind != "continuous" and ends[0].limit == ends[1].limit:
-            found.append(ends)
-    return found
+            twins.append(ends)
+    return twins
 
 
 def _gripper(tree: RobotTree, joints: Sequence[Joint]) -> Gripper:
     drivers = [joint for joint in joints if is_driven(joint)]
-    common = [list(_up_links(tree, joint.parent)) for joint in joints]
-    palm = next(link for link in common[0] if all(link in links for links in common))
+    ancestors = [list(_ancestors(tree, joint.parent)) for joint in joints]
+    palm = next(link for link in ancestors[0] if all(link in links for links in ancestors))
     names = {joint.name for joint in joints}
     links = [joint.child for joint in joints]
-    links += [joint.child for link in links for joint in below(tree, link) if joint.name not in names]
+    links += [joint.child for link in links for joint in joints_below(tree, link) if joint.name not in names]
     ordered = [drivers[0].name, *(joint.name for joint in joints if joint is not drivers[0])]
     twin = drivers[1].name if len(drivers) == 2 == len(joints) else ""
     if len(drivers) > 1 and not twin:
         raise CreationError(
             f"the gripper on link '{palm}' has {len(drivers)} driven joints "
-            f"({', '.join(item.name for item in drivers)}); one may be driven, the others follow it by <mimic>; add "
+            f"({', '.join(item.name for item in drivers)}); only one may be driven, the others must mimic it; add "
             "<mimic> to the URDF, or name the fingers by --gripper"
         )
     return Gripper("gripper", palm, drivers[0].name, tuple(ordered), tuple(dict.fromkeys(links)), twin)
 
 
-def _up_links(tree: RobotTree, link: str) -> Iterable[str]:
+def _ancestors(tree: RobotTree, link: str) -> Iterable[str]:
     yield link
     for joint in tree.up(link):
         yield joint.parent
 
 
 def _common_prefix(names: Sequence[str]) -> str:
-    """Returns what all names begin with, up to a separator."""
-    start = os.path.commonprefix(list(names))
-    return start[: start.rfind("_") + 1]
+    """Returns the common prefix of names, up to the last underscore."""
+    prefix = os.path.commonprefix(list(names))
+    return prefix[: prefix.rfind("_") + 1]
 
 
 def _distinct(prefixes: Sequence[str], noun: str) -> list[str]:
-    """Returns a name for each part: the noun, with what its joints begin with where there are several."""
+    """Returns a distinct name for each part: the noun, for several parts with the prefix of the joints or a number."""
     if len(prefixes) == 1:
         return [noun]
     sides = [_side(prefix, prefixes) for prefix in prefixes]
@@ -205,7 +217,7 @@ def _given_arms(tree: RobotTree, chains: Sequence[tuple[str, str]], grippers: Se
         driven = [joint.name for joint in path or () if is_driven(joint)]
         if not driven:
             raise CreationError(
-                f"--arm {base} {tip}: no joint that moves is between them; '{tip}' must hang below '{base}'; exchange "
+                f"--arm {base} {tip}: no driven joint is between them; '{tip}' must be a descendant of '{base}'; swap "
                 "or correct the links"
             )
         paths.append(driven)
@@ -217,21 +229,21 @@ def _given_arms(tree: RobotTree, chains: Sequence[tuple[str, str]], grippers: Se
 
 
 def _gripper_at(tree: RobotTree, tip: str, last_joint: str, grippers: Sequence[Gripper]) -> str:
-    """Returns the name of the gripper that the last joint of an arm carries."""
+    """Returns the name of the gripper at the end of an arm, or ""."""
     for item in grippers:
-        above = next((joint for joint in tree.up(item.palm) if is_driven(joint)), None)
-        if above is not None and above.name == last_joint or item.palm == tip:
+        parent = next((joint for joint in tree.up(item.palm) if is_driven(joint)), None)
+        if parent is not None and parent.name == last_joint or item.palm == tip:
             return item.name
     return ""
 
 
 def _found_arms(tree: RobotTree, grippers: tuple[Gripper, ...]) -> RobotParts:
-    taken = {name for item in grippers for name in item.joints}
+    gripper_joints = {name for item in grippers for name in item.joints}
     ends = [(item.palm, item.name) for item in grippers]
     for joint in tree.robot.joints:
-        if is_driven(joint) and joint.name not in taken:
-            lower = [item for item in below(tree, joint.child) if is_driven(item)]
-            if not lower:
+        if is_driven(joint) and joint.name not in gripper_joints:
+            descendants = [item for item in joints_below(tree, joint.child) if is_driven(item)]
+            if not descendants:
                 ends.append((joint.child, ""))
     ends = [(link, name) for link, name in ends if name or not _carries(tree, link, ends)]
     paths = [[joint.name for joint in reversed(list(tree.up(link))) if is_driven(joint)] for link, _ in ends]
@@ -239,13 +251,13 @@ def _found_arms(tree: RobotTree, grippers: tuple[Gripper, ...]) -> RobotParts:
     chains = [
         (own, *end)
         for path, end in zip(paths, ends, strict=True)
-        if len(own := [name for name in path if name not in shared]) >= LEAST_JOINTS
+        if len(own := [name for name in path if name not in shared]) >= MIN_ARM_JOINTS
     ]
     if not chains:
         joints = [joint.name for joint in tree.robot.joints if is_driven(joint)]
         raise CreationError(
-            f"no arm is found: no serial chain of {LEAST_JOINTS} or more joints among {', '.join(joints) or 'no joint'}"
-            "; name it by --arm BASE TIP"
+            f"no arm is found: no serial chain of {MIN_ARM_JOINTS} or more joints among {', '.join(joints) or 'none'}"
+            "; name the arm by --arm BASE TIP"
         )
     names = _distinct([_common_prefix(own) for own, _, _ in chains], "arm")
     arms = tuple(
@@ -258,15 +270,15 @@ def _found_arms(tree: RobotTree, grippers: tuple[Gripper, ...]) -> RobotParts:
 
 
 def _carries(tree: RobotTree, link: str, ends: Sequence[tuple[str, str]]) -> bool:
-    """Whether a gripper hangs on a link."""
+    """Returns whether a gripper is attached to a link or a descendant."""
     return any(name and (palm == link or tree.chain(link, palm)) for palm, name in ends)
 
 
 def tip_of(tree: RobotTree, link: str) -> str:
-    """Returns the frame at the end of a link: one fixed to it that is called a flange or has no shape, else itself."""
+    """Returns the tip frame of a link: a fixed descendant with a flange name or without shape, else the link itself."""
     fixed = [
         joint.child
-        for joint in below(tree, link)
+        for joint in joints_below(tree, link)
         if not tree.children(joint.child) and all(item.kind == "fixed" for item in tree.chain(link, joint.child) or ())
     ]
     for word in FLANGES:

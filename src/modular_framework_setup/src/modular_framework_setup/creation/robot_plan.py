@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Works out everything that is written into the packages of a robot."""
+"""Computes the content of a robot's packages."""
 
 from __future__ import annotations
 
@@ -31,25 +31,27 @@ from modular_framework_urdf.mesh_paths import mesh_path
 from modular_framework_urdf.urdf_reader import read_urdf
 from modular_framework_urdf.xml_text import XmlError
 
-SEGMENT_RAD = 0.05  # between two states that a planner checks on its way
-ACCELERATION_PER_VELOCITY = 2.0  # full speed in half a second
+SEGMENT_RAD = 0.05  # distance between collision-checked states of a path
+ACCELERATION_PER_VELOCITY = 2.0  # [1/s], full speed in half a second
 
 Ends = Mapping[str, tuple[float, float]]
-"""Of each gripper by name: the positions of its driver in which it is open and closed [rad or m]."""
+"""Open and closed position of each gripper's driven joint, by gripper name [rad or m]."""
 ConfirmParts = Callable[[RobotTree, RobotParts], RobotParts]
-"""Shows what was found to a person, and returns what they want."""
+"""Function that lets the user confirm or correct the parts that were found."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What a user says about the robot.
+    """Options of the user.
 
     Attributes:
-        name: of the robot, in the names of the packages.
-        chains: base and tip link of each arm; none: they are found.
-        fingers: finger links of each gripper; none: they are found.
-        samples, seed: of the self-collision matrix.
-        author, email: maintainer of the packages.
+        name: Robot name, used in the package names.
+        chains: Base and tip link of each arm; empty to find the arms.
+        fingers: Finger links of each gripper; empty to find the grippers.
+        samples: Number of random states for the self-collision matrix.
+        seed: Seed of the random states.
+        author: Maintainer of the packages.
+        email: Address of the maintainer.
     """
 
     name: str
@@ -62,7 +64,7 @@ class Choices:
 
     @property
     def robot_package(self) -> str:
-        """Name of the package with the description."""
+        """Name of the package with the robot description."""
         return f"{self.name}_robot"
 
     @property
@@ -73,7 +75,7 @@ class Choices:
 
 @dataclass(frozen=True, slots=True)
 class MovedJoint:
-    """A joint that a controller moves: its limits for planning [rad or m, and their derivatives]."""
+    """A joint moved by a controller, with its limits for planning [rad or m, per s, per s^2]."""
 
     name: str
     lower: float
@@ -84,17 +86,21 @@ class MovedJoint:
 
 @dataclass(frozen=True, slots=True)
 class RobotPlan:
-    """What the packages say.
+    """Content of a robot's packages.
 
     Attributes:
-        urdf: text of the description.
-        root: its root link.
-        states: {group: {state: {joint: position}}} [rad or m].
-        joints: all that controllers move, by name.
-        segment_fractions: of each group, the step between checked states as a share of its joint space.
-        palm_parents: of each palm, the link it is fixed to; a palm that a joint moves is left out.
-        urdf_file: name of the file it was made from.
-        notes: what was added to the description.
+        choices: Options of the user.
+        urdf: URDF text.
+        copies: Files to copy, path in the robot package -> source file.
+        root: Root link.
+        parts: Arms and grippers.
+        states: Named states, {group: {state: {joint: position}}} [rad or m].
+        verdicts: Self-collision matrix.
+        joints: Joints moved by controllers, by name.
+        segment_fractions: Distance between collision-checked states by group, as a fraction of the joint space.
+        palm_parents: Parent link of each palm that is fixed to its parent.
+        urdf_file: Name of the source file.
+        notes: Notes about additions to the URDF.
     """
 
     choices: Choices
@@ -112,16 +118,16 @@ class RobotPlan:
 
 
 def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progress: Progress) -> RobotPlan:
-    """Works out the packages of a robot.
+    """Computes the content of a robot's packages.
 
     Args:
-        source: its URDF; changed.
-        choices: of the user.
-        confirm: asked about the arms and grippers.
-        progress: of the self-collision matrix.
+        source: URDF, which is modified.
+        choices: Options of the user.
+        confirm: Function that confirms or corrects the arms and grippers.
+        progress: Function that shows the progress of the self-collision matrix.
 
     Raises:
-        CreationError: the URDF cannot be used, or no arm is found.
+        CreationError: The URDF is invalid, or no arm is found.
     """
     source.root.set("name", choices.name)
     tree = _tree(source)
@@ -141,7 +147,7 @@ def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progr
         parts,
         _states(model, parts, ends, disabled, choices.seed),
         verdicts,
-        {name: _moved_joint(model, name) for name in _moved(parts)},
+        {name: _moved_joint(model, name) for name in _controlled_joints(parts)},
         {arm.name: _segment_fraction(model, arm.joints) for arm in parts.arms},
         _palm_parents(tree, parts),
         source.path.name,
@@ -173,13 +179,13 @@ def _model(source: SourceUrdf, choices: Choices) -> RobotModel:
 
 
 def _gripper_ends(model: RobotModel, parts: RobotParts) -> dict[str, tuple[float, float]]:
-    """Returns the positions of each gripper's driver in which it is open and closed [rad or m]."""
+    """Returns the open and closed position of each gripper's driven joint [rad or m]."""
     sampling = CollisionSampling(model)
     return {gripper.name: gripper_states(sampling, gripper) for gripper in parts.grippers}
 
 
 def _with_grasp_frames(source: SourceUrdf, model: RobotModel, parts: RobotParts, ends: Ends) -> RobotParts:
-    """Adds a frame between the pads of each gripper that has none, and makes it the tip of its arm."""
+    """Adds a grasp frame to each gripper without a tip frame, and makes the grasp frame the tip of the arm."""
     arms = []
     for arm in parts.arms:
         gripper = parts.gripper_of(arm)
@@ -210,7 +216,7 @@ def _palm_parents(tree: RobotTree, parts: RobotParts) -> dict[str, str]:
     return {joint.child: joint.parent for joint in joints if joint is not None and joint.kind == "fixed"}
 
 
-def _moved(parts: RobotParts) -> list[str]:
+def _controlled_joints(parts: RobotParts) -> list[str]:
     return [*parts.torso, *(n for arm in parts.arms for n in arm.joints), *(item.driver for item in parts.grippers)]
 
 
@@ -228,7 +234,7 @@ def _segment_fraction(model: RobotModel, joints: Sequence[str]) -> float:
 def _states(
     model: RobotModel, parts: RobotParts, ends: Ends, disabled: Sequence[Pair], seed: int
 ) -> dict[str, dict[str, dict[str, float]]]:
-    """Returns the named states; the arms are placed one after the other, with open grippers."""
+    """Returns the named states. The arms are posed one by one, with open grippers."""
     sampling = CollisionSampling(model)
     states: dict[str, dict[str, dict[str, float]]] = {}
     positions = model.default_positions()
@@ -254,5 +260,5 @@ def _values(model: RobotModel, arm: Arm, positions: Array) -> dict[str, float]:
 
 
 def _rounded(model: RobotModel, joint: str, value: float) -> float:
-    number = model.index[joint]
-    return float(np.clip(round(float(value), 4), model.lower[number], model.upper[number])) + 0.0
+    index = model.index[joint]
+    return float(np.clip(round(float(value), 4), model.lower[index], model.upper[index])) + 0.0

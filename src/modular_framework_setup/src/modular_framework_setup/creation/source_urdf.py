@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the URDF that packages are made from, and finds its mesh files wherever the URDF's author kept them."""
+"""Reads the source URDF of the packages and finds its mesh files."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from modular_framework_urdf.mesh_reader import MeshError
 from modular_framework_urdf.xml_text import Element
 
 MESHES = "meshes"
-_MENTIONED = re.compile(r"^\s*(?:mtllib|map_\w+)\s+(?:-\S+\s+)*(\S+)\s*$|<init_from>\s*([^<]+?)\s*</init_from>", re.M)
+_REFERENCE = re.compile(r"^\s*(?:mtllib|map_\w+)\s+(?:-\S+\s+)*(\S+)\s*$|<init_from>\s*([^<]+?)\s*</init_from>", re.M)
 
 
 @dataclass(frozen=True, slots=True)
 class SourceUrdf:
-    """A URDF whose meshes are called as in the package that is to be made.
+    """A URDF whose mesh URIs refer to the new package.
 
     Attributes:
-        root: of the document.
-        path: where it was read.
-        copies: files to copy: path in the new package, and where the file is now.
+        root: Root element of the URDF.
+        path: Path of the source file.
+        copies: Files to copy, path in the new package -> source file.
     """
 
     root: Element
@@ -38,16 +38,16 @@ class SourceUrdf:
 def read_source(path: Path, arguments: Mapping[str, str], package: str) -> SourceUrdf:
     """Reads a URDF.
 
-    Meshes of packages on ROS_PACKAGE_PATH stay where they are. Others, named by a path or by a package that is not
-    there, are looked for in the folder of the URDF and those above it, and will be copied.
+    Meshes in packages on ROS_PACKAGE_PATH stay in place. Meshes given by path or in unknown packages are searched for
+    in the URDF's folder and its parents, and will be copied.
 
     Args:
-        path: of the URDF, which may be xacro.
-        arguments: of the xacro file.
-        package: name of the package to be made.
+        path: URDF or xacro file.
+        arguments: Arguments of the xacro file.
+        package: Name of the new package.
 
     Raises:
-        CreationError: it cannot be read, or meshes are not found; names all of them.
+        CreationError: The URDF is invalid, or meshes are missing; the message names all of them.
     """
     faults = FaultList()
     with packages_beside(path.resolve().parent):
@@ -56,19 +56,26 @@ def read_source(path: Path, arguments: Mapping[str, str], package: str) -> Sourc
         if root is None:
             raise CreationError("\n".join(map(str, faults.sorted())))
         copies: dict[str, Path] = {}
-        missing = [item.get("filename", "") for item in root.iter("mesh") if not _adopt(item, path, package, copies)]
+        missing = [item.get("filename", "") for item in root.iter("mesh") if not _relocate(item, path, package, copies)]
     if missing:
         raise CreationError(
-            f"{path}: {len(missing)} mesh files are not found: {', '.join(dict.fromkeys(missing))}; looked for as they "
-            "are named, on ROS_PACKAGE_PATH and in the folders from the URDF's upwards; put them there"
+            f"{path}: {len(missing)} mesh files are not found: {', '.join(dict.fromkeys(missing))}; searched "
+            "ROS_PACKAGE_PATH, the URDF's folder and its parents; put the files there"
         )
     for target, source in tuple(copies.items()):
-        _add_mentioned(target, source, copies)
+        _add_references(target, source, copies)
     return SourceUrdf(root, path, copies)
 
 
-def _adopt(mesh: Element, urdf: Path, package: str, copies: dict[str, Path]) -> bool:
-    """Names a mesh as in the new package; returns whether it was found."""
+def _relocate(mesh: Element, urdf: Path, package: str, copies: dict[str, Path]) -> bool:
+    """Changes the URI of a mesh to the new package; returns whether the file was found.
+
+    Args:
+        mesh: Element of the mesh.
+        urdf: Path of the URDF.
+        package: Name of the new package.
+        copies: Files to copy, extended by the mesh.
+    """
     uri = mesh.get("filename", "")
     if uri.startswith("package://"):
         try:
@@ -77,11 +84,11 @@ def _adopt(mesh: Element, urdf: Path, package: str, copies: dict[str, Path]) -> 
         except MeshError:
             pass
     relative = uri.partition("://")[2] if "://" in uri else uri
-    source = _look_for(relative, urdf.resolve().parent)
+    source = _find_file(relative, urdf.resolve().parent)
     if source is None:
         return False
-    short = "/".join(part for part in Path(relative).parts if part not in ("/", "..", ".", MESHES))
-    target = f"{MESHES}/{short if not Path(relative).is_absolute() else source.name}"
+    subpath = "/".join(part for part in Path(relative).parts if part not in ("/", "..", ".", MESHES))
+    target = f"{MESHES}/{subpath if not Path(relative).is_absolute() else source.name}"
     while target in copies and copies[target] != source:
         target = f"{MESHES}/{source.parent.name}/{target.removeprefix(f'{MESHES}/')}"
     copies[target] = source
@@ -89,26 +96,26 @@ def _adopt(mesh: Element, urdf: Path, package: str, copies: dict[str, Path]) -> 
     return True
 
 
-def _look_for(relative: str, folder: Path) -> Path | None:
-    """Returns the file of a name in a folder or one above it, also without the first part (a package's name)."""
+def _find_file(relative: str, folder: Path) -> Path | None:
+    """Returns a file in a folder or its parents, by relative path with or without the first part (a package name)."""
     if Path(relative).is_absolute():
         return Path(relative) if Path(relative).is_file() else None
-    shorter = relative.partition("/")[2]
-    for place in (folder, *folder.parents):
-        for name in (relative, shorter):
-            if name and (place / name).is_file():
-                return (place / name).resolve()
+    without_package = relative.partition("/")[2]
+    for parent in (folder, *folder.parents):
+        for name in (relative, without_package):
+            if name and (parent / name).is_file():
+                return (parent / name).resolve()
     return None
 
 
-def _add_mentioned(target: str, source: Path, copies: dict[str, Path]) -> None:
-    """Adds the materials and pictures that a mesh file mentions and that are there."""
+def _add_references(target: str, source: Path, copies: dict[str, Path]) -> None:
+    """Adds the existing materials and textures that a mesh file refers to."""
     if source.suffix.lower() not in (".obj", ".mtl", ".dae"):
         return
-    for match in _MENTIONED.finditer(source.read_text(encoding="utf-8", errors="replace")):
+    for match in _REFERENCE.finditer(source.read_text(encoding="utf-8", errors="replace")):
         name = next(item for item in match.groups() if item)
         file = source.parent / name
-        beside = str(Path(target).parent / name)
-        if ".." not in Path(name).parts and beside not in copies and file.is_file():
-            copies[beside] = file
-            _add_mentioned(beside, file, copies)
+        new_path = str(Path(target).parent / name)
+        if ".." not in Path(name).parts and new_path not in copies and file.is_file():
+            copies[new_path] = file
+            _add_references(new_path, file, copies)

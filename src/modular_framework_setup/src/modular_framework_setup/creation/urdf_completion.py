@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Adds to a URDF what planning, control and simulation need and its author left out."""
+"""Completes a URDF with the elements that planning, control and simulation require."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from modular_framework_urdf.xml_text import Element, add_child
 EFFORT, VELOCITY = 100.0, 1.0  # [N m or N], [rad/s or m/s]
 INTERFACE = "hardware_interface/PositionJointInterface"
 GAZEBO_PLUGIN = "libgazebo_ros_control.so"
-FRAME_MASS, FRAME_INERTIA = "1e-5", "1e-9"  # a simulator may give a link without inertia a kilogram [kg], [kg m^2]
+FRAME_MASS, FRAME_INERTIA = "1e-5", "1e-9"  # [kg], [kg m^2]; simulators may assume 1 kg for links without inertia
 
 
 def complete_urdf(root: Element, tree: RobotTree, grippers: tuple[Gripper, ...]) -> list[str]:
-    """Adds mimic elements, limits, inertias of frames, transmissions and the plugin of the simulation.
+    """Adds mimic elements, limits, inertias of frames, transmissions and the simulation plugin to a URDF.
 
     Args:
-        root: of the URDF; changed.
-        tree: of the robot.
-        grippers: a gripper's twin joint gets a mimic element.
+        root: Root element of the URDF, which is modified.
+        tree: Kinematic tree of the robot.
+        grippers: Grippers, whose twin joints get a mimic element.
 
     Returns:
-        One sentence for each addition that a user may want to correct.
+        One sentence per addition that the user may want to correct.
     """
     notes = []
     for gripper in grippers:
@@ -38,7 +38,7 @@ def complete_urdf(root: Element, tree: RobotTree, grippers: tuple[Gripper, ...])
         if element.find("inertial") is None and element.find("collision") is None and link.name not in tree.roots:
             _add_inertia(element)
         elif element.find("inertial") is None and element.find("collision") is not None:
-            notes.append(f"link '{link.name}' has a shape and no <inertial>: add its mass for the simulation")
+            notes.append(f"link '{link.name}' has a shape but no <inertial>: add its mass for the simulation")
     driven = {part.name for item in tree.robot.transmissions for part in item.joints}
     for item in root.findall("joint"):
         is_movable = item.get("type") in ("revolute", "continuous", "prismatic")
@@ -51,7 +51,14 @@ def complete_urdf(root: Element, tree: RobotTree, grippers: tuple[Gripper, ...])
 
 
 def add_frame(root: Element, name: str, parent: str, pose: Array) -> None:
-    """Adds a link without a shape, fixed to another one; its pose there has shape (4, 4) [m]."""
+    """Adds a link without shape that is fixed to a parent link.
+
+    Args:
+        root: Root element of the URDF, which is modified.
+        name: Name of the new link.
+        parent: Parent link.
+        pose: Pose in the parent frame, shape (4, 4) [m].
+    """
     _add_inertia(add_child(root, "link", name=name))
     joint = add_child(root, "joint", name=f"{name}_joint", type="fixed")
     add_child(joint, "parent", link=parent)
@@ -66,7 +73,7 @@ def _joint(root: Element, name: str) -> Element:
 
 
 def _add_limits(joint: Element) -> str:
-    """Gives a joint the limits it lacks; an effort or velocity of 0 would not let it move."""
+    """Adds missing or zero effort and velocity limits to a joint; returns a note, or "" for no change."""
     limit = joint.find("limit")
     if limit is None:
         limit = add_child(joint, "limit")

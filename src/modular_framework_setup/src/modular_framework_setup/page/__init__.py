@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A page to look at a config package."""
+"""HTML page about a config package."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes a config package as one HTML page: groups, joints with their limits and states, and the collision matrix."""
+"""Renders a config package as one HTML page with groups, joints, limits, states and the collision matrix."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ OTHER, CHECKED = "Other", "checked"
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A position of a named state on the bar of a joint.
+    """Mark of a named state on the bar of a joint.
 
     Attributes:
-        state: "group state".
-        position: [rad or m].
-        percent: place on the scale [%].
+        state: Group and name of the state, separated by a space.
+        position: Joint position [rad or m].
+        percent: Position on the scale [%].
     """
 
     state: str
@@ -40,14 +40,25 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class JointRow:
-    """A joint that moves: its range on a scale that all joints of its kind share.
+    """A movable joint, with its range on a scale common to all joints of its kind.
 
     Attributes:
-        unit: of positions.
-        left, width: of the bar on the scale [%].
-        zero: place of position 0 on the scale [%].
-        tight: left and width of the part that joint_limits.yaml leaves [%]; None where it tightens nothing.
-        follows: what a mimic joint does.
+        name: Name of the joint.
+        kind: URDF type.
+        unit: Unit of positions.
+        lower: Lower position limit [rad or m]; None if unlimited.
+        upper: Upper position limit [rad or m]; None if unlimited.
+        left: Left edge of the bar on the scale [%].
+        width: Width of the bar on the scale [%].
+        zero: Position 0 on the scale [%].
+        tight: Left edge and width of the range in joint_limits.yaml [%]; None if equal to the URDF's range.
+        velocity: Velocity limit of the URDF [rad/s or m/s].
+        velocity_in_file: Velocity limit of joint_limits.yaml [rad/s or m/s].
+        acceleration: Acceleration limit of joint_limits.yaml [rad/s^2 or m/s^2].
+        effort: Effort limit [N m or N].
+        follows: Formula of a mimic joint; "" for other joints.
+        groups: Planning groups with this joint.
+        marks: Named states with this joint.
     """
 
     name: str
@@ -73,11 +84,12 @@ class GroupRow:
     """A planning group.
 
     Attributes:
-        ends: its chains and the groups it is made of, for a reader.
-        active: joints a planner moves.
-        others: its further joints, sorted.
-        solver: of kinematics.yaml; empty when none is given.
-        states: names of its states.
+        name: Name of the group.
+        ends: Chains and subgroups, in words.
+        active: Joints that a planner moves.
+        others: Other joints, sorted.
+        solver: Kinematics solver in kinematics.yaml; "" if none is given.
+        states: Names of the named states.
     """
 
     name: str
@@ -90,11 +102,11 @@ class GroupRow:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What is done with two links.
+    """A cell of the collision matrix.
 
     Attributes:
-        kind: one of REASONS, OTHER, CHECKED; empty for a link and itself.
-        text: the same for a reader, with the links' names.
+        kind: One of REASONS, OTHER and CHECKED; "" on the diagonal.
+        text: Description with the link names.
     """
 
     kind: str
@@ -102,10 +114,10 @@ class Cell:
 
 
 def page_text(checked: CheckedPackage) -> str:
-    """Returns a page that needs no other file.
+    """Returns a self-contained HTML page.
 
     Args:
-        checked: the package; what could not be read is left out.
+        checked: Checked package; unreadable parts are omitted.
     """
     tree = checked.tree
     semantics, srdf = checked.semantics or Semantics(), checked.srdf or SemanticDescription("")
@@ -117,8 +129,8 @@ def page_text(checked: CheckedPackage) -> str:
         autoescape=True,
     )
     links = [link.name for link in tree.robot.links if link.collisions] if tree else []
-    cells = [[_cell(one, other, srdf) for other in links] for one in links]
-    kinds = [cell.kind for number, row in enumerate(cells) for cell in row[:number]]
+    cells = [[_cell(first, second, srdf) for second in links] for first in links]
+    kinds = [cell.kind for index, row in enumerate(cells) for cell in row[:index]]
     return environment.get_template("robot.html.jinja").render(
         package=checked.package.name,
         robot=tree.robot.name if tree else "",
@@ -134,20 +146,20 @@ def page_text(checked: CheckedPackage) -> str:
     )
 
 
-def _cell(one: str, other: str, srdf: SemanticDescription) -> Cell:
-    if one == other:
-        return Cell("", one)
-    pair = frozenset((one, other))
+def _cell(first: str, second: str, srdf: SemanticDescription) -> Cell:
+    if first == second:
+        return Cell("", first)
+    pair = frozenset((first, second))
     if pair in srdf.disabled_pairs and pair not in srdf.enabled_pairs:
         reason = srdf.disabled_pairs[pair]
-        return Cell(reason if reason in REASONS else OTHER, f"{one} – {other}: not checked, {reason or 'no reason'}")
+        return Cell(reason if reason in REASONS else OTHER, f"{first} – {second}: not checked, {reason or 'no reason'}")
     if set(srdf.touching_links) & pair and pair not in srdf.enabled_pairs:
-        return Cell(OTHER, f"{one} – {other}: not checked, disable_default_collisions")
-    return Cell(CHECKED, f"{one} – {other}: checked")
+        return Cell(OTHER, f"{first} – {second}: not checked, disable_default_collisions")
+    return Cell(CHECKED, f"{first} – {second}: checked")
 
 
 def _value(node: Any, *keys: str) -> Any:
-    """Returns a value of a YAML file; None where it is not there."""
+    """Returns a value in a YAML file, or None if missing."""
     for key in keys:
         node = node.entries.get(key) if isinstance(node, YamlMapping) else None
     return node.value if isinstance(node, Scalar) else None
@@ -176,17 +188,19 @@ def _joint_rows(
     tree: RobotTree, checked: CheckedPackage, semantics: Semantics, srdf: SemanticDescription
 ) -> list[JointRow]:
     joints = list(tree.robot.movable_joints())
-    slides = [joint for joint in joints if joint.kind == "prismatic"]
-    slide_scale, turn_scale = _scale(slides), _scale([joint for joint in joints if joint not in slides])
+    prismatic = [joint for joint in joints if joint.kind == "prismatic"]
+    prismatic_scale, revolute_scale = _scale(prismatic), _scale([joint for joint in joints if joint not in prismatic])
     limits = checked.files.get("joint_limits")
     return [
-        _joint_row(joint, slide_scale if joint in slides else turn_scale, limits, semantics, srdf.group_states)
+        _joint_row(
+            joint, prismatic_scale if joint in prismatic else revolute_scale, limits, semantics, srdf.group_states
+        )
         for joint in joints
     ]
 
 
 def _scale(joints: Sequence[Joint]) -> tuple[float, float]:
-    """Returns the lowest and highest position of some joints; a turn to each side for one without an end."""
+    """Returns the lowest and highest position of joints; unlimited joints count as [-pi, pi] [rad]."""
     ends = [_range(joint) for joint in joints]
     return min((low for low, _ in ends), default=0.0), max((high for _, high in ends), default=1.0)
 
@@ -210,7 +224,7 @@ def _joint_row(
     def percent(position: float) -> float:
         return round(100.0 * min(max((position - scale[0]) / length, 0.0), 1.0), 2)
 
-    has_end = joint.kind != "continuous" and joint.limit is not None
+    is_limited = joint.kind != "continuous" and joint.limit is not None
     entry = ("joint_limits", joint.name)
     tight_low, tight_high = _number(limits, *entry, "min_position"), _number(limits, *entry, "max_position")
     tight = (max(low, low if tight_low is None else tight_low), min(high, high if tight_high is None else tight_high))
@@ -218,8 +232,8 @@ def _joint_row(
         joint.name,
         joint.kind,
         "m" if joint.kind == "prismatic" else "rad",
-        low if has_end else None,
-        high if has_end else None,
+        low if is_limited else None,
+        high if is_limited else None,
         percent(low),
         round(percent(high) - percent(low), 2),
         percent(0.0),
