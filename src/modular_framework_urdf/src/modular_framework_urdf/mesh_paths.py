@@ -22,15 +22,15 @@ def mesh_path(uri: str, find_package: PackageFinder) -> Path:
     Raises:
         MeshError: The scheme is unknown, or the file does not exist.
     """
-    scheme, separator, rest = uri.partition("://")
+    scheme, separator, location = uri.partition("://")
     if separator and scheme == "package":
-        package, _, relative = rest.partition("/")
+        package, _, relative = location.partition("/")
         try:
             path = Path(find_package(package)) / relative
         except Exception as error:  # the caller's function may raise any exception for a missing package
             raise MeshError(uri, f"package '{package}' is not found ({error})", "install it") from error
     elif separator and scheme == "file":
-        path = Path(rest)
+        path = Path(location)
     elif separator:
         raise MeshError(uri, f"got '{uri}'", "allowed: package://, file:// or an absolute path")
     else:

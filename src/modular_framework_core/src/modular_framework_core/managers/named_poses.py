@@ -58,21 +58,21 @@ def parse_placement(entry: Entry) -> Placement:
     missing = [key for key in ("position", "orientation") if key not in fields]
     if missing:
         raise entry.fault(f"the keys {missing} are missing; a pose needs position and orientation")
-    return Placement(numbers(fields["position"], POSITION_KEYS), _orientation(fields["orientation"]))
+    return Placement(read_numbers(fields["position"], POSITION_KEYS), _orientation(fields["orientation"]))
 
 
 def _orientation(entry: Entry) -> tuple[float, ...]:
     if {child.key for child in entry.children()} != set(QUATERNION_KEYS):
-        roll, pitch, yaw = numbers(entry, RPY_KEYS)
+        roll, pitch, yaw = read_numbers(entry, RPY_KEYS)
         return quaternion_from_rpy(roll, pitch, yaw)
-    values = numbers(entry, QUATERNION_KEYS)
+    values = read_numbers(entry, QUATERNION_KEYS)
     norm = math.sqrt(sum(value * value for value in values))
     if norm < 1e-6:
         raise entry.fault("the norm of the quaternion is 0; give a unit quaternion")
     return tuple(value / norm for value in values)
 
 
-def numbers(entry: Entry, keys: tuple[str, ...]) -> tuple[float, ...]:
+def read_numbers(entry: Entry, keys: tuple[str, ...]) -> tuple[float, ...]:
     """Returns the numbers of a mapping with exactly the given keys.
 
     Raises:

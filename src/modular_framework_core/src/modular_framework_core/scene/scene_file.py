@@ -244,19 +244,19 @@ def _shape_lines(shape: SceneShape, scene_object: SceneObject | None) -> list[st
         rotated = rotate_vector(scene_object.quaternion_xyzw, position)
         position = tuple(a + b for a, b in zip(scene_object.position, rotated, strict=True))
         quaternion = multiply_quaternions(scene_object.quaternion_xyzw, quaternion)
-    sizes = [_numbers(shape.size)]
+    sizes = [_number_text(shape.size)]
     if shape.kind == "mesh":
         sizes = [
             f"{len(shape.vertices)} {len(shape.triangles)}",
-            *map(_numbers, shape.vertices),
+            *map(_number_text, shape.vertices),
             *(" ".join(map(str, indices)) for indices in shape.triangles),
         ]
-    return [shape.kind, *sizes, *_pose_lines(position, quaternion), _numbers(shape.color)]
+    return [shape.kind, *sizes, *_pose_lines(position, quaternion), _number_text(shape.color)]
 
 
 def _pose_lines(position: Vector, quaternion_xyzw: Vector) -> list[str]:
-    return [_numbers(position), _numbers(quaternion_xyzw)]
+    return [_number_text(position), _number_text(quaternion_xyzw)]
 
 
-def _numbers(values: Vector) -> str:
+def _number_text(values: Vector) -> str:
     return " ".join(f"{value:.12g}" for value in values)

@@ -61,11 +61,11 @@ def own_keys(constructor: ast.FunctionDef, has_smach_base: bool, aliases: Mappin
     if len(calls) > 1 or uses > 1:
         fixed = dict.fromkeys(STATE_KEYS)
     elif calls:
-        given, rest_unknown = _given(calls[0], has_smach_base, keys_name)
+        base_arguments, rest_unknown = _base_arguments(calls[0], has_smach_base, keys_name)
         for key in STATE_KEYS:
-            if key in given and not _is_option(given[key], key):
-                fixed[key] = _names(given[key], aliases)
-            elif key not in given and (rest_unknown or key in options):
+            if key in base_arguments and not _is_option(base_arguments[key], key):
+                fixed[key] = _names(base_arguments[key], aliases)
+            elif key not in base_arguments and (rest_unknown or key in options):
                 fixed[key] = None
     return fixed | dict.fromkeys(_changed(constructor))
 
@@ -78,18 +78,18 @@ def keys_argument(constructor: ast.FunctionDef) -> str | None:
     return None
 
 
-def _given(call: ast.Call, has_smach_base: bool, keys_name: str | None) -> tuple[dict[str, ast.expr], bool]:
+def _base_arguments(call: ast.Call, has_smach_base: bool, keys_name: str | None) -> tuple[dict[str, ast.expr], bool]:
     """Returns the arguments of a call of the base constructor, and whether there may be unknown arguments."""
     is_super = isinstance(call.func, ast.Attribute) and isinstance(call.func.value, ast.Call)
     positional = call.args if is_super else call.args[1:]
-    given = {str(item.arg): item.value for item in call.keywords if item.arg is not None}
+    base_arguments = {str(item.arg): item.value for item in call.keywords if item.arg is not None}
     mappings = [item.value for item in call.keywords if not item.arg]
     starred = any(isinstance(item, ast.Starred) for item in positional) or any(
         not (isinstance(value, ast.Name) and value.id == keys_name) for value in mappings
     )
     if has_smach_base and not starred:
-        given.update(zip(STATE_KEYS, positional, strict=False))
-    return given, starred or not has_smach_base
+        base_arguments.update(zip(STATE_KEYS, positional, strict=False))
+    return base_arguments, starred or not has_smach_base
 
 
 def _is_option(value: ast.expr, key: str) -> bool:

@@ -49,17 +49,17 @@ def uses_in(annotation: ast.expr | None, aliases: MappingABC[str, ast.expr]) -> 
     return tuple(dict.fromkeys(_uses(annotation, aliases, frozenset())))
 
 
-def _uses(node: ast.expr | None, aliases: MappingABC[str, ast.expr], seen: frozenset[str]) -> Iterator[Use]:
+def _uses(node: ast.expr | None, aliases: MappingABC[str, ast.expr], visited: frozenset[str]) -> Iterator[Use]:
     match node:
-        case ast.Name(id=name) if name in aliases and name not in seen:
-            yield from _uses(aliases[name], aliases, seen | {name})
+        case ast.Name(id=name) if name in aliases and name not in visited:
+            yield from _uses(aliases[name], aliases, visited | {name})
         case ast.BinOp(left=left, right=right):
-            yield from _uses(left, aliases, seen)
-            yield from _uses(right, aliases, seen)
+            yield from _uses(left, aliases, visited)
+            yield from _uses(right, aliases, visited)
         case ast.Subscript(value=ast.Name(id="Annotated"), slice=ast.Tuple(elts=[inner, *limit])):
-            yield from _uses(inner, aliases, seen)
+            yield from _uses(inner, aliases, visited)
             for item in limit:
-                yield from _uses(item, aliases, seen)
+                yield from _uses(item, aliases, visited)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords) if name in KINDS:
             try:
                 yield KINDS[name](
@@ -142,8 +142,8 @@ class _Reader:
             return Anything()
         choices = tuple(value for item in types if isinstance(item, Choice) for value in item.values)
         if choices:
-            others = [item for item in types if not isinstance(item, Choice)]
-            types = [Choice(tuple(dict.fromkeys(choices))), *others]
+            other_types = [item for item in types if not isinstance(item, Choice)]
+            types = [Choice(tuple(dict.fromkeys(choices))), *other_types]
         return types[0] if len(types) == 1 else AnyOf(tuple(types))
 
     def _limit_in(self, node: ast.expr) -> Limits | Length | None:

@@ -44,12 +44,12 @@ def checks_options(constructor: Callable[..., None], without: Iterable[str] = ()
         if not declared:  # evaluated on first use: an annotation may refer to names defined after the class
             declared.update(declared_types(constructor))
         try:
-            given = signature.bind(state, *arguments, **options).arguments
+            bound_arguments = signature.bind(state, *arguments, **options).arguments
         except TypeError:
-            given = {}  # the constructor's own error is clearer
+            bound_arguments = {}  # the constructor's own error is clearer
         checked = {
             name: value
-            for name, value in given.items()
+            for name, value in bound_arguments.items()
             if name not in unchecked and value is not signature.parameters[name].default
         }
         messages = [

@@ -21,12 +21,12 @@ def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[st
     Unreadable states are omitted. A schema cannot express links between labels, such as the target of a transition;
     ``state_machine_generator --check`` covers them.
     """
-    usable = [source for name in states.names() if (source := _readable(states, name)) is not None]
-    found = [template for name in templates.names() if (template := templates.get(name)) is not None]
+    usable_states = [source for name in states.names() if (source := _readable(states, name)) is not None]
+    usable_templates = [template for name in templates.names() if (template := templates.get(name)) is not None]
     definitions = {
         "state": {
-            "oneOf": [{"$ref": f"#/definitions/state_{source.name}"} for source in usable]
-            + [{"$ref": f"#/definitions/machine_{template.name}"} for template in found]
+            "oneOf": [{"$ref": f"#/definitions/state_{source.name}"} for source in usable_states]
+            + [{"$ref": f"#/definitions/machine_{template.name}"} for template in usable_templates]
         },
         "states": {
             "type": "array",
@@ -38,14 +38,14 @@ def task_schema(states: StateCatalogue, templates: TemplateCatalogue) -> dict[st
                 "additionalProperties": {"$ref": "#/definitions/state"},
             },
         },
-        **{f"state_{source.name}": _state(source) for source in usable},
-        **{f"machine_{template.name}": _machine(template, is_root=False) for template in found},
+        **{f"state_{source.name}": _state(source) for source in usable_states},
+        **{f"machine_{template.name}": _machine(template, is_root=False) for template in usable_templates},
     }
     return {
         "$schema": DRAFT,
         "title": "Task of the task constructor",
         "definitions": definitions,
-        "oneOf": [_machine(template, is_root=True) for template in found],
+        "oneOf": [_machine(template, is_root=True) for template in usable_templates],
     }
 
 

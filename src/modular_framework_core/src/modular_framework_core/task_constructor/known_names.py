@@ -34,11 +34,11 @@ class KnownNames:
     origins: Mapping[str, str] = field(default_factory=dict)
     manipulator_group: str = ""
 
-    def with_names(self, more: Mapping[str, frozenset[str]]) -> KnownNames:
+    def with_names(self, further_names: Mapping[str, frozenset[str]]) -> KnownNames:
         """Returns a copy with further names. Absent kinds stay absent, except for ``plan``."""
-        merged = {kind: names | more.get(kind, frozenset()) for kind, names in self.names.items()}
+        merged = {kind: names | further_names.get(kind, frozenset()) for kind, names in self.names.items()}
         return KnownNames(
-            merged | {"plan": merged.get("plan", frozenset()) | more.get("plan", frozenset())},
+            merged | {"plan": merged.get("plan", frozenset()) | further_names.get("plan", frozenset())},
             self.origins,
             self.manipulator_group,
         )

@@ -167,5 +167,5 @@ class HeaderReader:
         return header.entries[key].location if key in header.entries else header.location
 
     def _all_templates(self) -> list[TemplateSource]:
-        found = (self._templates.get(name) for name in self._templates.names())
-        return [template for template in found if template is not None]
+        templates = (self._templates.get(name) for name in self._templates.names())
+        return [template for template in templates if template is not None]

@@ -158,11 +158,11 @@ def machine_keys(template: TemplateSource) -> list[MachineKey]:
     """Returns the header keys of machines with a template, in their usual order."""
     absent = {"initial_state"} if template.concurrent else {"default_outcome", "outcome_map"}
     absent |= set() if template.takes_keys else {"input_keys", "output_keys"}
-    own = [
+    template_keys = [
         MachineKey(name, "any value", f"Option of this template, available in the template as options.{name}.", {})
         for name in sorted(template.options)
     ]
-    return [*(key for key in _KEYS if key.name not in absent), *own]
+    return [*(key for key in _KEYS if key.name not in absent), *template_keys]
 
 
 def required_keys(*, is_root: bool) -> list[MachineKey]:

@@ -144,12 +144,12 @@ class _Checker:
             return
         verb, key_list = "takes" if direction == "input" else "writes", key_list or f"{direction}_keys"
         source = self._state.source
-        place = f"{key_list} in {source.file.name}" if key_list in source.own_keys else key_list
+        key_place = f"{key_list} in {source.file.name}" if key_list in source.own_keys else key_list
         self._faults.add(
             location,
             f"state '{self._state.label}' ({source.name}): {what} {verb} the userdata key "
             f"'{key}', but its {direction} keys are: {', '.join(sorted(declared)) or 'none'}; "
-            f"add it to {place}",
+            f"add it to {key_place}",
         )
 
     def _check_reads(self) -> None:

@@ -27,8 +27,10 @@ class ParamsScope:
 
     def inner(self, params: Mapping | None, faults: FaultList) -> ParamsScope:
         """Returns the scope inside a machine or state. The values of its ``params`` may refer to outer params."""
-        own = {} if params is None else {key: self.resolve(value, faults) for key, value in params.entries.items()}
-        return ParamsScope({**self._visible, **own})
+        own_params = (
+            {} if params is None else {key: self.resolve(value, faults) for key, value in params.entries.items()}
+        )
+        return ParamsScope({**self._visible, **own_params})
 
     def resolve(self, node: Node, faults: FaultList) -> Node:
         """Replaces every reference in a value. An unknown key adds a fault, and its reference stays unchanged."""

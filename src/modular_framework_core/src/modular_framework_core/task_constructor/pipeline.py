@@ -90,29 +90,29 @@ def main(arguments: Sequence[str]) -> int:
         Exit code: 0 for success, 1 for a fault in the task or its inputs, 2 for a wrong command line.
     """
     parser = _parser()
-    given = parser.parse_args([argument for argument in arguments if ":=" not in argument])
-    if (given.explain or given.schema) and given.script is not None and str(given.script) != ".":
-        given.states, given.templates = (
-            directories_from(str(given.script)),
-            given.states,
+    args = parser.parse_args([argument for argument in arguments if ":=" not in argument])
+    if (args.explain or args.schema) and args.script is not None and str(args.script) != ".":
+        args.states, args.templates = (
+            directories_from(str(args.script)),
+            args.states,
         )  # without a script, the positional arguments move up
-    if given.script is None and not given.explain and not given.schema:
+    if args.script is None and not args.explain and not args.schema:
         parser.error("the script is missing; only --explain and --schema work without one")
     try:
-        states = default_folders.states_folders(given.states or [])
-        templates = default_folders.templates_folders(given.templates or [])
+        states = default_folders.states_folders(args.states or [])
+        templates = default_folders.templates_folders(args.templates or [])
         catalogue = StateCatalogue(states)
         for folder in catalogue.empty_directories:
             print(no_states_in(folder), file=sys.stderr)
-        if given.explain or given.schema:
-            print(_about_language(given, catalogue, TemplateCatalogue(templates)))
+        if args.explain or args.schema:
+            print(_about_language(args, catalogue, TemplateCatalogue(templates)))
             return 0
-        script = default_folders.task_script(given.script)
-        known = names_of_installation(given.config, given.moveit_config)
-        if given.check or given.graph:
-            print(_checked(given, check_task(script, states, templates, known)))
+        script = default_folders.task_script(args.script)
+        known = names_of_installation(args.config, args.moveit_config)
+        if args.check or args.graph:
+            print(_checked(args, check_task(script, states, templates, known)))
         else:
-            output = given.output or generator.default_output_directory()
+            output = args.output or generator.default_output_directory()
             print(construct_task(script, states, templates, output, known)[1])
     except (TaskFault, GenerationError, GraphError, StateSourceError, UnknownNameError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
@@ -162,23 +162,23 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _checked(given: argparse.Namespace, task: TaskSpec) -> str:
+def _checked(args: argparse.Namespace, task: TaskSpec) -> str:
     """Draws a checked task if requested, and returns the message to print."""
-    if given.graph:
-        task_graph.write(task, given.graph)
-        return str(given.graph)
+    if args.graph:
+        task_graph.write(task, args.graph)
+        return str(args.graph)
     count = len(list(task.root.leaf_states()))
-    return f"{given.script}: task '{task.name}' is in order, {count} state{'' if count == 1 else 's'}"
+    return f"{args.script}: task '{task.name}' is in order, {count} state{'' if count == 1 else 's'}"
 
 
-def _about_language(given: argparse.Namespace, states: StateCatalogue, templates: TemplateCatalogue) -> str:
-    if given.schema:
+def _about_language(args: argparse.Namespace, states: StateCatalogue, templates: TemplateCatalogue) -> str:
+    if args.schema:
         return json.dumps(task_schema(states, templates), indent=2)
-    state, template = states.resolve(given.explain), templates.get(given.explain)
+    state, template = states.resolve(args.explain), templates.get(args.explain)
     if state is None and template is None:
         raise UnknownNameError(
-            f"'{given.explain}' is neither a state nor a template; states: {', '.join(states.names())}; templates: "
-            f"{', '.join(templates.names())}{nearest(given.explain, [*states.names(), *templates.names()])}"
+            f"'{args.explain}' is neither a state nor a template; states: {', '.join(states.names())}; templates: "
+            f"{', '.join(templates.names())}{nearest(args.explain, [*states.names(), *templates.names()])}"
         )
     pages = [] if state is None else [explain(states.get(state))]
     return "\n\n".join([*pages, *([] if template is None else [explain_template(template)])])

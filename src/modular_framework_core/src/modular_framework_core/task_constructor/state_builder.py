@@ -38,8 +38,8 @@ class StateBuilder:
         """Returns the fields of a state with known keys only. Unknown keys and a missing source add faults."""
         source = self._source_without_faults(value_of(body, "source"))
         if source is None:  # unknown options
-            given = [key for key in body.entries if key == "source" or intended_key(key, ["source"]) is None]
-            body = corrected_keys(body, [*_RESERVED, *given], f"state '{label}': key", self._faults)
+            other_keys = [key for key in body.entries if key == "source" or intended_key(key, ["source"]) is None]
+            body = corrected_keys(body, [*_RESERVED, *other_keys], f"state '{label}': key", self._faults)
         else:
             free = [key for key in body.entries if source.takes_any_option and _is_argument(key)]
             what = f"state '{label}' ({source.name}): key"
@@ -75,8 +75,8 @@ class StateBuilder:
         source = self._state_source(body, label)
         if source is None:
             return None, None
-        given = {key: value for key, value in body.entries.items() if key not in _RESERVED}
-        options = {**self._options_from_params(label, body, scope, source), **given}
+        own_options = {key: value for key, value in body.entries.items() if key not in _RESERVED}
+        options = {**self._options_from_params(label, body, scope, source), **own_options}
         what = f"state '{label}' ({source.name}): option"
         faults_before = len(self._faults)
         self._check_imports(label, body, source)
@@ -84,9 +84,9 @@ class StateBuilder:
             if option.required and option.name not in options:
                 self._faults.add(location, f"{what} '{option.name}' is missing; it has no default")
             elif option.name in options and option.name not in STATE_KEYS:
-                wrong = option_fault(option.type, options[option.name])
-                if wrong is not None:
-                    self._faults.add(wrong[0].location, f"{what} '{option.name}' {wrong[1]}")
+                fault = option_fault(option.type, options[option.name])
+                if fault is not None:
+                    self._faults.add(fault[0].location, f"{what} '{option.name}' {fault[1]}")
         self._faults.harmless += len(self._faults) - faults_before
         for key in STATE_KEYS:
             if key in options:

@@ -202,8 +202,8 @@ class TaskBuilder:
         if node is None:
             return [], []
         if not isinstance(node, Sequence) or not node.items:
-            found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
-            self._faults.add(node.location, f"states must be a list of '- Label: {{source: ...}}', found {found}")
+            kind = "an empty list" if isinstance(node, Sequence) else kind_of(node)
+            self._faults.add(node.location, f"states must be a list of '- Label: {{source: ...}}', found {kind}")
             return [], []
         entries: list[tuple[str, SourceLocation, Mapping]] = []
         labels: list[str] = []
@@ -227,11 +227,11 @@ class TaskBuilder:
         return entries, labels
 
     def _child(
-        self, label: str, location: SourceLocation, body: Mapping, outer: ParamsScope, parent_type: str
+        self, label: str, location: SourceLocation, body: Mapping, outer_scope: ParamsScope, parent_type: str
     ) -> tuple[ChildSpec | None, ChildLinks]:
         is_machine = "states" in body.entries or bool(self._headers.template_named(value_of(body, "source")))
         params = value_of(body, "params") if is_machine else body.entries.get("params")
-        scope = outer.inner(params_of(params, self._faults), self._faults)
+        scope = outer_scope.inner(params_of(params, self._faults), self._faults)
         body = self._resolved(body, scope, is_machine=is_machine)
         spec: ChildSpec | None
         outcomes: tuple[str, ...] | None

@@ -129,5 +129,5 @@ def _remapped_keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
 
 def declared_keys(state: StateSpec, key: str) -> tuple[str, ...] | None:
     """Returns the userdata keys under one of input_keys, output_keys and io_keys of a state; None if unknown."""
-    given = None if key in state.source.own_keys else state.options.get(key)
-    return tuple(given) if isinstance(given, (list, tuple)) else state.source.default_names(key)
+    option_value = None if key in state.source.own_keys else state.options.get(key)
+    return tuple(option_value) if isinstance(option_value, (list, tuple)) else state.source.default_names(key)

@@ -28,15 +28,15 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page about the robot")
 
 
-def _check(given: argparse.Namespace) -> int:
-    folder = folder_of(given.package)
+def _check(args: argparse.Namespace) -> int:
+    folder = folder_of(args.package)
     checked = read_and_check(folder)
     faults = checked.faults
     for fault in faults:
         print(fault)
-    if given.html is not None:
+    if args.html is not None:
         try:
-            given.html.write_text(page_text(checked), encoding="utf-8")
+            args.html.write_text(page_text(checked), encoding="utf-8")
         except OSError as error:
             raise SetupError(f"--html: {error}; name a writable file") from error
     count = f"{len(faults)} fault{'' if len(faults) == 1 else 's'}" if faults else "no fault"

@@ -36,9 +36,9 @@ class Command:
         """Runs the command with the given arguments, by default those of the process; returns the exit code."""
         parser = argparse.ArgumentParser(prog=self.name, description=self.description)
         self.add_arguments(parser)
-        given = parser.parse_args(arguments)
+        args = parser.parse_args(arguments)
         try:
-            return self.execute(given)
+            return self.execute(args)
         except (SetupError, PlanningError, OSError) as error:
             print(f"{self.name}: {error}", file=sys.stderr)
             return 1
@@ -50,11 +50,11 @@ def add_sampling_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, help="seed of the random states; default: 1")
 
 
-def check_sampling(given: argparse.Namespace) -> None:
+def check_sampling(args: argparse.Namespace) -> None:
     """Checks the sampling arguments.
 
     Raises:
         CreationError: A value is not allowed.
     """
-    if given.samples < 1:
-        raise CreationError(f"--samples is {given.samples}; allowed: 1 or more, {SAMPLES} is usual")
+    if args.samples < 1:
+        raise CreationError(f"--samples is {args.samples}; allowed: 1 or more, {SAMPLES} is usual")

@@ -57,24 +57,24 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="do not ask; confirm the parts found")
 
 
-def _create(given: argparse.Namespace) -> int:
-    if not given.urdf.is_file():
-        raise CreationError(f"{given.urdf} is not a file; give the path of a URDF or xacro file")
-    check_sampling(given)
-    interactive = not given.yes and sys.stdin.isatty()
+def _create(args: argparse.Namespace) -> int:
+    if not args.urdf.is_file():
+        raise CreationError(f"{args.urdf} is not a file; give the path of a URDF or xacro file")
+    check_sampling(args)
+    interactive = not args.yes and sys.stdin.isatty()
     choices = Choices(
-        _name(given, interactive), [tuple(chain) for chain in given.arm], given.gripper, given.samples, given.seed,
-        given.author, given.email,
+        _name(args, interactive), [tuple(chain) for chain in args.arm], args.gripper, args.samples, args.seed,
+        args.author, args.email,
     )  # fmt: skip
-    refuse_existing(given.into, (choices.robot_package, choices.config_package))
-    source = read_source(given.urdf, _mappings(given.arguments), choices.robot_package)
+    refuse_existing(args.into, (choices.robot_package, choices.config_package))
+    source = read_source(args.urdf, _mappings(args.arguments), choices.robot_package)
     bar = ProgressBar("self collisions", sys.stderr)
 
     def confirm(tree: RobotTree, parts: RobotParts) -> RobotParts:
         return confirm_parts(tree, parts, choices) if interactive else parts
 
     plan = make_plan(source, choices, confirm, bar.show)
-    folders = write_packages(plan, given.into)
+    folders = write_packages(plan, args.into)
     _report(plan, folders)
     faults = check_package(folders[1])
     for fault in faults:
@@ -90,9 +90,9 @@ def _mappings(arguments: Sequence[str]) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
-def _name(given: argparse.Namespace, interactive: bool) -> str:
-    name = given.name or _name_in(given.urdf)
-    if not given.name and interactive:
+def _name(args: argparse.Namespace, interactive: bool) -> str:
+    name = args.name or _name_in(args.urdf)
+    if not args.name and interactive:
         name = ask_name(name)
     if not _NAME.fullmatch(name):
         raise CreationError(f"--name is '{name}'; allowed: lower-case letters, digits and '_', a letter first")

@@ -57,22 +57,22 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--write", action="store_true", help="replace the matrix in the SRDF; default: print it")
 
 
-def _compute(given: argparse.Namespace) -> int:
-    check_sampling(given)
-    folder = folder_of(given.package)
+def _compute(args: argparse.Namespace) -> int:
+    check_sampling(args)
+    folder = folder_of(args.package)
     with packages_beside(folder):
         robot = _load(folder)
-    origin = f"{given.samples} random states, seed {given.seed}, exact meshes"
-    if given.write:
+    origin = f"{args.samples} random states, seed {args.seed}, exact meshes"
+    if args.write:
         _updated_srdf(robot, {}, origin)  # raises before the computation if the file cannot be changed
     bar = ProgressBar("self collisions", sys.stderr)
-    verdicts = find_verdicts(robot.model, hands_of(robot.model), given.samples, given.seed, bar.show)
+    verdicts = find_verdicts(robot.model, hands_of(robot.model), args.samples, args.seed, bar.show)
     disabled = {verdict.pair: verdict.reason for verdict in verdicts if verdict.reason}
     for pair, reason in robot.model.semantics.disabled_pairs.items():
         first, second = sorted(pair) if len(pair) == 2 else 2 * tuple(pair)
         if reason not in REASONS:
             disabled.setdefault((first, second), reason)
-    if given.write:
+    if args.write:
         robot.srdf.write_text(_updated_srdf(robot, disabled, origin), encoding="utf-8")
     else:
         print(matrix_text(disabled), end="")

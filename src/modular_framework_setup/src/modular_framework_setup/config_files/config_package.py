@@ -107,13 +107,18 @@ def packages_beside(folder: Path) -> Iterator[None]:
 
     The packages need not be built. Siblings are in the package's parent folder or one level below it.
     """
-    own = next((parent for parent in (folder, *folder.parents) if (parent / "package.xml").is_file()), folder).resolve()
+    own_folder = next(
+        (parent for parent in (folder, *folder.parents) if (parent / "package.xml").is_file()), folder
+    ).resolve()
     old_path = os.environ.get("ROS_PACKAGE_PATH")
     known = {Path(path).resolve() for path in _package_paths()}
-    if own in known:
+    if own_folder in known:
         yield
         return
-    added = [own, *(file.parent for depth in ("*", "*/*") for file in own.parent.glob(f"{depth}/package.xml"))]
+    added = [
+        own_folder,
+        *(file.parent for depth in ("*", "*/*") for file in own_folder.parent.glob(f"{depth}/package.xml")),
+    ]
     os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join([*map(str, added), *([old_path] if old_path else [])])
     try:
         yield
@@ -171,8 +176,8 @@ def read_config_package(folder: Path, faults: FaultList) -> ConfigPackage:
     """
     name = package_name(folder)
     settings = _Settings(folder, faults)
-    own = folder / "config" / f"{name.removesuffix('_moveit_config')}.urdf.xacro"
-    urdf, urdf_package = (own, None) if own.is_file() else settings.urdf()
+    default_urdf = folder / "config" / f"{name.removesuffix('_moveit_config')}.urdf.xacro"
+    urdf, urdf_package = (default_urdf, None) if default_urdf.is_file() else settings.urdf()
     srdf = settings.srdf()
     if urdf is None and not settings.names_urdf:
         urdf = _only(folder, ("*.urdf.xacro", "*.urdf"), "robot description", faults)

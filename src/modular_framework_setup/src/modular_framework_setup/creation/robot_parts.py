@@ -195,7 +195,7 @@ def _distinct(prefixes: Sequence[str], noun: str) -> list[str]:
     sides = [_side(prefix, prefixes) for prefix in prefixes]
     if all(sides) and len(set(sides)) == len(sides):
         return [f"{side}_{noun}" for side in sides]
-    return [f"{noun}_{number}" for number in range(1, len(prefixes) + 1)]
+    return [f"{noun}_{index}" for index in range(1, len(prefixes) + 1)]
 
 
 def _side(prefix: str, prefixes: Sequence[str]) -> str:
@@ -249,9 +249,9 @@ def _found_arms(tree: RobotTree, grippers: tuple[Gripper, ...]) -> RobotParts:
     paths = [[joint.name for joint in reversed(list(tree.up(link))) if is_driven(joint)] for link, _ in ends]
     shared = {name for path in paths for name in path if sum(name in other for other in paths) > 1}
     chains = [
-        (own, *end)
+        (own_joints, *end)
         for path, end in zip(paths, ends, strict=True)
-        if len(own := [name for name in path if name not in shared]) >= MIN_ARM_JOINTS
+        if len(own_joints := [name for name in path if name not in shared]) >= MIN_ARM_JOINTS
     ]
     if not chains:
         joints = [joint.name for joint in tree.robot.joints if is_driven(joint)]
@@ -259,10 +259,10 @@ def _found_arms(tree: RobotTree, grippers: tuple[Gripper, ...]) -> RobotParts:
             f"no arm is found: no serial chain of {MIN_ARM_JOINTS} or more joints among {', '.join(joints) or 'none'}"
             "; name the arm by --arm BASE TIP"
         )
-    names = _distinct([_common_prefix(own) for own, _, _ in chains], "arm")
+    names = _distinct([_common_prefix(own_joints) for own_joints, _, _ in chains], "arm")
     arms = tuple(
-        Arm(name, tree.joints[own[0]].parent, tip_of(tree, link), tuple(own), gripper)
-        for name, (own, link, gripper) in zip(names, chains, strict=True)
+        Arm(name, tree.joints[own_joints[0]].parent, tip_of(tree, link), tuple(own_joints), gripper)
+        for name, (own_joints, link, gripper) in zip(names, chains, strict=True)
     )
     used = {joint for arm in arms for joint in arm.joints}
     torso = [joint.name for joint in tree.robot.joints if joint.name in shared and joint.name not in used]
