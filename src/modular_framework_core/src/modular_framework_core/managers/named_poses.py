@@ -113,7 +113,7 @@ def parse_pose(entry: Entry) -> NamedPose:
     if "position" in fields or "orientation" in fields:
         unknown = sorted(set(fields) - {"position", "orientation"})
         if unknown:
-            raise entry.fault(f"unknown keys {unknown}; allowed are reference_frame, position and orientation")
+            raise entry.fault(f"unknown keys {unknown}; allowed: reference_frame, position and orientation")
         return NamedPose(entry.key, frame, {"": parse_placement(entry)})
     if not fields:
         raise entry.fault("contains no pose; give position and orientation, once or for each end-effector link")

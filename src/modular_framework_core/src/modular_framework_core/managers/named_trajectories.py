@@ -58,7 +58,7 @@ def parse_waypoint(entry: Entry) -> Waypoint:
     fields = {child.key: child for child in entry.children()}
     unknown = sorted(set(fields) - set(WAYPOINT_KEYS))
     if unknown:
-        raise entry.fault(f"unknown keys {unknown}; allowed are {list(WAYPOINT_KEYS)}")
+        raise entry.fault(f"unknown keys {unknown}; allowed: {list(WAYPOINT_KEYS)}")
     missing = [key for key in ("name", "interpolate_time") if key not in fields]
     if missing:
         raise entry.fault(f"the keys {missing} are missing; every waypoint needs 'name' and 'interpolate_time'")

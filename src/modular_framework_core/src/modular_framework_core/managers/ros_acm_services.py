@@ -157,7 +157,7 @@ class AcmServices(ManagerServices):
                 self.manager.reinitialise()
                 return ""
             case _:
-                raise AcmError(f"got action {action}, allowed are ADD_ENTRY=0, DELETE_ENTRY=1, REINIT=2")
+                raise AcmError(f"got action {action}; allowed: ADD_ENTRY=0, DELETE_ENTRY=1, REINIT=2")
 
     def _get_modified(self, request: Any) -> GetModifiedACMResponse:
         self._remove_deleted_objects()
@@ -181,7 +181,7 @@ class AcmServices(ManagerServices):
                 return self.manager.allow_object_collision(request.objects, request.allow_collision)
             case _:
                 raise AcmError(
-                    f"got modification {request.modification}, allowed are NOTHING=0, "
+                    f"got modification {request.modification}; allowed: NOTHING=0, "
                     "MANIPULATOR_SELF_COLLISION=1, MANIPULATOR_OBJECT_COLLISION=2"
                 )
 
@@ -209,7 +209,7 @@ class AcmServices(ManagerServices):
                 )
             case _:
                 raise AcmError(
-                    f"got modification {request.modification}, allowed are ROBOT_SELF_COLLISION=0, "
+                    f"got modification {request.modification}; allowed: ROBOT_SELF_COLLISION=0, "
                     "ROBOT_OBJECT_COLLISION=1"
                 )
 

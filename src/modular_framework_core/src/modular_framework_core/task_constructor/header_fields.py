@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads single fields of a machine or state.
 
-Each function returns the value, or adds a fault and returns None. ``what`` names the field in messages.
+Each function returns the value, or adds a fault and returns None.
 """
 
 from __future__ import annotations
@@ -19,7 +19,13 @@ _NODE_NAME = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
 
 
 def text(node: Node, what: str, faults: FaultList) -> str | None:
-    """Returns a nonempty text."""
+    """Returns a nonempty text.
+
+    Args:
+        node: Value of the field.
+        what: Name of the field, for messages.
+        faults: Receives the faults.
+    """
     if isinstance(node, Scalar) and isinstance(node.value, str) and node.value:
         return node.value
     faults.add(node.location, f"{what} must be a text, found {kind_of(node)}")
@@ -27,7 +33,13 @@ def text(node: Node, what: str, faults: FaultList) -> str | None:
 
 
 def identifier(node: Node, what: str, faults: FaultList) -> str | None:
-    """Returns a text that is a valid name of a Python module and class."""
+    """Returns a text that is a valid name of a Python module and class.
+
+    Args:
+        node: Value of the field.
+        what: Name of the field, for messages.
+        faults: Receives the faults.
+    """
     name = text(node, what, faults)
     if name is None:
         return None
