@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Starter of the manipulator's own node."""
+"""Runs the node that drives the manipulator."""
 
 from modular_framework_ros.node_start import run_node
 
