@@ -21,10 +21,10 @@ BOOLEANS = ("true", "false", "1", "0")
 
 
 class ArgumentError(roslaunch.core.RLException):  # type: ignore[misc]
-    """Arguments of a launch file are wrong.
+    """Arguments of a launch file are invalid.
 
     Attributes:
-        faults: A sentence for each.
+        faults: One sentence per fault.
     """
 
     def __init__(self, path: str, faults: Sequence[str]) -> None:
