@@ -329,6 +329,12 @@ CASES = [
     in_parameters(
         "/move_group/trajectory_execution/joints_allowed_start_tolerance/elbo_joint", 0.1, "did you mean 'elbow_joint'"
     ),
+    in_parameters(f"{PIPELINE}/arm/default_planner_config", "RRTConect", "no planner.*did you mean 'RRTConnect'"),
+    in_parameters(f"{PIPELINE}/default_planner_config", "RRTConect", "no planner.*did you mean 'RRTConnect'"),
+    in_parameters(f"{PIPELINE}/arm/planner_configs", ["RRT", "PRMM"], "no planner 'PRMM'"),
+    in_parameters(
+        "/move_group/planning_pipelines/stomp/stomp_moveit/num_rolouts", 5, "names no parameter.*mean 'num_rollouts'"
+    ),
     in_parameters("/collision_detector", "Bulet", "'Bulet' is not known.*did you mean 'Bullet'"),
     in_parameters("/move_group/collision_detector", "fcll", "'fcll' is not known.*did you mean 'FCL'"),
     in_parameters("/move_group/capabilities", "move_group/TfPublishr", "did you mean 'move_group/TfPublisher'"),

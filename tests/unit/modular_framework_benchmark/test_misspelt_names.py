@@ -57,6 +57,8 @@ def test_the_experiments_that_the_cases_change_are_in_order(content: dict, tmp_p
         (("parameters", f"{PIPELINE}/planner_configs"), {"Mine": {"type": "geometric::RRT", "range": 0.2}}),
         (("parameters", GENERATOR), {"yaw_step": 0.5}),
         (("parameters", "/robot_description_planning"), {"joint_limits": {"elbow_joint": {"max_velocity": 1.0}}}),
+        (("parameters", f"{PIPELINE}/arm"), {"default_planner_config": "None", "planner_configs": ["RRT", "PRM"]}),
+        (("parameters", "/move_group/planning_pipelines/stomp/stomp_moveit"), {"num_rollouts": 5}),
         (("parameters", "/move_group/capabilities"), "move_group/TfPublisher"),
         (
             ("parameters", "/move_group/moveit_controller_manager"),

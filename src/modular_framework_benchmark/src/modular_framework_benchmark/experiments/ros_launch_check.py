@@ -15,6 +15,7 @@ from modular_framework_benchmark.experiments.ros_move_group_names import (
     move_group_faults,
     resolved_names,
 )
+from modular_framework_benchmark.experiments.ros_pipeline_names import PipelineNames, unknown_name
 from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
 from modular_framework_core.files import default_folders
 from modular_framework_core.files.faults import TaskFault, listing, nearest
@@ -31,7 +32,6 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
     ResolvedPlanner,
     UnknownNameError,
 )
-from modular_framework_ros.parameter_declarations import node_declaration
 
 MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
 PIPELINES = "planning_pipelines"
@@ -96,13 +96,13 @@ class LaunchCheck:
         yield from (LaunchFault(f"{parent}{name}", text) for name, text in broken.items())
         for name, value in self._names.naming("pipeline"):
             if value not in registry.specs:
-                yield _unknown(name, "pipeline", value, tuple(registry.specs))
+                yield unknown_name(name, "pipeline", value, tuple(registry.specs))
         group = str(self.launch.parameters.get("/arm_group_name", ""))
         for name, value in self._names.naming("planner"):
             try:
                 found = registry.resolve(value, group)
             except UnknownNameError as error:
-                yield _unknown(name, error.what, error.name, error.known)
+                yield unknown_name(name, error.what, error.name, error.known)
                 continue
             except ModelError:
                 continue  # noted above
@@ -111,40 +111,12 @@ class LaunchCheck:
                     yield LaunchFault(name, text)
             for text in registry.faults(found):
                 yield LaunchFault(name, f"planner '{value}': {text.replace('; it is ignored', '')}")
-        yield from self._pipeline_faults(registry, parent)
-
-    def _pipeline_faults(self, registry: PlannerRegistry, parent: str) -> Iterator[LaunchFault]:
-        """Yields what is wrong with the pipelines' parameters that are given."""
-        declared = node_declaration("modular_framework_planning", "planning_pipeline")
-        assert declared is not None
+        there = {name for name in registry.specs if f"{parent}{name}/planning_plugin" in self.launch.parameters}
+        names = PipelineNames(
+            parent, (*self._pipelines, *sorted(there - {*self._pipelines})), self._robot.groups, registry
+        )
         for name, value in leaves(self._given).items():
-            if not name.startswith(parent):
-                continue
-            pipeline, key, *rest = [*name.removeprefix(parent).split("/"), ""]
-            known = (*declared.parameters, *self._robot.groups)
-            if pipeline not in self._pipelines and f"{parent}{pipeline}/planning_plugin" not in self.launch.parameters:
-                yield _unknown(name, "pipeline", pipeline, self._pipelines)
-            elif key not in known:
-                yield LaunchFault(
-                    name, f"pipeline '{pipeline}' has no parameter '{key}'; {listing(known)}{nearest(key, known)}"
-                )
-            elif key == "planner_configs" and len(rest) > 2:
-                yield from self._setting_faults(registry, name, value, rest[:2])
-            elif key in declared.parameters and not rest[1:] and declared.parameters[key].fault(value):
-                yield LaunchFault(name, f"parameter '{name}' {declared.parameters[key].fault(value)}")
-
-    def _setting_faults(
-        self, registry: PlannerRegistry, name: str, value: Any, names: list[str]
-    ) -> Iterator[LaunchFault]:
-        planner, key = names
-        pipeline = name.split("/")[3]
-        try:
-            found = registry.resolve(planner, "", pipeline)
-        except UnknownNameError as error:
-            yield _unknown(name, error.what, error.name, error.known)
-            return
-        for text in registry.faults(found, {key: value}):
-            yield LaunchFault(name, text.replace("; it is ignored", ""))
+            yield from names.faults(name, value)
 
     @property
     def _robot(self) -> RobotNames:
@@ -156,13 +128,13 @@ class LaunchCheck:
         robot = self._robot
         for name, value in self._names.naming("group") if robot.groups else ():
             if value not in robot.groups:
-                yield _unknown(name, "planning group", value, robot.groups)
+                yield unknown_name(name, "planning group", value, robot.groups)
         if robot.fault:
             yield LaunchFault("robot_urdf_file", f"argument 'robot_urdf_file': {robot.fault}", ARGUMENTS)
             return
         for name, value in self._names.naming("joint") if robot.joints else ():
             if value not in robot.joints:
-                yield _unknown(name, "joint", value, robot.joints)
+                yield unknown_name(name, "joint", value, robot.joints)
         yield from self._names.below_trees(self._given, robot.by_kind())
 
     def _kinematics_faults(self) -> Iterator[LaunchFault]:
@@ -174,11 +146,11 @@ class LaunchCheck:
             if not found:
                 continue
             if groups and group not in groups:
-                yield _unknown(name, "planning group", group, groups)
+                yield unknown_name(name, "planning group", group, groups)
             elif key.startswith("kinematics_") and key not in KEYS:
-                yield _unknown(name, "key of kinematics.yaml", key, KEYS)
+                yield unknown_name(name, "key of kinematics.yaml", key, KEYS)
             elif key == "kinematics_solver" and not is_known_solver(str(value)):
-                yield _unknown(name, key, str(value), (NUMERIC, *PLUGINS))
+                yield unknown_name(name, key, str(value), (NUMERIC, *PLUGINS))
 
     def resolved_parameters(self) -> dict[str, Any]:
         """Returns the parameters with the defaults of those that are not set; equal for launches that run the same."""
@@ -278,11 +250,6 @@ def _task_faults(
     except (OSError, ValueError) as error:
         return (LaunchFault("", f"the task cannot be read: {error}", "task"),)
     return ()
-
-
-def _unknown(name: str, what: str, found: str, known: tuple[str, ...]) -> LaunchFault:
-    text = f"there is no {what} '{found}'; {listing(known)}{nearest(found, known)}"
-    return LaunchFault(name, f"parameter '{name}': {text}" if name else text)
 
 
 def launch_faults(path: str, arguments: Sequence[str]) -> list[str]:

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Looks up the parameters of planning pipelines that an experiment gives, and the planners that they name."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from modular_framework_core.files.faults import listing, nearest
+from modular_framework_core.launching.declared_trees import tree_fault
+from modular_framework_core.launching.ros_declared_names import LaunchFault
+from modular_framework_planning.planning_pipeline.planner_registry import PlannerRegistry, UnknownNameError
+from modular_framework_ros.parameter_declarations import existing_declaration
+
+PACKAGE = "modular_framework_planning"
+PLANNER_KEYS = ("default_planner_config", "planner_configs")
+"""Keys of a pipeline or of a group in it that name planners."""
+NO_PLANNER = ("", "None")
+"""Names that stand for the default; MoveIt's Setup Assistant writes the latter."""
+
+
+@dataclass(frozen=True, slots=True)
+class PipelineNames:
+    """Checks parameters below planning_pipelines.
+
+    Attributes:
+        parent: Whole name of planning_pipelines, with a slash at the end.
+        pipelines: Names of the pipelines.
+        groups: Planning groups of the robot.
+        registry: Planners of the launch.
+    """
+
+    parent: str
+    pipelines: Collection[str]
+    groups: Collection[str]
+    registry: PlannerRegistry
+
+    def faults(self, name: str, value: Any) -> Iterator[LaunchFault]:
+        """Yields what is wrong with a parameter; nothing if it is not below planning_pipelines."""
+        if not name.startswith(self.parent):
+            return
+        declared = existing_declaration(PACKAGE, "planning_pipeline").parameters
+        pipeline, key, *rest = [*name.removeprefix(self.parent).split("/"), ""]
+        known = (*declared, *self.groups)
+        if pipeline not in self.pipelines:
+            yield unknown_name(name, "pipeline", pipeline, self.pipelines)
+        elif key not in known:
+            text = f"pipeline '{pipeline}' has no parameter '{key}'; {listing(known)}{nearest(key, known)}"
+            yield LaunchFault(name, text)
+        elif key == "planner_configs" and len(rest) > 2:
+            yield from self._setting_faults(name, value, pipeline, rest)
+        elif (key in self.groups and rest[0] in PLANNER_KEYS) or key == PLANNER_KEYS[0]:
+            yield from self._planner_faults(name, value, pipeline, key if key in self.groups else "")
+        elif key in declared and declared[key].below and rest[0]:
+            below = existing_declaration(*declared[key].below.split("/"))
+            text = tree_fault("/".join(rest).rstrip("/"), value, below, {})
+            if text:
+                yield LaunchFault(name, f"parameter '{name}' {text}")
+        elif key in declared and not rest[1:] and declared[key].fault(value):
+            yield LaunchFault(name, f"parameter '{name}' {declared[key].fault(value)}")
+
+    def _planner_faults(self, name: str, value: Any, pipeline: str, group: str) -> Iterator[LaunchFault]:
+        """Yields the planners in a value that the pipeline does not have."""
+        for planner in value if isinstance(value, list) else [value]:
+            if str(planner) in NO_PLANNER:
+                continue
+            try:
+                self.registry.resolve(str(planner), group, pipeline)
+            except UnknownNameError as error:
+                yield unknown_name(name, error.what, error.name, error.known)
+
+    def _setting_faults(self, name: str, value: Any, pipeline: str, rest: list[str]) -> Iterator[LaunchFault]:
+        try:
+            found = self.registry.resolve(rest[0], "", pipeline)
+        except UnknownNameError as error:
+            yield unknown_name(name, error.what, error.name, error.known)
+            return
+        for text in self.registry.faults(found, {rest[1]: value}):
+            yield LaunchFault(name, text.replace("; it is ignored", ""))
+
+
+def unknown_name(name: str, what: str, found: str, known: Collection[str]) -> LaunchFault:
+    """Returns the fault of a parameter whose value names nothing.
+
+    Args:
+        name: Parameter; empty if it is none.
+        what: Kind of thing that it names.
+        found: Its value.
+        known: Names that there are.
+    """
+    text = f"there is no {what} '{found}'; {listing(known)}{nearest(found, known)}"
+    return LaunchFault(name, f"parameter '{name}': {text}" if name else text)
