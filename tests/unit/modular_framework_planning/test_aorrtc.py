@@ -69,14 +69,16 @@ def test_a_path_is_shorter_than_its_bound(small: RobotModel, seed: int) -> None:
     scene = scene_with(small, WALL, COVER)
     first = RrtConnect(problem_in(scene, seed), GOAL[None], STEP, RANGE, is_weighted=False).run()
     assert first is not None
-    bound = 0.9 * path_length(first)
-    search = RrtConnect(problem_in(scene, seed), GOAL[None], STEP, RANGE, 3000, is_weighted=False, bound=bound)
+    length_bound = 0.9 * path_length(first)
+    search = RrtConnect(
+        problem_in(scene, seed), GOAL[None], STEP, RANGE, 3000, is_weighted=False, length_bound=length_bound
+    )
     second = search.run()
-    assert second is None or path_length(second) <= bound + 1e-9
+    assert second is None or path_length(second) <= length_bound + 1e-9
 
 
 def test_no_path_is_shorter_than_the_straight_way(small: RobotModel) -> None:  # noqa: F811
     problem = problem_in(scene_with(small, WALL, COVER))
-    bound = 1.0001 * float(np.linalg.norm(GOAL - problem.start_values))
-    search = RrtConnect(problem, GOAL[None], STEP, RANGE, 500, is_weighted=False, bound=bound)
+    length_bound = 1.0001 * float(np.linalg.norm(GOAL - problem.start_values))
+    search = RrtConnect(problem, GOAL[None], STEP, RANGE, 500, is_weighted=False, length_bound=length_bound)
     assert search.run() is None and search.extensions == 500

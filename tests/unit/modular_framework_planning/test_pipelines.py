@@ -146,7 +146,7 @@ def test_projections_and_segment_lengths_of_the_group_are_honoured(model: RobotM
 
 def test_settings_of_planners_are_checked() -> None:
     assert parameter_faults("RRTConnect", {"type": "geometric::RRTConnect", "range": "0.0"}) == []
-    assert "allowed are enforce_constrained_state_space" in parameter_faults("RRTConnect", {"rnge": 1.0})[0]
+    assert "allowed: enforce_constrained_state_space" in parameter_faults("RRTConnect", {"rnge": 1.0})[0]
     assert "cannot be read" in parameter_faults("RRT", {"goal_bias": "much"})[0]
     assert "cannot be set" in parameter_faults("BFMT", {"optimality": 1})[0]
     assert parameter_faults("SPARS", {"anything": 1}) == [], "nothing is known of a planner that is not there"

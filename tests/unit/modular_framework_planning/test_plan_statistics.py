@@ -19,7 +19,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.plan_statistics import CheckCounts, PlanStatistics, Refusals
-from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, SideBySide
+from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect
 from modular_framework_planning.planning_interface.phase_times import SEARCH, SETUP, PhaseTimes
 from modular_framework_planning.planning_interface.planning_request import (
     JointGoal,
@@ -94,13 +94,13 @@ def test_an_edge_that_the_bounds_leave_open_counts_as_undecided_and_once(small: 
 def test_searches_side_by_side_are_counted_together(small: RobotModel) -> None:
     problem = problem_in(scene_with(small, WALL, COVER))
     searches = [
-        RrtConnect(replace(problem, rng=rng), GOAL[None], 0.02, 0.5, number=number)
-        for number, rng in enumerate([problem.rng, *problem.rng.spawn(2)])
+        RrtConnect(replace(problem, rng=rng), GOAL[None], 0.02, 0.5, search_index=index)
+        for index, rng in enumerate([problem.rng, *problem.rng.spawn(2)])
     ]
-    both = SideBySide(problem, searches)
+    both = ParallelSearch(problem, searches)
     assert both.run() is not None
-    assert problem.checker.check_counts[ASKED] == both.states
-    assert problem.checker.check_counts[TOUCHING_EXACTLY] <= both.states
+    assert problem.checker.check_counts[ASKED] == both.checks
+    assert problem.checker.check_counts[TOUCHING_EXACTLY] <= both.checks
 
 
 def test_a_part_inside_another_one_counts_for_itself(small: RobotModel) -> None:

@@ -22,7 +22,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 from modular_framework_planning.geometry.shapes import Box, Mesh, Plane, Shape
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planners.rrt_connect import compiled_rrt_connect, rrt_connect
-from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, SideBySide, can_search, reaches
+from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect, can_search, reaches
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import JointGoal, PipelineSettings, PlanningRequest
@@ -128,14 +128,14 @@ def test_of_searches_side_by_side_the_first_path_wins_whatever_the_threads_do(sm
     scene = scene_with(small, WALL, COVER)
     plain = PlainCoalChecker(scene, small.group("all").indices)
 
-    def searches(seed: int) -> SideBySide:
+    def searches(seed: int) -> ParallelSearch:
         problem = problem_in(scene, seed)
         generators = [problem.rng, *problem.rng.spawn(count - 1)]
-        return SideBySide(
+        return ParallelSearch(
             problem,
             [
-                RrtConnect(replace(problem, rng=rng), GOAL[None], STEP, RANGE, number=number)
-                for number, rng in enumerate(generators)
+                RrtConnect(replace(problem, rng=rng), GOAL[None], STEP, RANGE, search_index=index)
+                for index, rng in enumerate(generators)
             ],
         )
 
@@ -143,11 +143,11 @@ def test_of_searches_side_by_side_the_first_path_wins_whatever_the_threads_do(sm
     for seed in range(6):
         together, again, alone = searches(seed), searches(seed), search(problem_in(scene, seed))
         path = together.run()
-        assert path is not None and np.array_equal(path, again.run()) and together.states == again.states
+        assert path is not None and np.array_equal(path, again.run()) and together.checks == again.checks
         assert alone.run() is not None
         assert plain.path_is_free(problem_in(scene).motion.full_path(path), STEP)
-        fewer += together.states < count * alone.states
-        assert together.states <= count * (alone.states + compiled_rrt_connect.EDGES)
+        fewer += together.checks < count * alone.checks
+        assert together.checks <= count * (alone.checks + compiled_rrt_connect.EDGES_PER_CALL)
     assert fewer > 0, "some search other than the first one found its path earlier"
 
 
@@ -179,10 +179,10 @@ def test_of_searches_side_by_side_the_same_one_wins_whatever_edges_the_bounds_le
         for gap in (5.0e-6, 5.0e-3):  # the bounds leave edges open beside the near wall only
             problem = cube_beside_a_wall(gap, seed)
             searches = [
-                RrtConnect(replace(problem, rng=rng), np.array([[0.8, 0.0]]), 0.002, 0.02, None, False, number)
-                for number, rng in enumerate([problem.rng, *problem.rng.spawn(3)])
+                RrtConnect(replace(problem, rng=rng), np.array([[0.8, 0.0]]), 0.002, 0.02, None, False, index)
+                for index, rng in enumerate([problem.rng, *problem.rng.spawn(3)])
             ]
-            paths.append(SideBySide(problem, searches).run())
+            paths.append(ParallelSearch(problem, searches).run())
             counts = problem.checker.check_counts
             undecided.append(int(counts[ASKED] - counts[FOUND_FREE] - counts[FOUND_TOUCHING]))
         assert undecided[0] > 10 * undecided[1], "the near wall leaves far more edges open"
@@ -198,10 +198,10 @@ def test_searches_side_by_side_end_with_the_time_and_when_cancelled(small: Robot
 
     for problem in (problem_in(scene, seconds=0.2), problem_in(scene, cancelled=cancelled)):
         both = [
-            RrtConnect(replace(problem, rng=rng), UNREACHABLE[None], STEP, RANGE, number=number)
-            for number, rng in enumerate(problem.rng.spawn(2))
+            RrtConnect(replace(problem, rng=rng), UNREACHABLE[None], STEP, RANGE, search_index=index)
+            for index, rng in enumerate(problem.rng.spawn(2))
         ]
-        assert SideBySide(problem, both).run() is None
+        assert ParallelSearch(problem, both).run() is None
 
 
 def test_the_reach_of_a_joint_bounds_how_far_it_moves_what_it_carries(small: RobotModel) -> None:
@@ -248,7 +248,7 @@ def test_an_edge_too_close_for_the_bounds_is_decided_by_the_exact_check(small: R
 def test_a_goal_that_cannot_be_reached_ends_the_search_at_its_limit(small: RobotModel) -> None:
     few, many = (search(problem_in(scene_with(small, WALL)), limit, UNREACHABLE) for limit in (50, 500))
     assert few.run() is None and many.run() is None
-    assert 50 <= few.states < many.states
+    assert 50 <= few.checks < many.checks
 
 
 def test_trees_that_become_too_large_for_their_arrays_are_grown_on(
@@ -256,7 +256,7 @@ def test_trees_that_become_too_large_for_their_arrays_are_grown_on(
 ) -> None:
     scene = scene_with(small, WALL, COVER)
     path = search(problem_in(scene)).run()
-    monkeypatch.setattr(rrt_connect, "ROOM", 2)
+    monkeypatch.setattr(rrt_connect, "INITIAL_TREE_CAPACITY", 2)
     assert path is not None and np.array_equal(search(problem_in(scene)).run(), path)
 
 

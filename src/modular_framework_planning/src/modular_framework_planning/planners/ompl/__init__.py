@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planning pipeline `ompl`: OMPL's geometric planners."""
+"""OMPL's geometric planners, the planning pipeline `ompl`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Searches the joint space of a group with OMPL's geometric planners."""
+"""Joint-space planning of a group with OMPL's geometric planners."""
 
 from __future__ import annotations
 
@@ -29,41 +29,42 @@ from modular_framework_planning.planners.ompl.planner_settings import (
 )
 from modular_framework_planning.planners.ompl.projection import projection_evaluator
 from modular_framework_planning.planners.rrt_connect.aorrtc import Aorrtc
-from modular_framework_planning.planners.rrt_connect.rrt_connect import RrtConnect, SideBySide, can_search
+from modular_framework_planning.planners.rrt_connect.rrt_connect import ParallelSearch, RrtConnect, can_search
 from modular_framework_planning.planning_interface.path_repair import repaired
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem, no_path
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
-CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # of the search for a detour round one edge
-LARGE_GROUP = 10  # joints from which on a search takes long enough for threads, as those of two arms
-MOST_THREADS = 4  # that are chosen; each further search makes the first path come less sooner than the one before
+CONNECTION_ITERATIONS, CONSTRAINED_CONNECTION_STATES = 500, 100  # limits of the search for a detour around one edge
+LARGE_GROUP = 10  # joints of a group, such as two arms, whose searches are long enough for parallel threads
+MAX_THREADS = 4  # default limit, because every additional search saves less time
 ou.setLogLevel(ou.LogLevel.LOG_ERROR)
 
 
 class OmplPlanner:
-    """Samples the joint space of the group.
+    """Plans with OMPL's sampling-based planners.
 
-    Parameters below a planner's configuration or the group: those of the planner (see planner_settings.py),
-    `projection_evaluator`, `longest_valid_segment_fraction` (edges are checked at least that finely, as a share of
-    the extent of the joint space) and `maximum_waypoint_distance` [rad]; `seeded_iterations` of the pipeline.
+    Parameters of a planner configuration or of the group: the planner's settings (see planner_settings.py),
+    `projection_evaluator`, `longest_valid_segment_fraction` (maximum distance between checks along an edge, as a
+    fraction of the extent of the joint space) and `maximum_waypoint_distance` [rad]. Parameter of the pipeline:
+    `seeded_iterations`.
     """
 
     planner_ids = tuple(PLANNERS)
     improving_ids = ANYTIME
     description = "OMPL"
     constrained_planner = NAME
-    """Search that replaces any of them where it cannot keep the path constraints of a request."""
+    """Search that replaces a planner if the planner cannot satisfy the path constraints of a request."""
 
     @staticmethod
     def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:
-        """Says which settings of a planner are unknown or unreadable."""
+        """Returns messages about unknown and unreadable settings of a planner."""
         return parameter_faults(planner_id, settings)
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the shortest of the paths that `attempts` searches find; the straight motion where that is valid.
+        """Returns the straight path to a goal if it is valid, otherwise the shortest path of `attempts` searches.
 
         Raises:
-            PlanningError: no path was found, a setting is wrong, or the planner cannot do what is asked.
+            PlanningError: No path was found, a setting is wrong, or the planner does not support the request.
         """
         start, goals = problem.start_values, problem.goal_states()
         step = edge_step(problem)
@@ -72,64 +73,74 @@ class OmplPlanner:
                 return PlannedPath(np.vstack([start, goal]))
         if problem.constraints is not None and (problem.planner_id == "RRTConnect" or constraints_are_tight(problem)):
             problem.phases.searched_by(NAME)
-            most_states = problem.request.most_iterations
-            return ConstrainedSearch(problem, step, most_states=math.inf if most_states is None else most_states).run()
+            max_states = problem.request.most_iterations
+            return ConstrainedSearch(problem, step, max_states=math.inf if max_states is None else max_states).run()
         if problem.repeatable and problem.planner_id in THREADED:
             raise PlanningError(
                 ErrorCode.PLANNING_FAILED,
-                f"planner_id '{problem.planner_id}' works in threads and "
+                f"planner_id '{problem.planner_id}' searches in threads and "
                 "cannot repeat a plan; choose another planner or do not set a seed",
             )
-        states = 0
-        for part, targets in _parts(problem, goals):
-            paths, tried = _paths(part, targets, step)
-            states += tried
+        total_checks = 0
+        for stage, targets in _stages(problem, goals):
+            paths, checks = _paths(stage, targets, step)
+            total_checks += checks
             if paths:
                 return PlannedPath(min(paths, key=path_length))
-        raise no_path(problem, problem.planner_id, states)
+        raise no_path(problem, problem.planner_id, total_checks)
 
     @staticmethod
     def repaired(problem: PlanningProblem, vertices: Array) -> Array:
-        """Returns the path with every edge valid at the steps of the solution validator; raises EdgeError."""
+        """Returns the path with invalid edges replaced by detours, valid at the step of the final validation.
+
+        Raises:
+            EdgeError: An edge could not be repaired.
+        """
         return repaired(problem, vertices, connection)
 
 
-def _parts(problem: PlanningProblem, goals: Array) -> list[tuple[PlanningProblem, Array]]:
-    """Returns the searches to make, one after the other: problem with its deadline, and goals.
+def _stages(problem: PlanningProblem, goals: Array) -> list[tuple[PlanningProblem, Array]]:
+    """Returns the problem and goals of each search stage.
 
-    Joints without ends turn to their goals by the short way; where half of the time finds none, by either.
+    Continuous joints rotate to their goals the short way. If half of the time finds no path, both ways are allowed.
     """
-    turned = problem.other_ways_round(goals)
-    if not len(turned):
+    long_way_goals = problem.other_ways_round(goals)
+    if not len(long_way_goals):
         return [(problem, goals)]
-    both = np.vstack([goals, turned])
-    if problem.repeatable:  # the clock must not decide
+    both = np.vstack([goals, long_way_goals])
+    if problem.repeatable:  # the result must not depend on the clock
         return [(problem, both)]
     half = 0.5 * (time.monotonic() + problem.deadline_s)
     return [(replace(problem, deadline_s=half), goals), (problem, both)]
 
 
 def _paths(problem: PlanningProblem, goals: Array, step: float) -> tuple[list[Array], int]:
-    """Returns the paths that `attempts` searches find, and how many states they looked at."""
-    paths, states = [], 0
+    """Returns the paths found by `attempts` searches, and the number of checks."""
+    paths, checks = [], 0
     for _ in range(max(1, problem.request.attempts)):
         search = _search(problem, goals, step)
         problem.phases.searched_by("OMPL" if isinstance(search, _Search) else "compiled")
         path = search.run()
-        states += search.states
+        checks += search.checks
         if path is not None:
             paths.append(path)
         if problem.interrupted():
             break
-    return paths, states
+    return paths, checks
 
 
 def connection(problem: PlanningProblem, first: Array, second: Array) -> Array | None:
-    """Returns a path between two free states, its edges checked as finely as the solution validator does, or None.
+    """Returns a path between two free states, or None.
 
-    The search ends after a number of iterations or states, so that a seed repeats it, or with the allowed time.
+    Edges are checked at the step of the final validation. The search is bounded by a number of iterations or states,
+    so that a seed repeats it, and by the allowed time.
+
+    Args:
+        problem: Problem whose scene and path constraints apply.
+        first: Start joint vector of the group [rad or m].
+        second: Goal joint vector of the group [rad or m].
     """
-    near = replace(
+    local_problem = replace(
         problem.with_start(problem.motion.full_positions(first)),
         planner_id="RRTConnect",
         planner_parameters={},
@@ -138,45 +149,51 @@ def connection(problem: PlanningProblem, first: Array, second: Array) -> Array |
     fine = problem.settings.finest_step
     if problem.constraints is not None:
         try:
-            return ConstrainedSearch(near, fine, second[None], CONSTRAINED_CONNECTION_STATES).run().vertices
+            return ConstrainedSearch(local_problem, fine, second[None], CONSTRAINED_CONNECTION_STATES).run().vertices
         except PlanningError:
             return None
-    return _search(near, second[None], fine, CONNECTION_ITERATIONS).run()
+    return _search(local_problem, second[None], fine, CONNECTION_ITERATIONS).run()
 
 
 def _search(
-    problem: PlanningProblem, goals: Array, step: float, limit: int | None = None
-) -> _Search | SideBySide | Aorrtc:
-    """Returns the search of the problem's planner; RRTConnect and AORRTC are compiled where the checker allows it."""
-    parameters, limit = problem.planner_parameters, _most_iterations(problem, limit)
+    problem: PlanningProblem, goals: Array, step: float, iteration_limit: int | None = None
+) -> _Search | ParallelSearch | Aorrtc:
+    """Returns the search of the problem's planner: compiled for RRTConnect and AORRTC if possible, otherwise OMPL's."""
+    parameters, iteration_limit = problem.planner_parameters, _max_iterations(problem, iteration_limit)
     if problem.planner_id == "AORRTC" and can_search(problem):
-        return Aorrtc(problem, goals, connection_range(parameters) or DEFAULT_RANGE, limit)
+        return Aorrtc(problem, goals, connection_range(parameters) or DEFAULT_RANGE, iteration_limit)
     if problem.planner_id == "RRTConnect" and can_search(problem) and not keeps_intermediate_states(parameters):
-        wanted = connection_range(parameters)
+        configured_range = connection_range(parameters)
         generators = [problem.rng, *problem.rng.spawn(search_threads(problem) - 1)]
-        return SideBySide(
+        return ParallelSearch(
             problem,
             [
                 RrtConnect(
-                    replace(problem, rng=rng), goals, step, wanted or DEFAULT_RANGE, limit, wanted is None, number
+                    replace(problem, rng=rng),
+                    goals,
+                    step,
+                    configured_range or DEFAULT_RANGE,
+                    iteration_limit,
+                    configured_range is None,
+                    index,
                 )
-                for number, rng in enumerate(generators)
+                for index, rng in enumerate(generators)
             ],
         )
-    return _Search(problem, goals, step, limit)
+    return _Search(problem, goals, step, iteration_limit)
 
 
-def _most_iterations(problem: PlanningProblem, limit: int | None) -> int | None:
-    """Returns after how many iterations a search ends; None where the clock ends it."""
-    if limit is None and problem.repeatable and problem.planner_id in ANYTIME:
+def _max_iterations(problem: PlanningProblem, iteration_limit: int | None) -> int | None:
+    """Returns the maximum number of iterations of a search; None if only the clock ends the search."""
+    if iteration_limit is None and problem.repeatable and problem.planner_id in ANYTIME:
         return problem.settings.seeded_iterations
-    return problem.request.most_iterations if limit is None else limit
+    return problem.request.most_iterations if iteration_limit is None else iteration_limit
 
 
 def search_threads(problem: PlanningProblem) -> int:
-    """Returns how many searches run at the same time for a problem: what the settings say, else as many as pay.
+    """Returns the number of parallel searches: the setting `search_threads` or a choice based on group size and load.
 
-    Searches of small groups end too soon for that. With a seed it is one, whatever the machine has to do.
+    Small groups get one search because their searches are short, seeded plans because load must not change the plan.
     """
     settings = problem.settings
     if settings.search_threads:
@@ -184,12 +201,12 @@ def search_threads(problem: PlanningProblem) -> int:
     is_seeded = problem.repeatable or settings.seed is not None or problem.request.seed is not None
     if is_seeded or len(problem.group.joints) < LARGE_GROUP:
         return 1
-    free = len(os.sched_getaffinity(0)) - os.getloadavg()[0]
-    return int(min(max(free, 1.0), MOST_THREADS))
+    idle = len(os.sched_getaffinity(0)) - os.getloadavg()[0]
+    return int(min(max(idle, 1.0), MAX_THREADS))
 
 
 def edge_step(problem: PlanningProblem) -> float:
-    """Returns the distance of checks along an edge [rad or m] that the problem and the group's parameters ask for."""
+    """Returns the distance between checks along an edge [rad or m], set by the problem and the group's parameters."""
     step = problem.step
     low, high = problem.bounds
     extent = float(np.linalg.norm(np.minimum(high - low, 4.0 * np.pi)))
@@ -223,35 +240,35 @@ class _EdgeValidator(ob.MotionValidator):
 
 
 class _Search:
-    """One run of one planner."""
+    """A run of an OMPL planner."""
 
     def __init__(
         self,
         problem: PlanningProblem,
         goals: Array,
         step: float,
-        limit: int | None = None,
+        iteration_limit: int | None = None,
     ) -> None:
-        """Stores what to search.
+        """Stores the problem.
 
         Args:
-            problem: what to plan.
-            goals: joint vectors to reach, shape (n, joints).
-            step: distance of checks along an edge [rad or m].
-            limit: of iterations; None: the clock ends the search.
+            problem: Problem to plan for.
+            goals: Goal joint vectors, shape (n, joints) [rad or m].
+            step: Distance between checks along an edge [rad or m].
+            iteration_limit: Maximum number of iterations; None for no limit but time.
         """
         self._problem, self._goals, self._step = problem, goals, step
-        self._limit = limit
-        self._count = len(problem.group.joints)
+        self._iteration_limit = iteration_limit
+        self._joint_count = len(problem.group.joints)
         self._condition: Any = None
         self._iterations = 0
-        self.states = 0
+        self.checks = 0
 
     def run(self) -> Array | None:
-        """Returns vertices of shape (n, joints) from the start to one of the goals, or None.
+        """Returns path vertices from the start to one of the goals, shape (n, joints), or None.
 
         Raises:
-            PlanningError: a setting is wrong.
+            PlanningError: A setting is wrong.
         """
         problem = self._problem
         information = ob.SpaceInformation(self._space())
@@ -285,55 +302,55 @@ class _Search:
             information.setStateValidityChecker(lambda state: False)
 
     def _space(self) -> Any:
-        """Returns the joint space, no wider than two turns around the start and the goals."""
+        """Returns the joint space, limited to one rotation beyond the start and the goals."""
         low, high = self._problem.search_bounds(np.vstack([self._problem.start_values, self._goals]))
-        space, bounds = ob.RealVectorStateSpace(self._count), ob.RealVectorBounds(self._count)
-        for number in range(self._count):
-            bounds.setLow(number, float(low[number]))
-            bounds.setHigh(number, float(high[number]))
+        space, bounds = ob.RealVectorStateSpace(self._joint_count), ob.RealVectorBounds(self._joint_count)
+        for index in range(self._joint_count):
+            bounds.setLow(index, float(low[index]))
+            bounds.setHigh(index, float(high[index]))
         space.setBounds(bounds)
         return space
 
     def _termination(self) -> Any:
-        """Returns when to stop: the clock, or a number of iterations where the plan must be repeatable."""
+        """Returns the termination condition: the deadline and, if set, the iteration limit."""
         problem = self._problem
         if problem.planner_id in THREADED:
             return ob.timedPlannerTerminationCondition(max(1e-3, problem.deadline_s - time.monotonic()))
-        limit = self._limit
-        if limit is None:
+        iteration_limit = self._iteration_limit
+        if iteration_limit is None:
             return ob.PlannerTerminationCondition(problem.interrupted)
 
         def stop() -> bool:
             self._iterations += 1
             if problem.interrupted():
                 return True
-            return self._iterations > limit
+            return self._iterations > iteration_limit
 
         return ob.PlannerTerminationCondition(stop)
 
     def _state_is_valid(self, state: Any) -> bool:
-        self.states += 1
+        self.checks += 1
         if self._problem.cancelled() and self._condition is not None:
             self._condition.terminate()
             return False
-        return self._problem.state_is_valid(np.array(state[0 : self._count]))
+        return self._problem.state_is_valid(np.array(state[0 : self._joint_count]))
 
     def edge_is_valid(self, first: Any, second: Any) -> bool:
-        """Whether the straight motion between two OMPL states is free and keeps the constraints."""
-        self.states += 1
+        """Checks that the straight motion between two OMPL states is free and satisfies the constraints."""
+        self.checks += 1
         return self._problem.edge_is_valid(
-            np.array(first[0 : self._count]), np.array(second[0 : self._count]), self._step
+            np.array(first[0 : self._joint_count]), np.array(second[0 : self._joint_count]), self._step
         )
 
     def _state(self, information: Any, values: Array) -> Any:
         state = information.allocState()
-        for number, value in enumerate(values):
-            state[number] = float(value)
+        for index, value in enumerate(values):
+            state[index] = float(value)
         return state
 
     def _vertices(self, definition: Any) -> Array | None:
         if not definition.hasExactSolution():
             return None
         if self._problem.repeatable and self._problem.interrupted():
-            return None  # a search that the clock ends is not repeatable
-        return np.array([list(state[0 : self._count]) for state in definition.getSolutionPath().getStates()])
+            return None  # a search stopped by the clock is not repeatable
+        return np.array([list(state[0 : self._joint_count]) for state in definition.getSolutionPath().getStates()])

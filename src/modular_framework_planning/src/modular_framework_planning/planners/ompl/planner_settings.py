@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""OMPL's geometric planners and their settings, under the names MoveIt and ompl_planning.yaml give them."""
+"""OMPL's geometric planners and their settings, under the names of MoveIt and ompl_planning.yaml."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import ompl.geometric as og
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
 
-# [rad or m]; OMPL's own choice, a fifth of the space, makes edges so long that few are free. Tuned for RRTConnect with
-# its weighted lengths on MotionBenchMaker's problems of a UR5, a Panda, a Fetch and a two-armed Baxter: of 0.35, 0.5
-# and 0.7 it needs the least time on average on the first three, and 5 % more than 0.35 on the last.
+# Maximum length of an edge [rad or m]. OMPL's default, a fifth of the extent of the space, makes most edges too long to
+# be free. Tuned for RRTConnect with weighted lengths on MotionBenchMaker's problems: among 0.35, 0.5 and 0.7, 0.5 has
+# the lowest mean time for a UR5, a Panda and a Fetch, and takes 5 % longer than 0.35 for a two-armed Baxter.
 DEFAULT_RANGE = 0.5
 
 
@@ -26,9 +26,9 @@ def _bool(value: object) -> bool:
 
 
 def _number(low: float = -math.inf, high: float = math.inf, whole: bool = False) -> Callable[[object], Any]:
-    """Returns a reader of finite numbers from a range, both ends included."""
-    words = f"a {'whole ' if whole else ''}number"
-    words += "" if low == -math.inf else f" of at least {low:g}" if high == math.inf else f" from {low:g} to {high:g}"
+    """Returns a reader of finite numbers in a closed range."""
+    allowed = f"a {'whole ' if whole else ''}number"
+    allowed += "" if low == -math.inf else f" of at least {low:g}" if high == math.inf else f" from {low:g} to {high:g}"
 
     def read(value: object) -> float | int:
         try:
@@ -36,7 +36,7 @@ def _number(low: float = -math.inf, high: float = math.inf, whole: bool = False)
         except ValueError:
             number = math.nan
         if not math.isfinite(number) or not low <= number <= high or (whole and number != int(number)):
-            raise ValueError(words)
+            raise ValueError(allowed)
         return int(number) if whole else number
 
     return read
@@ -109,12 +109,13 @@ PLANNERS: dict[str, tuple[type, dict[str, Setting]]] = {
     "RRTstar": (og.RRTstar, {**_RANGE, **_BIAS, **_STAR}),
     "SORRTstar": (og.SORRTstar, {**_RANGE, **_BIAS, **_STAR}),
 }
-# Planners that look for solutions in a thread of their own: it must not need the interpreter, whose lock solve() holds.
+# Planners that look for solutions in their own thread; solve() holds the interpreter lock, so this thread must not call
+# Python.
 THREADED = frozenset({"PRM", "PRMstar"})
-# Planners that improve their path until they are stopped.
+# Planners that improve their path until a termination condition stops them.
 ANYTIME = frozenset({"AORRTC", "BITstar", "InformedRRTstar", "PRMstar", "RRTstar", "SORRTstar"})
 PATH_LENGTH = "PathLengthOptimizationObjective"
-# Keys of ompl_planning.yaml that are read elsewhere, and those of which this OMPL supports one value only.
+# Keys of ompl_planning.yaml that other modules read, and keys with a single supported value.
 GENERAL_KEYS: dict[str, Callable[[object], Any]] = {
     "type": str,
     "projection_evaluator": str,
@@ -125,31 +126,32 @@ GENERAL_KEYS: dict[str, Callable[[object], Any]] = {
     "enforce_joint_model_state_space": _bool,
     "enforce_constrained_state_space": _bool,
 }
-# Settings OMPL has, but not in its Python interface.
+# Settings missing from OMPL's Python interface.
 NOT_SETTABLE = {"BFMT": ("balanced", "optimality")}
 
 
 def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[str]:
-    """Says which settings of a planner are unknown or unreadable, one sentence each; nothing for a planner not here."""
+    """Returns a message per unknown or unreadable setting of a planner; none for an unknown planner."""
     if planner_id not in PLANNERS:
         return []
     known = PLANNERS[planner_id][1]
     faults = []
     for key, value in settings.items():
         if key in NOT_SETTABLE.get(planner_id, ()):
-            faults.append(f"'{key}' of {planner_id} cannot be set through OMPL's Python interface and is left as it is")
+            faults.append(f"'{key}' of {planner_id} cannot be set through OMPL's Python interface; it is ignored")
         elif key in known:
             faults += _unreadable(key, known[key][1], value)
         elif key not in GENERAL_KEYS:
-            near = difflib.get_close_matches(key, (*known, *GENERAL_KEYS), n=1)
+            similar = difflib.get_close_matches(key, (*known, *GENERAL_KEYS), n=1)
             faults.append(
-                f"{planner_id} has no setting '{key}'; it is ignored; allowed are "
-                f"{', '.join(sorted((*known, *GENERAL_KEYS)))}" + "".join(f"; did you mean '{name}'?" for name in near)
+                f"{planner_id} has no setting '{key}'; it is ignored; allowed: "
+                f"{', '.join(sorted((*known, *GENERAL_KEYS)))}"
+                + "".join(f"; did you mean '{name}'?" for name in similar)
             )
         elif faulty := _unreadable(key, GENERAL_KEYS[key], value):
             faults += faulty
         elif key == "optimization_objective" and str(value) != PATH_LENGTH:
-            faults.append(f"optimization_objective '{value}' is not available and ignored; allowed is {PATH_LENGTH}")
+            faults.append(f"optimization_objective '{value}' is not available; it is ignored; allowed: {PATH_LENGTH}")
     return faults
 
 
@@ -159,31 +161,31 @@ def _unreadable(key: str, read: Callable[[object], Any], value: object) -> list[
     try:
         read(value)
     except ValueError as error:
-        return [f"'{key}' is '{value}', which cannot be read; allowed: {error}"]
+        return [f"'{key}' is '{value}', which cannot be read; it must be {error}"]
     return []
 
 
 def connection_range(settings: Mapping[str, object]) -> float | None:
-    """Returns the range that the settings of RRTConnect give [rad or m], None where they leave it open.
+    """Returns the range in the settings of RRTConnect [rad or m]; None if it is not set.
 
     Raises:
-        PlanningError: it cannot be read.
+        PlanningError: The range cannot be read.
     """
-    wanted = _value("RRTConnect", settings, "range")
-    return float(wanted) if wanted is not None and wanted > 0.0 else None
+    value = _value("RRTConnect", settings, "range")
+    return float(value) if value is not None and value > 0.0 else None
 
 
 def keeps_intermediate_states(settings: Mapping[str, object]) -> bool:
-    """Whether the settings of RRTConnect ask it to add states along its edges.
+    """Checks whether the settings of RRTConnect request intermediate states along edges.
 
     Raises:
-        PlanningError: the value cannot be read.
+        PlanningError: The value cannot be read.
     """
     return bool(_value("RRTConnect", settings, "intermediate_states"))
 
 
 def _value(planner_id: str, settings: Mapping[str, object], key: str) -> Any:
-    """Returns a setting as its planner takes it, None for an empty one; raises PlanningError where it is no value."""
+    """Returns the value of a setting, None if it is empty; raises PlanningError if it cannot be read."""
     text = settings.get(key, "")
     if not str(text).strip():
         return None
@@ -196,16 +198,16 @@ def _value(planner_id: str, settings: Mapping[str, object], key: str) -> Any:
 def make_planner(
     planner_id: str, settings: Mapping[str, object], information: Any, default_range: float = DEFAULT_RANGE
 ) -> Any:
-    """Makes an OMPL planner with its settings.
+    """Returns an OMPL planner with its settings applied.
 
     Args:
-        planner_id: key of PLANNERS.
-        settings: by ompl_planning.yaml's keys; an empty value, and range 0, keep the default.
-        default_range: range where the settings give none [rad or m].
+        planner_id: Key of PLANNERS.
+        settings: Settings, keyed as in ompl_planning.yaml; an empty value or range 0 keeps the default.
         information: OMPL's SpaceInformation.
+        default_range: Range if the settings contain none [rad or m].
 
     Raises:
-        PlanningError: a value cannot be read.
+        PlanningError: A value cannot be read.
     """
     kind, known = PLANNERS[planner_id]
     planner = kind(information)

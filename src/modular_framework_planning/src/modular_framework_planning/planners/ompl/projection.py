@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Projections of the joint space to few dimensions, which OMPL's cell planners measure coverage in."""
+"""Low-dimensional projections of the joint space, in which OMPL's cell-based planners measure coverage."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 
 
 class _LinkPosition(ob.ProjectionEvaluator):
-    """Projects a state to a link's position; `release` drops the reference to the robot model."""
+    """Projects a state to the position of a link."""
 
     def __init__(self, space: Any, position: Callable[[Array], Array], count: int) -> None:
         super().__init__(space)
@@ -28,7 +28,7 @@ class _LinkPosition(ob.ProjectionEvaluator):
         return 3
 
     def project(self, state: Any, projection: Any) -> None:
-        """Writes the position [m] of the link at a state."""
+        """Writes the link position at a state [m]."""
         if self._position is not None:
             projection[:] = self._position(np.array(state[0 : self._count]))
 
@@ -38,15 +38,15 @@ class _LinkPosition(ob.ProjectionEvaluator):
 
 
 def projection_evaluator(text: str, problem: PlanningProblem, space: Any) -> Any:
-    """Makes the projection that the parameter `projection_evaluator` describes.
+    """Returns the projection described by the parameter `projection_evaluator`.
 
     Args:
-        text: "joints(a,b,...)" or "link(name)".
-        problem: gives the group's joints and the robot.
+        text: Parameter value: "joints(a,b,...)" or "link(name)".
+        problem: Problem with the joint group and the robot model.
         space: OMPL's state space of the group.
 
     Raises:
-        PlanningError: the text is another, or a name does not exist.
+        PlanningError: The text has a different form, or a name does not exist.
     """
     match = re.fullmatch(r"\s*(joints|link)\s*\(([^()]*)\)\s*", text)
     names = [name.strip() for name in match[2].split(",") if name.strip()] if match else []
@@ -54,22 +54,21 @@ def projection_evaluator(text: str, problem: PlanningProblem, space: Any) -> Any
     if not match or not names or (match[1] == "link" and len(names) != 1):
         raise PlanningError(
             ErrorCode.PLANNING_FAILED,
-            f"projection_evaluator '{text}' of group "
-            f"'{problem.group.name}': allowed are joints(a,b,...) and link(name)",
+            f"projection_evaluator '{text}' of group '{problem.group.name}' must be joints(a,b,...) or link(name)",
         )
     if match[1] == "joints":
         unknown = [name for name in names if name not in joints]
         if unknown:
             raise PlanningError(
                 ErrorCode.PLANNING_FAILED,
-                f"projection_evaluator '{text}': {', '.join(unknown)} is "
-                f"not in group '{problem.group.name}'; its joints are {', '.join(joints)}",
+                f"projection_evaluator '{text}' names {', '.join(unknown)}, but group '{problem.group.name}' "
+                f"has only the joints {', '.join(joints)}",
             )
         return ob.RealVectorOrthogonalProjectionEvaluator(space, [joints.index(name) for name in names])
     if not problem.model.has_link(names[0]):
         raise PlanningError(
             ErrorCode.INVALID_LINK_NAME,
-            f"projection_evaluator '{text}': the robot has no such link; known: {', '.join(problem.model.frame_ids)}",
+            f"projection_evaluator '{text}': the robot has no such link; allowed: {', '.join(problem.model.frame_ids)}",
         )
 
     def position(values: Array) -> Array:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""RRT-Connect with its edges checked inside one compiled loop."""
+"""RRT-Connect, with edge checks inside one compiled loop."""

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""RRT-Connect as one compiled loop: samples, trees and checks of edges without a call of Python between them.
+"""RRT-Connect as one compiled loop that samples, grows trees and checks edges without calling Python.
 
 Kuffner, LaValle: RRT-Connect: An efficient approach to single-query path planning, ICRA 2000. The smaller tree extends
-to the next sample and the other one connects to it, as in the same authors' "An efficient approach to path planning
-using balanced bidirectional RRT search", CMU-RI-TR-05-34: the tree in the narrower place grows as large as the other
-one. A state whose extension met an obstacle is extended to samples near to it alone, as in Yershova, Jaillet, Simeon,
-LaValle: Dynamic-domain RRTs, ICRA 2005: else trees that cannot grow meet the same obstacle again and again.
+to the next sample and the other tree connects to it, as in the same authors' "An efficient approach to path planning
+using balanced bidirectional RRT search", CMU-RI-TR-05-34: balanced trees explore the narrower end as densely as the
+other. A state whose extension was blocked accepts only nearby samples, as in Yershova, Jaillet, Simeon, LaValle:
+Dynamic-domain RRTs, ICRA 2005. Otherwise an enclosed tree keeps extending into the same obstacle.
 
-With a bound it looks for paths that are shorter than that, as in Hauser, Zhou: Asymptotically optimal planning by
-feasible kinodynamic planning in a state-cost space, IEEE T-RO 2016: each sample has a length that the way to it may
-have, and is reached only from states that allow for that.
+With a length bound the search accepts only shorter paths, as in Hauser, Zhou: Asymptotically optimal planning by
+feasible kinodynamic planning in a state-cost space, IEEE T-RO 2016: each sample gets a random maximum path length and
+is reached only from states that respect that length.
 
-The loop returns where it needs the interpreter: for more samples, for larger trees, for an edge that the bounds leave
-undecided, and every few edges for the clock.
+The loop returns to the interpreter for new samples, for larger trees, for an edge that the compiled check leaves
+undecided, and regularly to read the clock.
 """
 
 from __future__ import annotations
@@ -35,26 +35,27 @@ from modular_framework_planning.collision_detection.kernels.compiled_edges impor
 from modular_framework_planning.collision_detection.kernels.compiled_paths import new_workspace, release
 from modular_framework_planning.geometry.spatial import Array
 
-# What `grow` returns
-FOUND, NEEDS_SAMPLES, NEEDS_ROOM, UNDECIDED, PAUSED, AT_LIMIT = range(6)
-EXTENDS, CONNECTS = 0, 1
-NEW = -1  # target, for which the nearest state is not known yet
-EDGES = 200  # that are checked before a pause, so that the clock and a cancellation are looked at in between
+# Return values of `grow`
+FOUND, NEEDS_SAMPLES, NEEDS_CAPACITY, UNDECIDED, PAUSED, LIMIT_REACHED = range(6)
+EXTEND, CONNECT = 0, 1
+NEAREST_UNKNOWN = -1  # the nearest state to a new target has not been searched yet
+EDGES_PER_CALL = 200  # edge checks between two looks at the clock and at cancellation
 
 
 class Trees(NamedTuple):
-    """The trees from the start (0) and from the goals (1), and where the search stands between two calls.
+    """The trees from the start (0) and from the goals (1), and the progress of the search between two calls.
 
     Attributes:
-        states: joint vectors of the group [rad or m]; shape (2, room, joints).
-        parents: of each state, -1 for a root; shape (2, room).
-        blocked: whether an extension of each state met an obstacle; shape (2, room).
-        lengths: weighted length of the way to each state from the root of its tree; shape (2, room).
-        sizes: how many states each tree has; shape (2,).
-        position: next sample; tree that grows; EXTENDS or CONNECTS; state at which it grows, or NEW; shape (4,).
-        target: state that it grows to; shape (joints,).
-        counts: edges that were checked, extensions that were tried, how many may be, and edges at which the search
-            pauses; shape (4,).
+        states: Joint vectors of the group, shape (2, capacity, joints) [rad or m].
+        parents: Parent index of each state, -1 for a root, shape (2, capacity).
+        blocked: Whether an extension from each state was blocked, shape (2, capacity).
+        lengths: Weighted path length from the root to each state, shape (2, capacity).
+        sizes: Number of states per tree, shape (2,).
+        cursor: Index of the next sample, index of the growing tree, phase (EXTEND or CONNECT), and index of the state
+            that grows (or NEAREST_UNKNOWN), shape (4,).
+        target: State that the tree grows towards, shape (joints,).
+        counts: Number of edge checks, number of extensions, extension limit, and number of edge checks at the next
+            pause, shape (4,).
     """
 
     states: Array
@@ -62,31 +63,31 @@ class Trees(NamedTuple):
     blocked: NDArray[np.bool_]
     lengths: Array
     sizes: NDArray[np.int64]
-    position: NDArray[np.int64]
+    cursor: NDArray[np.int64]
     target: Array
     counts: NDArray[np.int64]
 
 
 class Space(NamedTuple):
-    """The joint space of a group, in which lengths are weighted.
+    """The joint space of a group with a weighted metric; all lengths below are weighted.
 
     Attributes:
-        weights: of each joint in a length; shape (joints,).
-        longest: most a tree grows by at once, in weighted length.
-        domain: how far a sample may be from a blocked state that is extended to it, in weighted length.
-        bound: the path has to be shorter than that, in weighted length; infinite for any path.
-        edges: how the edges of the trees are checked.
+        weights: Joint weights of the metric, shape (joints,).
+        max_extension: Maximum length of an extension.
+        domain_radius: Maximum distance at which a blocked state is extended to a sample.
+        length_bound: Upper bound of the path length; infinite to accept any path.
+        edges: Mapping and step of the edge checks.
     """
 
     weights: Array
-    longest: float
-    domain: float
-    bound: float
+    max_extension: float
+    domain_radius: float
+    length_bound: float
     edges: GroupEdges
 
 
 @njit(cache=True, nogil=True)
-def _squared_length(one, other, weights):  # type: ignore[no-untyped-def]
+def _squared_distance(one, other, weights):  # type: ignore[no-untyped-def]
     length = 0.0
     for joint in range(len(one)):
         gap = weights[joint] * (other[joint] - one[joint])
@@ -95,60 +96,66 @@ def _squared_length(one, other, weights):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _nearest(states, lengths, tree, size, target, weights, most):  # type: ignore[no-untyped-def]
-    """Returns the number of the state of a tree that is nearest to a joint vector.
+def _nearest(states, lengths, tree, size, target, weights, max_length):  # type: ignore[no-untyped-def]
+    """Returns the index of the tree's state nearest to a joint vector.
 
-    The way from the root over that state is no longer than `most`; -1 where there is none.
+    Only states whose path from the root to the joint vector is no longer than `max_length` qualify; -1 if none does.
     """
-    best, found, joints = np.inf, -1, len(target)
-    for number in range(size):
+    best, nearest, joints = np.inf, -1, len(target)
+    for index in range(size):
         length = 0.0
         for joint in range(joints):
-            gap = weights[joint] * (target[joint] - states[tree, number, joint])
+            gap = weights[joint] * (target[joint] - states[tree, index, joint])
             length += gap * gap
-        if length < best and (most == np.inf or lengths[tree, number] + np.sqrt(length) <= most):
-            best, found = length, number
-    return found
+        if length < best and (max_length == np.inf or lengths[tree, index] + np.sqrt(length) <= max_length):
+            best, nearest = length, index
+    return nearest
 
 
 @njit(cache=True, nogil=True)
-def _length_to_root(states, parents, tree, size, target, weights):  # type: ignore[no-untyped-def]
-    """Returns the weighted length of the straight way from a joint vector to the nearest root of a tree."""
+def _distance_to_root(states, parents, tree, size, target, weights):  # type: ignore[no-untyped-def]
+    """Returns the weighted distance from a joint vector to the nearest root of a tree."""
     best = np.inf
-    for number in range(size):
-        if parents[tree, number] >= 0:
+    for index in range(size):
+        if parents[tree, index] >= 0:
             break
-        best = min(best, _squared_length(states[tree, number], target, weights))
+        best = min(best, _squared_distance(states[tree, index], target, weights))
     return np.sqrt(best)
 
 
 @njit(cache=True, nogil=True)
-def _most_to_sample(trees, space, tree, sample):  # type: ignore[no-untyped-def]
-    """Returns how long the way from the root of a tree to a sample may be; -1 where no path over it is short enough.
+def _max_length_to_sample(trees, space, tree, sample):  # type: ignore[no-untyped-def]
+    """Returns the maximum path length from the root of a tree to a sample; -1 if every path through it is too long.
 
-    The sample's last value, in 0 to 1, chooses a length between the straight way's and what the bound leaves.
+    The sample's last value, from 0 to 1, interpolates between the straight distance and the length the bound leaves.
     """
-    if space.bound == np.inf:
+    if space.length_bound == np.inf:
         return np.inf
-    target, ways = sample[:-1], np.empty(2)
-    for one in range(2):
-        ways[one] = _length_to_root(trees.states, trees.parents, one, trees.sizes[one], target, space.weights)
-    left = space.bound - ways[0] - ways[1]
-    return ways[tree] + sample[-1] * left if left > 0.0 else -1.0
+    target, distances = sample[:-1], np.empty(2)
+    for side in range(2):
+        distances[side] = _distance_to_root(trees.states, trees.parents, side, trees.sizes[side], target, space.weights)
+    slack = space.length_bound - distances[0] - distances[1]
+    return distances[tree] + sample[-1] * slack if slack > 0.0 else -1.0
 
 
 @njit(cache=True, nogil=True)
-def write_step(here, target, space, out):  # type: ignore[no-untyped-def]
-    """Writes the state (joints,) on the way from one state to another, `longest` away from the first at most.
+def write_step(start, target, space, out):  # type: ignore[no-untyped-def]
+    """Writes the end of an extension towards a target, at most `max_extension` away from the start.
+
+    Args:
+        start: Joint vector of the group.
+        target: Joint vector to extend towards.
+        space: Joint space of the search.
+        out: Output joint vector, shape (joints,).
 
     Returns:
-        Whether it is the other state.
+        Whether the extension reaches the target.
     """
-    length = np.sqrt(_squared_length(here, target, space.weights))
-    share = space.longest / length if length > space.longest else 1.0
+    length = np.sqrt(_squared_distance(start, target, space.weights))
+    fraction = space.max_extension / length if length > space.max_extension else 1.0
     for joint in range(len(out)):
-        out[joint] = target[joint] if share == 1.0 else here[joint] + share * (target[joint] - here[joint])
-    return share == 1.0
+        out[joint] = target[joint] if fraction == 1.0 else start[joint] + fraction * (target[joint] - start[joint])
+    return fraction == 1.0
 
 
 @njit(cache=True, nogil=True)
@@ -156,16 +163,17 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
     """Grows the trees until they meet.
 
     Args:
-        trees: the search; changed.
-        space: in which it runs.
-        samples: random states, shape (n, joints); with a bound they have a number in 0 to 1 each behind the joints.
-        verdict: FREE or BLOCKED about the edge for which the last call returned UNDECIDED; else UNKNOWN.
-        world: what `arguments` returns.
+        trees: State of the search; changed in place.
+        space: Joint space of the search.
+        samples: Random states, shape (n, joints); with a length bound, shape (n, joints + 1), where the last column
+            holds random numbers from 0 to 1.
+        verdict: FREE or BLOCKED for the edge on which the last call returned UNDECIDED; otherwise UNKNOWN.
+        world: Result of `arguments`.
 
     Returns:
-        FOUND: the last states of both trees are the same. NEEDS_SAMPLES: all samples are used. NEEDS_ROOM: a tree is
-        full. AT_LIMIT: the last extension that may be was tried. UNDECIDED: the edge from the state at which a tree
-        grows to `target`, `longest` of it at most. PAUSED: to be called again.
+        FOUND: the last states of both trees are equal. NEEDS_SAMPLES: all samples are used. NEEDS_CAPACITY: a tree is
+        full. LIMIT_REACHED: the extension limit is used up. UNDECIDED: the next extension towards `target` needs an
+        exact check. PAUSED: the caller looks at the clock and calls again.
     """
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(space.edges)
@@ -177,62 +185,65 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
 
 @njit(cache=True, nogil=True)
 def _grow(trees, space, samples, verdict, world, edge, workspace):  # type: ignore[no-untyped-def]
-    """Does what `grow` does, in given working memory; none of the arrays should have an owner (see `borrowed`)."""
-    states, parents, blocked, lengths, sizes, position, target, counts = trees
+    """Implements `grow` with preallocated working memory; arrays are passed without owner (see `borrowed`)."""
+    states, parents, blocked, lengths, sizes, cursor, target, counts = trees
     state, no_rows = np.empty(len(target)), np.empty((0, 2), np.int64)
     while True:
         if counts[0] >= counts[3] and verdict == UNKNOWN:
             return PAUSED
-        if position[3] == NEW:
-            if position[2] == EXTENDS:
+        if cursor[3] == NEAREST_UNKNOWN:
+            if cursor[2] == EXTEND:
                 if counts[1] == counts[2]:
-                    return AT_LIMIT
-                if position[0] == len(samples):
+                    return LIMIT_REACHED
+                if cursor[0] == len(samples):
                     return NEEDS_SAMPLES
-                position[1] = 0 if sizes[0] <= sizes[1] else 1
-                target[:] = samples[position[0], : len(target)]
-                most = _most_to_sample(trees, space, position[1], samples[position[0]])
-                position[0] += 1
-            else:  # to the last state of the other tree
-                other = 1 - position[1]
-                most = space.bound - lengths[other, sizes[other] - 1]
-            tree = position[1]
-            position[3] = _nearest(states, lengths, tree, sizes[tree], target, space.weights, most)
-            if position[3] < 0:  # none may be on the way, and position[3] is NEW
-                counts[1] += position[2] == EXTENDS
-                position[2] = EXTENDS
+                cursor[1] = 0 if sizes[0] <= sizes[1] else 1
+                target[:] = samples[cursor[0], : len(target)]
+                max_length = _max_length_to_sample(trees, space, cursor[1], samples[cursor[0]])
+                cursor[0] += 1
+            else:  # connect to the last state of the other tree
+                other = 1 - cursor[1]
+                max_length = space.length_bound - lengths[other, sizes[other] - 1]
+            tree = cursor[1]
+            cursor[3] = _nearest(states, lengths, tree, sizes[tree], target, space.weights, max_length)
+            if cursor[3] < 0:  # no state qualifies; cursor[3] is NEAREST_UNKNOWN again
+                counts[1] += cursor[2] == EXTEND
+                cursor[2] = EXTEND
                 continue
-            if position[2] == EXTENDS:
-                nearest = states[tree, position[3]]
-                if blocked[tree, position[3]] and _squared_length(nearest, target, space.weights) > space.domain**2:
-                    position[3] = NEW
+            if cursor[2] == EXTEND:
+                nearest = states[tree, cursor[3]]
+                if (
+                    blocked[tree, cursor[3]]
+                    and _squared_distance(nearest, target, space.weights) > space.domain_radius**2
+                ):
+                    cursor[3] = NEAREST_UNKNOWN
                     continue
                 counts[1] += 1
-        tree = position[1]
+        tree = cursor[1]
         if sizes[tree] == parents.shape[1]:
-            return NEEDS_ROOM
-        here = states[tree, position[3]]
-        reached = write_step(here, target, space, state)
+            return NEEDS_CAPACITY
+        start = states[tree, cursor[3]]
+        reached = write_step(start, target, space, state)
         if verdict == UNKNOWN:
             counts[0] += 1
-            verdict = check_edge(space.edges, world, here, state, edge, no_rows, workspace)
+            verdict = check_edge(space.edges, world, start, state, edge, no_rows, workspace)
             if verdict == UNKNOWN:
                 return UNDECIDED
         is_free, verdict = verdict == FREE, UNKNOWN
         if is_free:
-            states[tree, sizes[tree]], parents[tree, sizes[tree]] = state, position[3]
-            step = np.sqrt(_squared_length(here, state, space.weights))
-            lengths[tree, sizes[tree]] = lengths[tree, position[3]] + step
+            states[tree, sizes[tree]], parents[tree, sizes[tree]] = state, cursor[3]
+            step = np.sqrt(_squared_distance(start, state, space.weights))
+            lengths[tree, sizes[tree]] = lengths[tree, cursor[3]] + step
             sizes[tree] += 1
-        elif position[2] == EXTENDS:
-            blocked[tree, position[3]] = True
-        if position[2] == EXTENDS:
-            position[3] = NEW
+        elif cursor[2] == EXTEND:
+            blocked[tree, cursor[3]] = True
+        if cursor[2] == EXTEND:
+            cursor[3] = NEAREST_UNKNOWN
             if is_free:
-                position[1], position[2], target[:] = 1 - tree, CONNECTS, state
+                cursor[1], cursor[2], target[:] = 1 - tree, CONNECT, state
         elif not is_free:
-            position[2], position[3] = EXTENDS, NEW
+            cursor[2], cursor[3] = EXTEND, NEAREST_UNKNOWN
         elif reached:
             return FOUND
         else:
-            position[3] = sizes[tree] - 1
+            cursor[3] = sizes[tree] - 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""RRT-Connect on the arrays of a collision checker that offers them; other checkers and constraints need OMPL's."""
+"""RRT-Connect on compiled collision checks; path constraints and other collision checkers need OMPL's RRT-Connect."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from modular_framework_planning.collision_detection.kernels.compiled_edges impor
 from modular_framework_planning.collision_detection.reaches import reaches
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planners.rrt_connect.compiled_rrt_connect import (
-    AT_LIMIT,
-    EDGES,
-    EXTENDS,
+    EDGES_PER_CALL,
+    EXTEND,
     FOUND,
-    NEEDS_ROOM,
+    LIMIT_REACHED,
+    NEAREST_UNKNOWN,
+    NEEDS_CAPACITY,
     NEEDS_SAMPLES,
-    NEW,
     PAUSED,
     UNDECIDED,
     Space,
@@ -37,35 +37,38 @@ from modular_framework_planning.planning_interface.collision_checker import Comp
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 from modular_framework_planning.trajectory_processing.path_shortening import path_length
 
-SAMPLES = 256  # that are drawn at once; most of them are too far from blocked states, and cost nothing
-LEAST_WEIGHT = 0.1  # of a joint in a length, also of one that carries nothing: it turns ten times the range at most
-ROOM = 1024  # of states in a tree, to begin with
-# Of the domain of blocked states: four extensions (as in VAMP), or so many standard deviations below the mean squared
-# distance of two random states: in 14 dimensions hardly any lie within four extensions. Tuned on MotionBenchMaker's
-# problems of a UR5, a Panda, a Fetch and a two-armed Baxter.
-LEAST_DOMAIN, DEVIATIONS = 4.0, 1.72
-WIDE_EVERY = 8  # how many batches of samples there are to one from the whole bounds
+SAMPLE_BATCH = 256  # most samples fall outside the dynamic domain and are rejected cheaply
+MIN_WEIGHT = (
+    0.1  # lower limit of a joint's weight, so that an extension moves no joint farther than ten times the range
+)
+INITIAL_TREE_CAPACITY = 1024
+# The squared radius of the dynamic domain lies DOMAIN_DEVIATIONS standard deviations below the mean squared distance of
+# two random states, because in 14 dimensions hardly any sample lies within a few extensions. The radius is at least
+# MIN_DOMAIN_EXTENSIONS extensions (as in VAMP). Tuned on MotionBenchMaker's problems of a UR5, a Panda, a Fetch and a
+# two-armed Baxter.
+MIN_DOMAIN_EXTENSIONS, DOMAIN_DEVIATIONS = 4.0, 1.72
+FULL_BOUNDS_PERIOD = 8  # every eighth batch of samples covers the full bounds, the others the range around the ends
 
 
 def can_search(problem: PlanningProblem) -> bool:
-    """Whether a problem has no path constraints and a checker whose arrays decide all pairs."""
+    """Checks that a problem has no path constraints and that compiled checks cover all body pairs."""
     return problem.compiled_world is not None
 
 
 def warm_up(checker: CompiledChecks, positions: Array) -> None:
-    """Compiles the loop, or loads it from the cache.
+    """Compiles the loop or loads it from the cache.
 
     Args:
-        checker: of a scene.
-        positions: of the whole robot.
+        checker: Collision checker of any scene.
+        positions: Positions of the whole robot [rad or m].
     """
     space = Space(np.ones(1), 1.0, 1.0, np.inf, GroupEdges(positions, np.zeros((len(positions), 1)), 0.1))
     assert checker.compiled_world is not None
     grow(_trees(np.zeros(1), np.ones((1, 1)), 1), space, np.zeros((1, 1)), UNKNOWN, *arguments(checker.compiled_world))
 
 
-def _trees(start: Array, goals: Array, most_extensions: int) -> Trees:
-    states = np.empty((2, max(ROOM, 2 * len(goals)), len(start)))
+def _trees(start: Array, goals: Array, extension_limit: int) -> Trees:
+    states = np.empty((2, max(INITIAL_TREE_CAPACITY, 2 * len(goals)), len(start)))
     states[0, 0], states[1, : len(goals)] = start, goals
     return Trees(
         states,
@@ -73,171 +76,176 @@ def _trees(start: Array, goals: Array, most_extensions: int) -> Trees:
         np.zeros(states.shape[:2], dtype=bool),
         np.zeros(states.shape[:2]),
         np.array([1, len(goals)]),
-        np.array([0, 0, EXTENDS, NEW]),
+        np.array([0, 0, EXTEND, NEAREST_UNKNOWN]),
         start.copy(),
-        np.array([0, 0, most_extensions, EDGES]),
+        np.array([0, 0, extension_limit, EDGES_PER_CALL]),
     )
 
 
 def empty_field(field: DistanceField) -> DistanceField:
-    """Returns a field of the same solids of which no cell is filled yet."""
+    """Returns a distance field of the same solids with all cells unfilled."""
     return field._replace(
         known=np.zeros_like(field.known), nearest=np.empty_like(field.nearest), distances=np.empty_like(field.distances)
     )
 
 
 class RrtConnect:
-    """One search."""
+    """A bidirectional search for a collision-free path."""
 
     def __init__(
         self,
         problem: PlanningProblem,
         goals: Array,
         step: float,
-        longest: float,
-        limit: int | None = None,
+        max_extension: float,
+        extension_limit: int | None = None,
         is_weighted: bool = True,
-        number: int = 0,
-        bound: float = np.inf,
+        search_index: int = 0,
+        length_bound: float = np.inf,
     ) -> None:
-        """Stores what to search.
+        """Prepares the trees and the joint space.
 
         Args:
-            problem: for which `can_search` holds.
-            goals: joint vectors to reach, shape (n, joints).
-            step: distance of collision checks along an edge [rad or m].
-            longest: most a tree grows by at once, in weighted length if `is_weighted` [rad or m].
-            limit: of extensions to random states; None: the clock ends the search.
-            is_weighted: whether joints count in a length by the root of their reach, the one that reaches farthest as
-                1; else all count as 1. A wrist then turns further in one step than a shoulder.
-            number: of the search among those that run at the same time; all but number 0 have a distance field and
-                counts of their own, which they fill.
-            bound: the path has to be shorter, in weighted length [rad or m].
+            problem: Problem that `can_search` accepts.
+            goals: Goal joint vectors, shape (n, joints) [rad or m].
+            step: Distance between collision checks along an edge [rad or m].
+            max_extension: Maximum length of an extension [rad or m], weighted if `is_weighted`.
+            extension_limit: Maximum number of extensions to random states; None for no limit but time.
+            is_weighted: Whether the weight of a joint is the square root of its reach, relative to the largest
+                reach. A wrist then turns farther per extension than a shoulder. Otherwise all weights are 1.
+            search_index: Index among parallel searches. Searches above 0 fill their own distance field and counts.
+            length_bound: Upper bound of the weighted path length [rad or m].
         """
         self._problem, self._goals = problem, goals
         start = problem.start_values
         world = problem.compiled_world
         assert world is not None
-        if number > 0:
+        if search_index > 0:
             world = world._replace(
                 field=empty_field(world.field),
                 counts=np.zeros_like(world.counts),
                 refusals=np.zeros_like(world.refusals),
             )
         self._bodies, self._world = world, arguments(world)
-        around = np.vstack([start, goals])
-        self._low, self._high = problem.search_bounds(around)
-        turn = np.where(world.tree.prismatic[problem.group.indices], np.inf, np.pi)
-        self._near = np.maximum(self._low, around.min(axis=0) - turn), np.minimum(self._high, around.max(axis=0) + turn)
-        self._space = self._space_of(world, step, longest, is_weighted, bound)
-        self._trees = _trees(start, goals, np.iinfo(np.int64).max if limit is None else limit)
+        ends = np.vstack([start, goals])
+        self._low, self._high = problem.search_bounds(ends)
+        half_turn = np.where(world.tree.prismatic[problem.group.indices], np.inf, np.pi)
+        self._local_bounds = (
+            np.maximum(self._low, ends.min(axis=0) - half_turn),
+            np.minimum(self._high, ends.max(axis=0) + half_turn),
+        )
+        self._space = self._search_space(world, step, max_extension, is_weighted, length_bound)
+        self._trees = _trees(start, goals, np.iinfo(np.int64).max if extension_limit is None else extension_limit)
         self._samples, self._batches = np.empty((0, len(self._low))), 0
         self._verdict, self._status = UNKNOWN, PAUSED
 
     @property
-    def states(self) -> int:
-        """How many edges were checked."""
+    def checks(self) -> int:
+        """Number of edge checks."""
         return int(self._trees.counts[0])
 
     @property
     def extensions(self) -> int:
-        """How many extensions to random states were tried."""
+        """Number of attempted extensions to random states."""
         return int(self._trees.counts[1])
 
     @property
     def tree_sizes(self) -> tuple[int, int]:
-        """How many states the trees from the start and from the goals have."""
+        """Number of states in the start tree and in the goal tree."""
         return int(self._trees.sizes[0]), int(self._trees.sizes[1])
 
     def grow(self) -> None:
-        """Grows the trees until they meet, or for some edges; other searches may do the same in other threads."""
-        if self._status != UNDECIDED:  # else the same turn goes on
-            self._trees.counts[3] = self._trees.counts[0] + EDGES
+        """Grows the trees until they meet or the search pauses; searches may grow in parallel threads."""
+        if self._status != UNDECIDED:  # an undecided edge continues the same round
+            self._trees.counts[3] = self._trees.counts[0] + EDGES_PER_CALL
         self._status = grow(self._trees, self._space, self._samples, self._verdict, *self._world)
         self._verdict = UNKNOWN
 
     @property
     def path(self) -> Array | None:
-        """Vertices of shape (n, joints) from the start to one of the goals; None as long as the trees have not met."""
+        """Path vertices from the start to one of the goals, shape (n, joints); None until the trees meet."""
         return self._vertices() if self._status == FOUND else None
 
     @property
     def is_undecided(self) -> bool:
-        """Whether the search waits for `decide`."""
+        """Whether the search waits for a call of `decide`."""
         return self._status == UNDECIDED
 
     def decide(self) -> None:
-        """Asks the exact check about the edge that the bounds leave open."""
+        """Runs the exact check of the edge that the compiled check leaves undecided."""
         self._verdict = FREE if self._undecided_edge_is_free() else BLOCKED
 
     def prepare(self) -> bool:
-        """Provides what the trees need to grow on; returns whether they may."""
-        if self._status == NEEDS_ROOM:
-            self._add_room()
+        """Provides the requested samples or tree capacity; returns False if the extension limit is reached."""
+        if self._status == NEEDS_CAPACITY:
+            self._add_capacity()
         elif self._status == NEEDS_SAMPLES:
             self._batches += 1
-            self._samples = self._random_states() if self._space.bound == np.inf else self._states_within_bound()
-            self._trees.position[0] = 0
-        return self._status != AT_LIMIT
+            self._samples = self._random_states() if self._space.length_bound == np.inf else self._states_within_bound()
+            self._trees.cursor[0] = 0
+        return self._status != LIMIT_REACHED
 
-    def add_counts_of(self, other: RrtConnect) -> None:
-        """Adds the checks of a search that ran at the same time to those of this one."""
+    def add_counts(self, other: RrtConnect) -> None:
+        """Adds the check counts of a parallel search to the counts of this search."""
         self._bodies.counts[:] += other._bodies.counts
         self._bodies.refusals[:] += other._bodies.refusals
 
     def run(self) -> Array | None:
-        """Returns vertices of shape (n, joints) from the start to one of the goals, or None."""
-        return SideBySide(self._problem, [self]).run()
+        """Returns path vertices from the start to one of the goals, shape (n, joints), or None."""
+        return ParallelSearch(self._problem, [self]).run()
 
-    def _space_of(self, world: World, step: float, longest: float, is_weighted: bool, bound: float) -> Space:
+    def _search_space(
+        self, world: World, step: float, max_extension: float, is_weighted: bool, length_bound: float
+    ) -> Space:
         problem = self._problem
         count = len(self._low)
         edges, weights = problem.motion.edges(step), np.ones(count)
         if is_weighted:
             weights = np.sqrt((np.abs(edges.map) * reaches(world)[:, None]).max(axis=0))
-            weights = np.maximum(weights / (weights.max() or 1.0), LEAST_WEIGHT)
-        squares = (weights * (self._near[1] - self._near[0])) ** 2
-        near = squares.sum() / 6.0 - DEVIATIONS * np.sqrt(7.0 / 180.0 * (squares**2).sum())  # of two random states
-        domain = max(LEAST_DOMAIN * longest, float(np.sqrt(max(near, 0.0))))
-        if bound < np.inf:  # the shortest paths lie near obstacles
-            domain = np.inf
-        return Space(weights, longest, domain, bound, edges)
+            weights = np.maximum(weights / (weights.max() or 1.0), MIN_WEIGHT)
+        squares = (weights * (self._local_bounds[1] - self._local_bounds[0])) ** 2
+        # Mean and variance of the squared distance of two uniform states: squares / 6 and 7 / 180 squares^2 per joint
+        squared_radius = squares.sum() / 6.0 - DOMAIN_DEVIATIONS * np.sqrt(7.0 / 180.0 * (squares**2).sum())
+        domain_radius = max(MIN_DOMAIN_EXTENSIONS * max_extension, float(np.sqrt(max(squared_radius, 0.0))))
+        if length_bound < np.inf:  # short paths pass close to obstacles
+            domain_radius = np.inf
+        return Space(weights, max_extension, domain_radius, length_bound, edges)
 
     def _random_states(self) -> Array:
-        low, high = (self._low, self._high) if self._batches % WIDE_EVERY == 0 else self._near
-        # what rng.uniform(low, high) gives, in a third of its time
-        return low + (high - low) * self._problem.rng.random((SAMPLES, len(low)))
+        low, high = (self._low, self._high) if self._batches % FULL_BOUNDS_PERIOD == 0 else self._local_bounds
+        # Equal to rng.uniform(low, high), in a third of the time
+        return low + (high - low) * self._problem.rng.random((SAMPLE_BATCH, len(low)))
 
     def _states_within_bound(self) -> Array:
-        """Random states over which a path may be shorter than the bound, and a number in 0 to 1 behind each.
+        """Returns states on paths that can be shorter than the bound, each followed by a random number from 0 to 1.
 
-        They are uniform in the ellipsoid whose focal points are the start and one of the goals, as in Gammell et al.:
+        The states are uniform in the ellipsoid with the start and a random goal as foci, as in Gammell et al.:
         Informed RRT*, IROS 2014.
         """
         rng, start, weights = self._problem.rng, self._problem.start_values, self._space.weights
-        ways = weights * (self._goals - start)
-        ways = ways[np.linalg.norm(ways, axis=1) < self._space.bound]
-        way = ways[rng.integers(len(ways))]
-        distance, count = float(np.linalg.norm(way)), len(way)
-        radii = np.full(count, 0.5 * np.sqrt(self._space.bound**2 - distance**2))
-        radii[0] = 0.5 * self._space.bound
-        directions = rng.normal(size=(SAMPLES, count))
+        offsets = weights * (self._goals - start)
+        offsets = offsets[np.linalg.norm(offsets, axis=1) < self._space.length_bound]
+        offset = offsets[rng.integers(len(offsets))]
+        distance, count = float(np.linalg.norm(offset)), len(offset)
+        radii = np.full(count, 0.5 * np.sqrt(self._space.length_bound**2 - distance**2))
+        radii[0] = 0.5 * self._space.length_bound
+        directions = rng.normal(size=(SAMPLE_BATCH, count))
         directions /= np.linalg.norm(directions, axis=1)[:, None]
-        ball = directions * rng.random((SAMPLES, 1)) ** (1.0 / count) * radii
-        mirror = way / distance - np.eye(count)[0]  # Householder's: it takes the first axis to the way
-        square = float(mirror @ mirror)
-        if square > 0.0:
-            ball -= np.outer(ball @ mirror, mirror) * (2.0 / square)
-        states = np.clip(start + (0.5 * way + ball) / weights, self._low, self._high)
-        return np.column_stack([states, rng.random(SAMPLES)])
+        samples = directions * rng.random((SAMPLE_BATCH, 1)) ** (1.0 / count) * radii
+        reflector = offset / distance - np.eye(count)[0]  # Householder reflection of the first axis onto the offset
+        squared_norm = float(reflector @ reflector)
+        if squared_norm > 0.0:
+            samples -= np.outer(samples @ reflector, reflector) * (2.0 / squared_norm)
+        states = np.clip(start + (0.5 * offset + samples) / weights, self._low, self._high)
+        return np.column_stack([states, rng.random(SAMPLE_BATCH)])
 
     def _undecided_edge_is_free(self) -> bool:
         trees = self._trees
-        here, end = trees.states[trees.position[1], trees.position[3]], np.empty_like(trees.target)
-        write_step(here, trees.target, self._space, end)
-        return self._problem.motion.edge_is_free(here, end, self._space.edges.step)
+        start, end = trees.states[trees.cursor[1], trees.cursor[3]], np.empty_like(trees.target)
+        write_step(start, trees.target, self._space, end)
+        return self._problem.motion.edge_is_free(start, end, self._space.edges.step)
 
-    def _add_room(self) -> None:
+    def _add_capacity(self) -> None:
         trees = self._trees
         self._trees = trees._replace(
             states=np.concatenate([trees.states, np.empty_like(trees.states)], axis=1),
@@ -249,55 +257,55 @@ class RrtConnect:
     def _vertices(self) -> Array:
         branches = []
         for tree in (0, 1):
-            number, branch = int(self._trees.sizes[tree]) - 1, []
-            while number >= 0:
-                branch.append(self._trees.states[tree, number])
-                number = int(self._trees.parents[tree, number])
+            index, branch = int(self._trees.sizes[tree]) - 1, []
+            while index >= 0:
+                branch.append(self._trees.states[tree, index])
+                index = int(self._trees.parents[tree, index])
             branches.append(branch)
         return np.array([*reversed(branches[0]), *branches[1][1:]])
 
 
-class SideBySide:
-    """Searches of one problem that run at the same time, in a thread each; the first path that one of them finds wins.
+class ParallelSearch:
+    """Searches of one problem in parallel threads, which return the first path found.
 
-    They take turns of some edges, after which all are waited for: which one is first does not depend on the machine.
+    The searches run in rounds of equal numbers of edge checks, so that the winner does not depend on thread timing.
     """
 
     def __init__(self, problem: PlanningProblem, searches: Sequence[RrtConnect]) -> None:
-        """Stores the searches; each needs a random generator of its own."""
+        """Stores the searches; each search needs its own random generator."""
         self._problem, self._searches = problem, list(searches)
 
     @property
-    def states(self) -> int:
-        """How many edges were checked."""
-        return sum(search.states for search in self._searches)
+    def checks(self) -> int:
+        """Number of edge checks of all searches."""
+        return sum(search.checks for search in self._searches)
 
     def run(self) -> Array | None:
-        """Returns the first path that is found, the shortest of several; None where time or samples are over."""
+        """Returns the first path found, or the shortest of a round; None if time or extensions run out."""
         if len(self._searches) == 1:
-            return self._take_turns(map)
+            return self._run_rounds(map)
         with ThreadPoolExecutor(len(self._searches)) as threads:
-            path = self._take_turns(threads.map)
+            path = self._run_rounds(threads.map)
         first, *others = self._searches
         for search in others:
-            first.add_counts_of(search)
+            first.add_counts(search)
         return path
 
-    def _take_turns(
-        self, each: Callable[[Callable[[RrtConnect], None], list[RrtConnect]], Iterable[None]]
+    def _run_rounds(
+        self, map_searches: Callable[[Callable[[RrtConnect], None], list[RrtConnect]], Iterable[None]]
     ) -> Array | None:
         problem, searches = self._problem, self._searches
         while searches:
             growing = searches
-            while growing:  # a turn does not depend on which edges the bounds leave open
-                for _ in each(RrtConnect.grow, growing):
+            while growing:  # a round has the same extent however many edges are undecided
+                for _ in map_searches(RrtConnect.grow, growing):
                     pass
                 growing = [search for search in growing if search.is_undecided and not problem.interrupted()]
                 for search in growing:
                     search.decide()
             paths = [search.path for search in searches if search.path is not None]
             if paths:
-                # a search that the clock ends is not repeatable
+                # A search stopped by the clock is not repeatable
                 return None if problem.repeatable and problem.interrupted() else min(paths, key=path_length)
             if problem.interrupted():
                 return None
