@@ -204,7 +204,7 @@ def test_rules_of_a_sequence_are_kept_and_reported(home: Pose) -> None:
     started = to(home, 0.1, 0, -0.1, start_state=here)
     for message, code, text in (
         (sequence((first, -0.01), (second, 0.0)), CODES.INVALID_MOTION_PLAN, "items[0].blend_radius is -0.01"),
-        (sequence((first, 0.01), (second, 0.01)), CODES.INVALID_MOTION_PLAN, "the last one must be 0"),
+        (sequence((first, 0.01), (second, 0.01)), CODES.INVALID_MOTION_PLAN, "the last radius must be 0"),
         (sequence((first, 0.0), (started, 0.0)), CODES.INVALID_ROBOT_STATE, "items[1].start_state"),
         (sequence((first, 0.06), (second, 0.06), (third, 0.0)), CODES.INVALID_MOTION_PLAN, "overlap"),
         (sequence((first, 0.0), (to(home, 0, 3.0, 0), 0.0)), CODES.NO_IK_SOLUTION, "items[1]: "),

@@ -253,7 +253,7 @@ def test_a_joint_that_would_be_too_fast_refuses_the_line_and_is_named(
     far = moved(home, (0.3, 0.1, -0.1), (0, 0, 1.5))
     error = failure(pipeline, lin(scene, far, velocity_scaling=1.0, acceleration_scaling=1.0))
     assert error.code == ErrorCode.INVALID_MOTION_PLAN
-    assert re.search("joint '.*' would need (velocity|acceleration) .*; allowed is .*scaling_factor", error.reason)
+    assert re.search("joint '.*' would need (velocity|acceleration) .*; its limit is .*scaling_factor", error.reason)
 
 
 def test_refusals_have_a_code_and_a_reason(

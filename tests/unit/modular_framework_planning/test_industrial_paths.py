@@ -13,8 +13,8 @@ from modular_framework_planning.errors import ErrorCode, ModelError, PlanningErr
 from modular_framework_planning.planners.pilz.cartesian_limits import CartesianLimits, read_cartesian_limits
 from modular_framework_planning.planners.pilz.pose_path import LinePath, arc_around_centre, arc_through_interim, timed
 from modular_framework_planning.planners.pilz.velocity_profile import (
+    MIN_GAP_S,
     ROUNDING_S,
-    SHORTEST_GAP_S,
     fastest_profile,
     sample_times,
 )
@@ -64,7 +64,7 @@ def test_profiles_go_the_distance_within_limits_and_rest_at_both_ends(
     assert change.max() <= acceleration * (1 + 1e-6) and change.min() >= -deceleration * (1 + 1e-6)
     points = sample_times(profile.duration_s, profile.knots, 0.1)
     assert points[0] == 0.0 and points[-1] == pytest.approx(profile.duration_s, abs=1e-9)
-    assert np.diff(points).min() >= 0.99e-4 and np.diff(points).max() <= 0.1 + SHORTEST_GAP_S
+    assert np.diff(points).min() >= 0.99e-4 and np.diff(points).max() <= 0.1 + MIN_GAP_S
 
 
 def test_the_rotation_speeds_up_in_the_ratio_of_the_translation() -> None:

@@ -200,7 +200,7 @@ def spec(group: str = GROUP, radius: float = 0.0, start: bool = False) -> ItemSp
         (
             [spec(), spec(radius=0.1)],
             ErrorCode.INVALID_MOTION_PLAN,
-            "items[1].blend_radius is 0.1; the last one must be 0",
+            "items[1].blend_radius is 0.1; the last radius must be 0",
         ),
         ([spec(start=True), spec(start=True)], ErrorCode.INVALID_ROBOT_STATE, "items[1].start_state"),
         ([spec(), spec("ezgripper"), spec(start=True)], ErrorCode.INVALID_ROBOT_STATE, "items[2].start_state"),

@@ -117,7 +117,7 @@ def test_update_moves_towards_the_cheaper_copies_and_keeps_the_ends() -> None:
         np.random.default_rng(1),
     )
     line = optimiser.line(np.zeros(2), np.ones(2))
-    copies = optimiser.disturbed(line, np.full(200, 0.3))
+    copies = optimiser.noisy_copies(line, np.full(200, 0.3))
     assert np.array_equal(copies[:, [0, -1]], np.repeat(line[None, [0, -1]], 200, axis=0))
     assert 0.2 < copies[:, 30].std(axis=0).mean() < 0.4, "standard deviation in the middle"
     costs = optimiser.costs(copies, lambda states: np.abs(states[:, 0] - 5.0))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pilz's industrial motions: point to point (PTP), straight lines (LIN), arcs (CIRC), and sequences of them."""
+"""Pilz industrial motions: point-to-point (PTP), linear (LIN), circular (CIRC), and blended sequences."""

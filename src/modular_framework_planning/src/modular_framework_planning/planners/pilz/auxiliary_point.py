@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the auxiliary point of a circle from path_constraints, where Pilz's planner expects it; it is no constraint."""
+"""Auxiliary point of a CIRC motion, which Pilz's planner passes in the path_constraints of a request."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ CENTRE, INTERIM = "center", "interim"
 
 
 def auxiliary_point(scene: PlanningScene, constraints: Any, where: str = "path_constraints") -> AuxiliaryPoint:
-    """Reads the point.
+    """Returns the auxiliary point in the planning frame.
 
     Args:
-        scene: gives frames their poses.
+        scene: Planning scene with the frame poses.
         constraints: moveit_msgs/Constraints named "center" or "interim", with one position constraint whose region
-            has one pose; shapes and orientation do not matter and may be left out.
-        where: what the message belongs to, for error texts.
+            has one pose; shapes and orientation are ignored.
+        where: Name of the message field in error messages.
 
     Raises:
-        PlanningError: the name is another, there is not exactly one point, it is not finite, or its frame or link
-            does not exist.
+        PlanningError: The name is unknown, the number of points is not 1, the point is not finite, or its frame or
+            link does not exist.
     """
     poses = [
         pose
@@ -38,7 +38,7 @@ def auxiliary_point(scene: PlanningScene, constraints: Any, where: str = "path_c
             f"{where}: name '{constraints.name}' with "
             f"{len(constraints.position_constraints)} position constraints and {len(poses)} poses; "
             f"CIRC needs the name '{CENTRE}' or '{INTERIM}' and one position constraint whose region "
-            "has one pose, the point",
+            "has one pose: the auxiliary point",
         )
     item = constraints.position_constraints[0]
     if item.link_name and not scene.model.has_link(item.link_name):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Limits of a tool's speed along lines and arcs, as `robot_description_planning/cartesian_limits` gives them."""
+"""Cartesian velocity limits of LIN and CIRC motions from `robot_description_planning/cartesian_limits`."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ KEYS = ("max_trans_vel", "max_trans_acc", "max_trans_dec", "max_rot_vel")
 
 @dataclass(frozen=True, slots=True)
 class CartesianLimits:
-    """Limits of a link's motion.
+    """Cartesian limits of a link.
 
     Attributes:
-        velocity: translation [m/s].
-        acceleration, deceleration: translation, both above 0 [m/s^2].
-        rotation_velocity: [rad/s]; rotation speeds up in the same ratio to it as translation does to its own.
+        velocity: Maximum translational velocity [m/s].
+        acceleration, deceleration: Maximum translational acceleration and deceleration, both positive [m/s^2].
+        rotation_velocity: Maximum angular velocity [rad/s]; angular accelerations have the same ratio to it as
+            translational accelerations have to `velocity`.
     """
 
     velocity: float
@@ -30,7 +31,7 @@ class CartesianLimits:
 
     @property
     def metres_per_radian(self) -> float:
-        """Length of the translation that takes as long as a turn of one radian."""
+        """Translation that takes as long as a rotation by one radian [m/rad]."""
         return self.velocity / self.rotation_velocity
 
 
@@ -38,7 +39,7 @@ def read_cartesian_limits(entries: Mapping[str, Any], where: str = "cartesian_li
     """Reads the four limits.
 
     Raises:
-        ModelError: lists every key that is missing or has a value that cannot be.
+        ModelError: Lists every key that is missing or has an invalid value.
     """
     faults = []
     for key in KEYS:
@@ -51,7 +52,7 @@ def read_cartesian_limits(entries: Mapping[str, Any], where: str = "cartesian_li
             or (sign * value <= 0.0)
         ):
             got = "missing" if key not in entries else repr(value)
-            faults.append(f"{key} is {got}; a number {'below' if sign < 0 else 'above'} 0 is needed")
+            faults.append(f"{key} is {got}; it must be a number {'below' if sign < 0 else 'above'} 0")
     if faults:
         raise ModelError(f"{where}: {'; '.join(faults)}; see pilz_cartesian_limits.yaml of a config package")
     return CartesianLimits(

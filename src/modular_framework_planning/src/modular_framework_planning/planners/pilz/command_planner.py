@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planner of the pipeline pilz_industrial_motion_planner: one motion of a known shape per request.
+"""Planner of the pipeline pilz_industrial_motion_planner: one PTP, LIN or CIRC motion per request.
 
-It does not avoid obstacles: it returns exactly the requested motion, or refuses it with the reason.
+The planner does not avoid obstacles. It returns exactly the requested motion or raises an error with the reason.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planners.pilz.auxiliary_point import CENTRE, INTERIM
 from modular_framework_planning.planners.pilz.cartesian_limits import CartesianLimits, read_cartesian_limits
-from modular_framework_planning.planners.pilz.commands import Pace, along_path, point_to_point
-from modular_framework_planning.planners.pilz.joint_motion import JointRates
+from modular_framework_planning.planners.pilz.commands import MotionSettings, along_path, point_to_point
+from modular_framework_planning.planners.pilz.joint_motion import JointRateLimits
 from modular_framework_planning.planners.pilz.pose_path import (
     LinePath,
     PosePath,
@@ -32,12 +32,12 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 DEFAULT_SAMPLING_TIME_S = 0.1
-MAX_START_VELOCITY = 0.01  # [rad/s or m/s]; measured velocities of a joint at rest stay below it
+MAX_START_VELOCITY = 0.01  # upper limit of measurement noise on the velocity of a joint at rest [rad/s or m/s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Target:
-    """The goal pose of a link, and its joint values if the goal was given by joints."""
+    """Goal pose of a link, and the joint values of a joint goal."""
 
     link: str
     pose: Transform
@@ -50,7 +50,7 @@ class CommandPlanner:
     planner_ids = ("PTP", "LIN", "CIRC")
     replaces_bad_values = False
     auxiliary_constraints = (CENTRE, INTERIM)
-    collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt: its generators check no collisions themselves
+    collision_code = ErrorCode.INVALID_MOTION_PLAN  # as in MoveIt, whose generators do not check collisions
 
     def __init__(
         self, cartesian_limits: Mapping[str, Any] | None, sampling_time_s: float = DEFAULT_SAMPLING_TIME_S
@@ -58,76 +58,75 @@ class CommandPlanner:
         """Stores the limits.
 
         Args:
-            cartesian_limits: max_trans_vel, max_trans_acc, max_trans_dec, max_rot_vel; may be absent for PTP alone.
-            sampling_time_s: between two points of a motion.
+            cartesian_limits: Entries max_trans_vel, max_trans_acc, max_trans_dec and max_rot_vel; optional for PTP.
+            sampling_time_s: Sampling period of the trajectories [s].
 
         Raises:
-            ModelError: the sampling time is not above 0, or a limit is not usable.
+            ModelError: The sampling time is not above 0, or a limit is invalid.
         """
         if not (math.isfinite(sampling_time_s) and sampling_time_s > 0.0):
-            raise ModelError(f"sampling_time is {sampling_time_s}; a time above 0 s is needed")
+            raise ModelError(f"sampling_time is {sampling_time_s}; it must be above 0 s")
         self.sampling_time_s = sampling_time_s
         self._limits = read_cartesian_limits(cartesian_limits) if cartesian_limits else None
 
     @classmethod
     def configure(cls, _model: RobotModel, settings: PipelineSettings) -> CommandPlanner:
-        """Makes the planner from parameters: robot_description_planning/cartesian_limits, sampling_time."""
+        """Returns the planner with the parameters robot_description_planning/cartesian_limits and sampling_time."""
         return cls(
             settings.robot_planning.get("cartesian_limits"),
             float(settings.parameters.get("sampling_time", DEFAULT_SAMPLING_TIME_S)),
         )
 
     def plan(self, problem: PlanningProblem) -> Trajectory:
-        """Plans one motion; raises PlanningError with the reason."""
+        """Returns the requested motion; raises PlanningError with the reason if it is impossible."""
         if problem.cancelled():
             raise PlanningError(ErrorCode.PREEMPTED, f"{problem.planner_id} was cancelled before it began")
         _require_start_at_rest(problem)
         if len(problem.request.goals) != 1:
             raise PlanningError(
                 ErrorCode.INVALID_GOAL_CONSTRAINTS,
-                f"goal_constraints: {len(problem.request.goals)} alternatives; {problem.planner_id} takes exactly one",
+                f"goal_constraints has {len(problem.request.goals)} goals; {problem.planner_id} needs exactly one",
             )
         if not isinstance(problem.request.goals[0], JointGoal | PoseGoal):
             raise PlanningError(
                 ErrorCode.INVALID_GOAL_CONSTRAINTS,
-                f"goal_constraints: {problem.planner_id} takes "
-                "joint constraints alone, or one position and one orientation constraint of one link",
+                f"goal_constraints: {problem.planner_id} needs "
+                "either joint constraints, or one position and one orientation constraint of the same link",
             )
-        pace = self._pace(problem)
+        settings = self._motion_settings(problem)
         match problem.planner_id:
             case "PTP" | "":
-                rates = JointRates.of(problem.model, problem.group)
-                return point_to_point(problem.start_values, problem.goal_states()[0], rates, pace)
+                limits = JointRateLimits.of(problem.model, problem.group)
+                return point_to_point(problem.start_values, problem.goal_states()[0], limits, settings)
             case "LIN" | "CIRC":
-                return self._along_path(problem, pace)
+                return self._along_path(problem, settings)
         raise PlanningError(
-            ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' is not one of {', '.join(self.planner_ids)}"
+            ErrorCode.PLANNING_FAILED, f"planner_id '{problem.planner_id}' must be one of {', '.join(self.planner_ids)}"
         )
 
-    def _pace(self, problem: PlanningProblem) -> Pace:
-        """Reads the scaling factors back from the scaled limits, where 0 has become the default."""
+    def _motion_settings(self, problem: PlanningProblem) -> MotionSettings:
+        """Recovers the scaling factors from the scaled limits, in which a factor of 0 is replaced by the default."""
         indices = problem.group.indices
-        return Pace(
+        return MotionSettings(
             float((problem.max_velocity / problem.model.max_velocity[indices]).min()),
             float((problem.max_acceleration / problem.model.max_acceleration[indices]).min()),
             self.sampling_time_s,
         )
 
-    def _along_path(self, problem: PlanningProblem, pace: Pace) -> Trajectory:
+    def _along_path(self, problem: PlanningProblem, settings: MotionSettings) -> Trajectory:
         limits = self._require_limits(problem.planner_id)
         solver = problem.kinematics.solver(problem.group.name)
         target = _target(problem)
         follower = PoseFollower(solver, target.link, problem.start)
         path = _path(problem, follower.pose(problem.start_values), target.pose)
-        return along_path(path, follower, problem.start_values, limits, pace, target.values)
+        return along_path(path, follower, problem.start_values, limits, settings, target.values)
 
     def _require_limits(self, planner_id: str) -> CartesianLimits:
         if self._limits is None:
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
-                f"{planner_id}: robot_description_planning/"
-                "cartesian_limits is not set; load a pilz_cartesian_limits.yaml with max_trans_vel, "
-                "max_trans_acc, max_trans_dec and max_rot_vel",
+                f"{planner_id}: robot_description_planning/cartesian_limits is not set; load a "
+                "pilz_cartesian_limits.yaml with max_trans_vel, max_trans_acc, max_trans_dec and max_rot_vel",
             )
         return self._limits
 
@@ -138,7 +137,7 @@ def _require_start_at_rest(problem: PlanningProblem) -> None:
             raise PlanningError(
                 ErrorCode.INVALID_ROBOT_STATE,
                 f"start state: joint '{name}' moves at {velocity}; "
-                f"{problem.planner_id} starts from rest (at most {MAX_START_VELOCITY})",
+                f"{problem.planner_id} starts from rest (at most {MAX_START_VELOCITY}); wait until the robot stops",
             )
 
 
@@ -159,7 +158,7 @@ def _path(problem: PlanningProblem, start: Transform, end: Transform) -> PosePat
     if auxiliary is None:
         raise PlanningError(
             ErrorCode.INVALID_MOTION_PLAN,
-            f"CIRC: path_constraints: neither '{CENTRE}' nor "
-            f"'{INTERIM}'; one is needed as the name, with a position constraint that is the point",
+            f"CIRC: path_constraints must have the name '{CENTRE}' or "
+            f"'{INTERIM}' and a position constraint with the auxiliary point",
         )
     return (arc_around_centre if auxiliary.name == CENTRE else arc_through_interim)(start, end, auxiliary.position)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The three motions: PTP moves the joints synchronously, LIN moves a link along a line, CIRC along an arc."""
+"""PTP, LIN and CIRC trajectories: synchronous joint motion, link motion along a line, link motion along an arc."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.pose_follower import PoseFollower
 from modular_framework_planning.planners.pilz.cartesian_limits import CartesianLimits
-from modular_framework_planning.planners.pilz.joint_motion import JointRates, JointState, Posture, at_rest, follow
+from modular_framework_planning.planners.pilz.joint_motion import JointRateLimits, JointState, Posture, at_rest, follow
 from modular_framework_planning.planners.pilz.pose_path import PosePath, TimedPath, timed
 from modular_framework_planning.planners.pilz.velocity_profile import fastest_profile, sample_times
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-SAME_POSITION = 1.0e-9  # [rad or m]
-GOAL_TOLERANCE = 1.0e-4  # [rad or m] between the end of a line and the joint values that were asked for
+MIN_MOTION = 1.0e-9  # [rad or m]
+GOAL_TOLERANCE = 1.0e-4  # distance between the end of a path and the requested joint values [rad or m]
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class MotionSettings:
     """Speed and sampling period of a motion.
 
     Attributes:
-        velocity_scaling, acceleration_scaling: shares of the limits, in (0, 1].
-        period_s: between two points of a trajectory.
+        velocity_scaling, acceleration_scaling: Fractions of the limits, in (0, 1].
+        period_s: Sampling period of the trajectory [s].
     """
 
     velocity_scaling: float
@@ -35,81 +35,95 @@ class Pace:
 
 
 def standstill(joints: tuple[str, ...], values: Array) -> Trajectory:
-    """Returns the trajectory of one point."""
+    """Returns a trajectory with a single point."""
     still = np.zeros((1, len(values)))
     return Trajectory(joints, np.zeros(1), values[None, :].copy(), still, still.copy())
 
 
-def point_to_point(start: Array, goal: Array, rates: JointRates, pace: Pace) -> Trajectory:
-    """Moves all joints with common phases under the strictest limits of any; the joint with the longest way leads."""
+def point_to_point(start: Array, goal: Array, limits: JointRateLimits, settings: MotionSettings) -> Trajectory:
+    """Returns a PTP motion whose joints accelerate, cruise and brake together.
+
+    The joint with the largest change moves within the strictest limits of all joints; the others scale with it.
+
+    Args:
+        start: Start joint vector [rad or m].
+        goal: Goal joint vector [rad or m].
+        limits: Joint limits.
+        settings: Speed and sampling period.
+    """
     change = goal - start
-    lead = float(np.abs(change).max())
-    if lead < SAME_POSITION:
-        return standstill(rates.joints, start)
+    max_change = float(np.abs(change).max())
+    if max_change < MIN_MOTION:
+        return standstill(limits.joints, start)
     profile = fastest_profile(
-        lead,
-        float(rates.velocity.min()) * pace.velocity_scaling,
-        float(rates.acceleration.min()) * pace.acceleration_scaling,
-        float(rates.deceleration.min()) * pace.acceleration_scaling,
+        max_change,
+        float(limits.velocity.min()) * settings.velocity_scaling,
+        float(limits.acceleration.min()) * settings.acceleration_scaling,
+        float(limits.deceleration.min()) * settings.acceleration_scaling,
     )
-    times = sample_times(profile.duration_s, profile.knots, pace.period_s)
-    position, velocity, acceleration = (values[:, None] / lead * change for values in profile.at(times))
+    times = sample_times(profile.duration_s, profile.knots, settings.period_s)
+    position, velocity, acceleration = (values[:, None] / max_change * change for values in profile.at(times))
     positions = start + position
     positions[-1], velocity[-1], acceleration[-1] = goal, 0.0, 0.0
-    return Trajectory(rates.joints, times, positions, velocity, acceleration)
+    return Trajectory(limits.joints, times, positions, velocity, acceleration)
 
 
 def along_path(
-    path: PosePath, follower: PoseFollower, start: Array, limits: CartesianLimits, pace: Pace, goal: Array | None = None
+    path: PosePath,
+    follower: PoseFollower,
+    start: Array,
+    limits: CartesianLimits,
+    settings: MotionSettings,
+    goal: Array | None = None,
 ) -> Trajectory:
-    """Moves a link along a path.
+    """Returns the joint trajectory of a link motion along a path.
 
     Args:
-        path: of the follower's link.
-        follower: inverse kinematics by continuation.
-        start: joint values at the start of the path.
-        limits: of the link.
-        pace: how fast.
-        goal: joint values the motion has to end at, where the goal was given by joints.
+        path: Path of the follower's link.
+        follower: Kinematics of the link.
+        start: Joint values at the start of the path [rad or m].
+        limits: Cartesian limits of the link.
+        settings: Speed and sampling period.
+        goal: Joint values of a joint goal [rad or m], otherwise None.
 
     Raises:
-        PlanningError: a pose cannot be reached without a jump, a limit is broken, or the end is another posture than
-            that of the goal.
+        PlanningError: A pose cannot be reached without a jump, a joint limit is exceeded, or the final posture
+            differs from the goal.
     """
-    motion = timed(path, limits, pace.velocity_scaling, pace.acceleration_scaling)
+    motion = timed(path, limits, settings.velocity_scaling, settings.acceleration_scaling)
     if motion is None:
         trajectory = standstill(follower.group.joints, start)
     else:
-        posture = None if goal is None else _towards(motion, start, goal)
-        trajectory = follow(motion, follower, pace.period_s, at_rest(start), posture=posture)
+        posture = None if goal is None else _posture_between(motion, start, goal)
+        trajectory = follow(motion, follower, settings.period_s, at_rest(start), posture=posture)
     if goal is not None:
         require_posture(trajectory, goal)
     return trajectory
 
 
-def _towards(motion: TimedPath, start: Array, goal: Array) -> Posture:
-    """Returns the postures of a redundant arm whose end is given by joints."""
+def _posture_between(motion: TimedPath, start: Array, goal: Array) -> Posture:
+    """Returns the preferred postures of a redundant arm on the way to a joint goal."""
 
     def posture(time_s: float) -> JointState:
-        shares = (float(values[0]) / motion.profile.distance for values in motion.profile.at(np.array([time_s])))
-        share, speed, change = shares
-        return JointState(start + share * (goal - start), speed * (goal - start), change * (goal - start))
+        progress = (float(values[0]) / motion.profile.distance for values in motion.profile.at(np.array([time_s])))
+        fraction, rate, rate_change = progress
+        return JointState(start + fraction * (goal - start), rate * (goal - start), rate_change * (goal - start))
 
     return posture
 
 
 def require_posture(trajectory: Trajectory, goal: Array) -> None:
-    """Checks that a motion ends at joint values.
+    """Checks that a trajectory ends at the joint values of the goal.
 
     Raises:
-        PlanningError: the same pose is reached with other joint values.
+        PlanningError: The joint values differ.
     """
-    off = np.abs(trajectory.positions[-1] - goal)
-    worst = int(off.argmax())
-    if off[worst] > GOAL_TOLERANCE:
+    deviation = np.abs(trajectory.positions[-1] - goal)
+    worst = int(deviation.argmax())
+    if deviation[worst] > GOAL_TOLERANCE:
         raise PlanningError(
             ErrorCode.GOAL_CONSTRAINTS_VIOLATED,
-            "the path ends at the goal's pose in another posture: "
-            f"joint '{trajectory.joint_names[worst]}' at {trajectory.positions[-1][worst]:.4f} instead "
-            f"of {goal[worst]:.4f}; give the goal as a pose, or move there by PTP",
+            "the path ends at the goal pose, but in a different posture: "
+            f"joint '{trajectory.joint_names[worst]}' is at {trajectory.positions[-1][worst]:.4f} instead "
+            f"of {goal[worst]:.4f}; request a pose goal or use PTP",
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Converts a link's motion over time to a joint trajectory, and checks each sample against the joint limits."""
+"""Conversion of a link motion to a joint trajectory within the joint limits."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from modular_framework_planning.planners.pilz.velocity_profile import sample_tim
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-CHECK_PERIOD_S = 0.01  # between two checks of the joints' limits
+CHECK_PERIOD_S = 0.01  # period of the joint limit checks
 MAX_CHECKS = 4000
-DIFFERENCE_S = 1.0e-5  # step of the numeric derivatives of a pose
-LIMIT_TOLERANCE = 1.0e-3  # share of a limit
+DIFFERENCE_STEP_S = 1.0e-5  # step of the numeric derivatives of a pose
+LIMIT_TOLERANCE = 1.0e-3  # fraction of a limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointState:
-    """Joints of a group at one moment, shape (joints,) each [rad or m, per s, per s^2]."""
+    """Joint state of a group, with arrays of shape (joints,) [rad or m, per s, per s^2]."""
 
     positions: Array
     velocities: Array
     accelerations: Array
 
 
-Posture = Callable[[float], JointState]  # over the time of a motion
+Posture = Callable[[float], JointState]  # preferred joint state at a time [s]
 
 
 def at_rest(positions: Array) -> JointState:
@@ -41,30 +41,30 @@ def at_rest(positions: Array) -> JointState:
 
 
 def state_at(trajectory: Trajectory, time_s: float) -> JointState:
-    """Returns the joints of a trajectory at a moment; at rest before and after it."""
+    """Returns the joint state of a trajectory at a time; before and after the trajectory, the joints are at rest."""
     if not 0.0 <= time_s <= trajectory.duration_s:
         return at_rest(trajectory.positions[0 if time_s < 0.0 else -1])
     return JointState(*(rows[0] for rows in trajectory.at(np.array([time_s]))[:3]))
 
 
 class PoseMotion(Protocol):
-    """A link's pose over time; at rest outside of it."""
+    """Pose of a link over time."""
 
     @property
     def duration_s(self) -> float:
-        """Length of the motion."""
+        """Duration of the motion [s]."""
 
     @property
     def knots(self) -> Array:
-        """Times at which the jerk may change, in order [s]."""
+        """Times at which the jerk can change, in ascending order [s]."""
 
     def pose(self, time_s: float) -> Transform:
-        """Returns the link's pose in the planning frame."""
+        """Returns the link pose in the planning frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointRates:
-    """Velocity and acceleration limits of a group's joints, in their order [1/s, 1/s^2]."""
+class JointRateLimits:
+    """Velocity, acceleration and deceleration limits of the joints of a group [rad or m, per s or per s^2]."""
 
     joints: tuple[str, ...]
     velocity: Array
@@ -72,8 +72,8 @@ class JointRates:
     deceleration: Array
 
     @classmethod
-    def of(cls, model: RobotModel, group: JointGroup) -> JointRates:
-        """Reads the limits of a group."""
+    def of(cls, model: RobotModel, group: JointGroup) -> JointRateLimits:
+        """Returns the limits of a group."""
         return cls(
             group.joints,
             model.max_velocity[group.indices],
@@ -82,14 +82,19 @@ class JointRates:
         )
 
     def require(self, time_s: float, velocities: Array, accelerations: Array) -> None:
-        """Checks one sample.
+        """Checks a sample against the limits.
+
+        Args:
+            time_s: Time of the sample, for the error message [s].
+            velocities: Joint velocities, shape (joints,).
+            accelerations: Joint accelerations, shape (joints,).
 
         Raises:
-            PlanningError: names the joint that is furthest above its limit.
+            PlanningError: Names the joint that exceeds its limit most.
         """
         braking = velocities * accelerations < 0.0
         allowed = np.where(braking, self.deceleration, self.acceleration)
-        for what, unit, values, limits in (
+        for quantity, unit, values, limits in (
             ("velocity", "1/s", velocities, self.velocity),
             ("acceleration", "1/s^2", accelerations, allowed),
         ):
@@ -98,21 +103,21 @@ class JointRates:
             if excess[worst] > 1.0 + LIMIT_TOLERANCE:
                 raise PlanningError(
                     ErrorCode.INVALID_MOTION_PLAN,
-                    f"joint '{self.joints[worst]}' would need {what} {abs(values[worst]):.3f} {unit} at "
-                    f"{time_s:.3f} s; allowed is {limits[worst]:.3f}: lower max_{what}_scaling_factor, or keep away "
-                    "from singular postures",
+                    f"joint '{self.joints[worst]}' would need {quantity} {abs(values[worst]):.3f} {unit} at "
+                    f"{time_s:.3f} s; its limit is {limits[worst]:.3f}: lower max_{quantity}_scaling_factor or avoid "
+                    "singular postures",
                 )
 
 
 def link_motion(motion: PoseMotion, time_s: float) -> LinkMotion:
-    """Returns velocity and acceleration of a link by central differences."""
-    step = DIFFERENCE_S
+    """Returns the velocity and acceleration of a link by central differences."""
+    step = DIFFERENCE_STEP_S
     before, now, after = (motion.pose(time_s + shift) for shift in (-step, 0.0, step))
-    turn_before = now.rotation @ pin.log3(before.rotation.T @ now.rotation)
-    turn_after = now.rotation @ pin.log3(now.rotation.T @ after.rotation)
+    rotation_before = now.rotation @ pin.log3(before.rotation.T @ now.rotation)
+    rotation_after = now.rotation @ pin.log3(now.rotation.T @ after.rotation)
     step_before, step_after = now.translation - before.translation, after.translation - now.translation
-    velocity = np.concatenate([step_before + step_after, turn_before + turn_after]) / (2.0 * step)
-    return LinkMotion(velocity, np.concatenate([step_after - step_before, turn_after - turn_before]) / step**2)
+    velocity = np.concatenate([step_before + step_after, rotation_before + rotation_after]) / (2.0 * step)
+    return LinkMotion(velocity, np.concatenate([step_after - step_before, rotation_after - rotation_before]) / step**2)
 
 
 def follow(
@@ -123,28 +128,28 @@ def follow(
     end: JointState | None = None,
     posture: Posture | None = None,
 ) -> Trajectory:
-    """Follows a link's motion with the joints.
+    """Returns the joint trajectory that follows a link motion.
 
     Args:
-        motion: of the follower's link.
-        follower: inverse kinematics by continuation.
-        period_s: between two points of the trajectory.
-        start: of the joints at the beginning.
-        end: velocities and accelerations of the joints at the end; at rest by default.
-        posture: what a redundant arm keeps nearest to.
+        motion: Motion of the follower's link.
+        follower: Kinematics of the link.
+        period_s: Sampling period of the trajectory [s].
+        start: Joint state at the start.
+        end: Joint velocities and accelerations at the end; None for a stop.
+        posture: Preferred posture of a redundant arm.
 
     Raises:
-        PlanningError: a pose cannot be reached without a jump, or a joint's limit would be broken.
+        PlanningError: A pose cannot be reached without a jump, or a joint limit would be exceeded.
     """
-    rates = JointRates.of(follower.model, follower.group)
+    limits = JointRateLimits.of(follower.model, follower.group)
     points = sample_times(motion.duration_s, motion.knots, period_s)
-    longest = max(CHECK_PERIOD_S, motion.duration_s / MAX_CHECKS)
+    max_gap_s = max(CHECK_PERIOD_S, motion.duration_s / MAX_CHECKS)
     state, rows = start, [start]
     for low, high in zip(points[:-1], points[1:], strict=True):
-        count = int(np.ceil((high - low) / longest))
+        count = int(np.ceil((high - low) / max_gap_s))
         for time_s in low + (high - low) * np.arange(1, count + 1) / count:
             state = _advance(motion, follower, state, float(time_s), (high - low) / count, posture)
-            rates.require(time_s, state.velocities, state.accelerations)
+            limits.require(time_s, state.velocities, state.accelerations)
         rows.append(state)
     rows[-1] = JointState(state.positions, end.velocities, end.accelerations) if end else at_rest(state.positions)
     return Trajectory(
@@ -158,12 +163,12 @@ def _advance(
     motion: PoseMotion, follower: PoseFollower, state: JointState, time_s: float, gap_s: float, posture: Posture | None
 ) -> JointState:
     guess = state.positions + gap_s * (state.velocities + 0.5 * gap_s * state.accelerations)
-    wanted = posture(time_s) if posture else None
+    target = posture(time_s) if posture else None
     try:
-        values = follower.step(guess, motion.pose(time_s), wanted.positions if wanted else None)
+        values = follower.step(guess, motion.pose(time_s), target.positions if target else None)
     except PlanningError as error:
         raise PlanningError(error.code, f"{error.reason} (after {time_s:.3f} of {motion.duration_s:.3f} s)") from error
     velocities, accelerations = follower.rates(
-        values, link_motion(motion, time_s), (wanted.velocities, wanted.accelerations) if wanted else None
+        values, link_motion(motion, time_s), (target.velocities, target.accelerations) if target else None
     )
     return JointState(values, velocities, accelerations)

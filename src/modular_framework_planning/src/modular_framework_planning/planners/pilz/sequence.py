@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joins the motions of a sequence: each starts at the end of the one before, and is blended with it on request.
+"""Motion sequences: joins consecutive motions, with blending between motions that have a blend radius.
 
-The motions of one group that follow each other become one trajectory; a change of group begins another.
+Consecutive motions of one group become one trajectory; a change of group starts a new trajectory.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-SMALLEST_GAP_M = 1.0e-6  # between two spheres
+MIN_GAP_M = 1.0e-6  # minimum gap between two blend spheres
 CheckerSource = Callable[[PlanningScene, JointGroup, Array], CollisionChecker]
 
 
 @dataclass(frozen=True, slots=True)
 class ItemSpec:
-    """One item of a sequence, as the rules of sequences see it.
+    """Properties of a sequence item that can be checked before planning.
 
     Attributes:
-        group: planning group.
-        blend_radius: how close to the motion's end the next one may begin [m]; 0 stops there.
-        has_start_state: whether the item names a start.
+        group: Planning group.
+        blend_radius: Radius of the blend into the next motion [m]; 0 for a stop.
+        has_start_state: Whether the item has a start state.
     """
 
     group: str
@@ -46,7 +46,7 @@ class ItemSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedItem:
-    """One planned motion of a sequence."""
+    """A planned motion of a sequence."""
 
     request: PlanningRequest
     answer: PlanningAnswer
@@ -55,11 +55,13 @@ class PlannedItem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequencePart:
-    """Motions of one group in one trajectory.
+    """Consecutive motions of one group, joined to one trajectory.
 
     Attributes:
-        scene: the world, with the robot at the start of the part.
-        answers: of the motions it was made of.
+        scene: Planning scene with the robot at the start of the part.
+        group: Joints of the planning group.
+        trajectory: Joined trajectory.
+        answers: Planning results of the joined motions.
     """
 
     scene: PlanningScene
@@ -69,126 +71,126 @@ class SequencePart:
 
 
 def checked_radii(items: Sequence[ItemSpec]) -> tuple[list[float], list[str]]:
-    """Checks the rules that need no planning.
+    """Checks the items of a sequence before planning.
 
     Returns:
-        The radii to use, and warnings about those that had to become 0, because the next motion is another group's.
+        The blend radii to use, and warnings about radii set to 0 because the planning group changes.
 
     Raises:
-        PlanningError: a radius is below 0 or not finite, the last one is not 0, or an item that is not the first of
-            its group has a start state.
+        PlanningError: A radius is negative or not finite, the last radius is not 0, or an item other than the first
+            of its group has a start state.
     """
     faults = [
-        f"items[{number}].blend_radius is {item.blend_radius}; it must be 0 or more"
-        for number, item in enumerate(items)
+        f"items[{index}].blend_radius is {item.blend_radius}; it must be 0 or more"
+        for index, item in enumerate(items)
         if not 0.0 <= item.blend_radius < math.inf
     ]
     if items and items[-1].blend_radius != 0.0:
-        faults.append(f"items[{len(items) - 1}].blend_radius is {items[-1].blend_radius}; the last one must be 0")
+        faults.append(f"items[{len(items) - 1}].blend_radius is {items[-1].blend_radius}; the last radius must be 0")
     if faults:
         raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, "; ".join(faults))
     seen: set[str] = set()
-    for number, item in enumerate(items):
+    for index, item in enumerate(items):
         if item.has_start_state and item.group in seen:
             raise PlanningError(
                 ErrorCode.INVALID_ROBOT_STATE,
-                f"items[{number}].start_state: only the first item of "
-                f"group '{item.group}' may have one; leave it empty, the motion starts where the one "
-                "before it ends",
+                f"items[{index}].start_state: only the first item of "
+                f"group '{item.group}' may have a start state; leave it empty, because the motion starts where the "
+                "previous motion ends",
             )
         seen.add(item.group)
     radii, warnings = [item.blend_radius for item in items], []
-    for number, (item, following) in enumerate(zip(items[:-1], items[1:], strict=True)):
-        if item.blend_radius > 0.0 and item.group != following.group:
-            radii[number] = 0.0
+    for index, (item, next_item) in enumerate(zip(items[:-1], items[1:], strict=True)):
+        if item.blend_radius > 0.0 and item.group != next_item.group:
+            radii[index] = 0.0
             warnings.append(
-                f"items[{number}].blend_radius {item.blend_radius} is taken as 0: the next motion is that "
-                f"of group '{following.group}' and not of '{item.group}'"
+                f"items[{index}].blend_radius {item.blend_radius} is taken as 0: the next motion moves "
+                f"group '{next_item.group}' and not '{item.group}'"
             )
     return radii, warnings
 
 
 class SequenceJoiner:
-    """Makes trajectories of planned motions."""
+    """Joins planned motions to trajectories."""
 
     def __init__(self, kinematics: KinematicsPool, checkers: CheckerSource, period_s: float, step: float) -> None:
-        """Stores the parts.
+        """Stores the arguments.
 
         Args:
-            kinematics: inverse kinematics of the groups.
-            checkers: gives the collision world of a motion from its scene, group and start.
-            period_s: between two points of a blended piece.
-            step: between two checked states of a blended piece [rad or m].
+            kinematics: Kinematics solvers of the groups.
+            checkers: Creates the collision checker for a scene, a group and a start.
+            period_s: Sampling period of a blend [s].
+            step: Distance between collision checks of a blend [rad or m].
         """
         self._kinematics, self._checkers = kinematics, checkers
         self._period_s, self._step = period_s, step
 
     def join(self, items: Sequence[PlannedItem]) -> tuple[SequencePart, ...]:
-        """Joins all motions.
+        """Returns the joined motions.
 
         Raises:
-            PlanningError: spheres overlap, or two motions cannot be blended; names the item.
+            PlanningError: Blend spheres overlap, or two motions cannot be blended; names the items.
         """
-        self._require_apart(items)
+        self._require_disjoint_blends(items)
         parts: list[SequencePart] = []
-        for number, item in enumerate(items):
+        for index, item in enumerate(items):
             group = item.request.scene.model.group(item.request.group)
             if not parts or parts[-1].group.name != group.name:
                 parts.append(SequencePart(item.request.scene, group, item.answer.trajectory, (item.answer,)))
                 continue
-            before = parts[-1]
-            radius = items[number - 1].blend_radius
+            previous = parts[-1]
+            radius = items[index - 1].blend_radius
             try:
                 trajectory = (
-                    self._blended(before, items[number - 1], item, radius)
+                    self._blended(previous, items[index - 1], item, radius)
                     if radius > 0.0
-                    else appended(before.trajectory, item.answer.trajectory)
+                    else appended(previous.trajectory, item.answer.trajectory)
                 )
             except PlanningError as error:
-                raise PlanningError(error.code, f"items[{number - 1}] and items[{number}]: {error.reason}") from error
-            parts[-1] = SequencePart(before.scene, group, trajectory, (*before.answers, item.answer))
+                raise PlanningError(error.code, f"items[{index - 1}] and items[{index}]: {error.reason}") from error
+            parts[-1] = SequencePart(previous.scene, group, trajectory, (*previous.answers, item.answer))
         return tuple(parts)
 
     def _follower(self, item: PlannedItem) -> PoseFollower:
         solver = self._kinematics.solver(item.request.group)
         return PoseFollower(solver, solver.group.tip_link, item.answer.start)
 
-    def _require_apart(self, items: Sequence[PlannedItem]) -> None:
-        """Raises PlanningError where the spheres of two neighbouring ends overlap."""
-        for number, (item, following) in enumerate(zip(items[:-1], items[1:], strict=True)):
-            radii = item.blend_radius + following.blend_radius
-            if item.request.group != following.request.group or radii == 0.0:
+    def _require_disjoint_blends(self, items: Sequence[PlannedItem]) -> None:
+        """Raises PlanningError if consecutive blend spheres overlap."""
+        for index, (item, next_item) in enumerate(zip(items[:-1], items[1:], strict=True)):
+            radii = item.blend_radius + next_item.blend_radius
+            if item.request.group != next_item.request.group or radii == 0.0:
                 continue
             follower = self._follower(item)
             indices = follower.group.indices
-            ends = [follower.pose(part.answer.goal[indices]).translation for part in (item, following)]
+            ends = [follower.pose(part.answer.goal[indices]).translation for part in (item, next_item)]
             distance = float(np.linalg.norm(ends[1] - ends[0]))
-            if radii > distance - SMALLEST_GAP_M:
+            if radii > distance - MIN_GAP_M:
                 raise PlanningError(
                     ErrorCode.INVALID_MOTION_PLAN,
-                    f"items[{number}] and items[{number + 1}]: the "
-                    f"blend radii {item.blend_radius} and {following.blend_radius} m overlap: their "
-                    f"sum must be below the distance {distance:.4f} m of the two ends",
+                    f"items[{index}] and items[{index + 1}]: the blends with radii "
+                    f"{item.blend_radius} and {next_item.blend_radius} m overlap: the sum of the "
+                    f"radii must be below the distance {distance:.4f} m between the ends of the motions",
                 )
 
-    def _blended(self, before: SequencePart, item: PlannedItem, following: PlannedItem, radius: float) -> Trajectory:
-        trajectory, inside = blend(
-            before.trajectory, following.answer.trajectory, radius, self._follower(item), self._period_s
+    def _blended(self, previous: SequencePart, item: PlannedItem, next_item: PlannedItem, radius: float) -> Trajectory:
+        trajectory, blended = blend(
+            previous.trajectory, next_item.answer.trajectory, radius, self._follower(item), self._period_s
         )
-        group, start = before.group, following.answer.start
-        checker = self._checkers(following.request.scene, group, start)
+        group, start = previous.group, next_item.answer.start
+        checker = self._checkers(next_item.request.scene, group, start)
         motion = MotionChecker(checker, group.indices, start)
-        curve = inside.curve(self._step)
-        hit = motion.colliding_state(curve, self._step)
-        if hit is not None:
-            contacts = describe_contacts(checker.contacts(motion.full_positions(hit), include_fixed=False))
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blended within {radius} m: {contacts}")
-        for constraints in (item.request.path_constraints, following.request.path_constraints):
+        curve = blended.curve(self._step)
+        colliding_values = motion.colliding_state(curve, self._step)
+        if colliding_values is not None:
+            contacts = describe_contacts(checker.contacts(motion.full_positions(colliding_values), include_fixed=False))
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, f"blend with radius {radius} m: {contacts}")
+        for constraints in (item.request.path_constraints, next_item.request.path_constraints):
             for values in curve if constraints is not None else ():
                 if constraints is not None and not constraints.satisfied(motion.full_positions(values)):
                     raise PlanningError(
                         ErrorCode.INVALID_MOTION_PLAN,
-                        f"blended within {radius} m: a path constraint "
+                        f"blend with radius {radius} m: a path constraint "
                         f"is violated: {constraints.describe(motion.full_positions(values))}",
                     )
         return trajectory

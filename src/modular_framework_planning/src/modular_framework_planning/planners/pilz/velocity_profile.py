@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trapezoidal velocity profiles with rounded corners, so that the acceleration is continuous.
 
-A controller joins trajectory points by polynomials of position, velocity and acceleration. A plain trapezoid has jumps
-of acceleration, and such a polynomial overshoots the limits there. Averaging the trapezoid over a short window keeps
-distance and limits (an average never exceeds the averaged values) and makes it a chain of cubics, which a controller
-follows exactly.
+A controller interpolates position, velocity and acceleration of trajectory points by polynomials, which overshoot the
+limits at the acceleration jumps of a plain trapezoid. A moving average of the trapezoid keeps the distance and the
+limits. Its position is a cubic spline, which a controller follows exactly.
 """
 
 from __future__ import annotations
@@ -16,20 +15,20 @@ import numpy as np
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 
-ROUNDING_S = 0.004  # width of the averaging window: how long the acceleration takes to change
-MAX_POINTS = 20_000  # of one motion
-SHORTEST_GAP_S = 1.0e-4  # between two points of a trajectory
+ROUNDING_S = 0.004  # width of the averaging window, which is the duration of a change of acceleration
+MAX_POINTS = 20_000  # maximum number of points of a motion
+MIN_GAP_S = 1.0e-4  # minimum time between two points of a trajectory
 
 
 @dataclass(frozen=True, slots=True)
 class TrapezoidalProfile:
-    """Position along a path of some length over time, from rest to rest.
+    """Position along a path over time, from rest to rest.
 
     Attributes:
-        distance: length of the path, above 0.
-        rise_s, cruise_s, fall_s: lengths of the trapezoid's phases.
-        knots, positions, velocities, accelerations: the chain of cubics, one entry where the acceleration changes
-            its slope.
+        distance: Path length, above 0.
+        rise_s, cruise_s, fall_s: Durations of the phases of the trapezoid.
+        knots: Knots of the cubic spline, at the changes of jerk [s].
+        positions, velocities, accelerations: Values of the spline at the knots.
     """
 
     distance: float
@@ -43,11 +42,11 @@ class TrapezoidalProfile:
 
     @property
     def duration_s(self) -> float:
-        """Length in time: the trapezoid's and the rounding's."""
+        """Duration of the trapezoid and the rounding [s]."""
         return float(self.knots[-1])
 
     def at(self, times: Array) -> tuple[Array, Array, Array]:
-        """Returns position, velocity and acceleration at times [s]; at rest before the start and after the end."""
+        """Returns position, velocity and acceleration at times [s]; times outside the profile are clipped."""
         clipped = np.clip(times, 0.0, self.duration_s)
         piece = np.clip(np.searchsorted(self.knots, clipped, side="right") - 1, 0, len(self.knots) - 2)
         jerk = np.diff(self.accelerations)[piece] / np.diff(self.knots)[piece]
@@ -60,20 +59,20 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
     """Returns the fastest profile within limits.
 
     Args:
-        distance: length of the path, above 0.
-        velocity: limit, above 0 [1/s].
-        acceleration: limit, above 0 [1/s^2].
-        deceleration: limit, above 0 [1/s^2].
+        distance: Path length, above 0.
+        velocity: Velocity limit, above 0.
+        acceleration: Acceleration limit, above 0.
+        deceleration: Deceleration limit, above 0.
     """
     peak = min(velocity, float(np.sqrt(2.0 * distance * acceleration * deceleration / (acceleration + deceleration))))
     rise, fall = peak / acceleration, peak / deceleration
     cruise = max(0.0, distance / peak - 0.5 * (rise + fall))
-    corners = np.cumsum([0.0, rise, cruise, fall])
-    knots = np.unique(np.concatenate([corners, corners + ROUNDING_S]))
+    breakpoints = np.cumsum([0.0, rise, cruise, fall])
+    knots = np.unique(np.concatenate([breakpoints, breakpoints + ROUNDING_S]))
     knots = knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
 
     def speed(times: Array) -> Array:
-        return np.interp(times, corners, [0.0, peak, peak, 0.0], left=0.0, right=0.0)
+        return np.interp(times, breakpoints, [0.0, peak, peak, 0.0], left=0.0, right=0.0)
 
     accelerations = (speed(knots) - speed(knots - ROUNDING_S)) / ROUNDING_S
     accelerations[-1] = 0.0
@@ -89,24 +88,28 @@ def fastest_profile(distance: float, velocity: float, acceleration: float, decel
 
 
 def sample_times(duration_s: float, knots: Array, period_s: float) -> Array:
-    """Returns the times of a trajectory's points: every period, every knot, the end; at least 0.1 ms apart.
+    """Returns the times of trajectory points: periodic times, knots and the end, in whole nanoseconds.
 
-    A knot takes the place of a period's point nearer than that, so points are at most a period and 0.1 ms apart.
-    They are whole nanoseconds, as messages carry them.
+    Points are at least 0.1 ms apart: a knot replaces a periodic time that is closer.
+
+    Args:
+        duration_s: Duration of the motion [s].
+        knots: Times that must be included [s].
+        period_s: Sampling period [s].
 
     Raises:
-        PlanningError: the motion is so slow that it would have more than 20,000 points.
+        PlanningError: The motion would have more than 20,000 points.
     """
     if duration_s > MAX_POINTS * period_s:
         raise PlanningError(
             ErrorCode.INVALID_MOTION_PLAN,
-            f"the motion would take {duration_s:.0f} s, which at one "
-            f"point every {period_s} s is more than {MAX_POINTS} points; choose larger scaling "
+            f"the motion would take {duration_s:.0f} s; at a sampling "
+            f"period of {period_s} s it would exceed {MAX_POINTS} points; choose larger scaling "
             "factors",
         )
     regular = np.arange(0.0, duration_s, period_s)
-    kept = np.unique(np.concatenate([[0.0, duration_s], knots[(knots > 0.0) & (knots < duration_s)]]))
-    kept = kept[np.concatenate([[True], np.diff(kept) >= SHORTEST_GAP_S])]
-    kept[-1] = duration_s
-    near = np.abs(regular[:, None] - kept[None, :]).min(axis=1) < SHORTEST_GAP_S
-    return np.round(np.sort(np.concatenate([kept, regular[~near]])), 9)
+    fixed = np.unique(np.concatenate([[0.0, duration_s], knots[(knots > 0.0) & (knots < duration_s)]]))
+    fixed = fixed[np.concatenate([[True], np.diff(fixed) >= MIN_GAP_S])]
+    fixed[-1] = duration_s
+    is_close = np.abs(regular[:, None] - fixed[None, :]).min(axis=1) < MIN_GAP_S
+    return np.round(np.sort(np.concatenate([fixed, regular[~is_close]])), 9)

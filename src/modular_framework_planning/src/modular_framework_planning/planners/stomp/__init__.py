@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planning pipeline `stomp`: stochastic optimisation of whole motions."""
+"""Stochastic trajectory optimisation, the planning pipeline `stomp`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cost of the states of a motion: penetration of obstacles and violation of path constraints."""
+"""State costs of STOMP: obstacle penetration and path constraint violation."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.collision_checker import CollisionChecker, CollisionCostEstimator
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
 
-DEPTH_WEIGHT = 10.0  # with 1, grazing an obstacle for a few states costs less than the accelerations of a detour
+DEPTH_WEIGHT = 10.0  # with weight 1, grazing an obstacle costs less than the accelerations of a detour
 
 
 class StateCosts:
-    """Costs of states; whether a state is valid is decided by the exact check."""
+    """Cost function of states; validity is decided by the exact check, not by the cost."""
 
     def __init__(self, problem: PlanningProblem) -> None:
         self._problem = problem
 
     def __call__(self, values: Array) -> Array:
-        """Returns costs of joint vectors (n, joints), shape (n,)."""
+        """Returns the costs of joint vectors (n, joints), shape (n,)."""
         states = self._problem.motion.full_path(values)
         costs = DEPTH_WEIGHT * collision_costs(self._problem.checker, states)
         if self._problem.constraints is not None:
@@ -35,7 +35,7 @@ class StateCosts:
 
 
 def collision_costs(checker: CollisionChecker, states: Array) -> Array:
-    """Returns the costs of collisions of states (n, joints), shape (n,)."""
+    """Returns the collision costs of robot states (n, joints), shape (n,)."""
     if isinstance(checker, CollisionCostEstimator):
         return checker.collision_costs(states)
     return np.array(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""STOMP: improves a motion by noisy copies of it, weighted by their costs, smoothed by the cost of accelerations.
+"""STOMP update: moves a trajectory towards its cheaper noisy copies and smooths the change.
 
 Source: M. Kalakrishnan, S. Chitta, E. Theodorou, P. Pastor, S. Schaal, "STOMP: Stochastic Trajectory Optimization for
-Motion Planning", ICRA 2011. Besides the weighted average, the cheapest copy itself may become the next motion.
+Motion Planning", ICRA 2011. In addition, the planner can continue from the cheapest copy instead of the average.
 """
 
 from __future__ import annotations
@@ -18,43 +18,43 @@ CostFunction = Callable[[Array], Array]
 
 
 class Optimiser:
-    """The matrices of one number of time steps; start and goal of a motion stay fixed.
+    """Noise, cost and update of motions with a fixed number of time steps, fixed start and fixed goal.
 
-    A motion is an array (steps, joints); costs of its states have shape (steps,).
+    A motion is an array (steps, joints); the costs of its states have shape (steps,).
     """
 
     def __init__(self, settings: StompSettings, lower: Array, upper: Array, rng: np.random.Generator) -> None:
-        """Computes the matrices.
+        """Computes the noise and smoothing matrices.
 
         Args:
-            settings: of the planner.
-            lower: bounds of the joints, shape (joints,) [rad or m].
-            upper: bounds of the joints, shape (joints,) [rad or m].
-            rng: source of the noise.
+            settings: Planner settings.
+            lower: Lower joint bounds, shape (joints,) [rad or m].
+            upper: Upper joint bounds, shape (joints,) [rad or m].
+            rng: Random generator of the noise.
         """
         self._settings, self._lower, self._upper, self._rng = settings, lower, upper, rng
-        inner = settings.num_timesteps - 2
-        differences = np.zeros((inner + 2, inner))  # second differences of a motion whose ends do not move
-        for column in range(inner):
+        inner_steps = settings.num_timesteps - 2
+        differences = np.zeros((inner_steps + 2, inner_steps))  # finite-difference matrix of the accelerations
+        for column in range(inner_steps):
             differences[column : column + 3, column] = 1.0, -2.0, 1.0
         inverse = np.linalg.inv(differences.T @ differences)
         self._noise = np.linalg.cholesky(inverse / inverse.max())
-        self._smoothing = inverse / (inverse.max(axis=0) * inner)
+        self._smoothing = inverse / (inverse.max(axis=0) * inner_steps)
 
     def line(self, start: Array, goal: Array) -> Array:
-        """Returns the straight motion."""
+        """Returns the straight motion from start to goal."""
         return np.linspace(start, goal, self._settings.num_timesteps)
 
-    def disturbed(self, motion: Array, stddev: Array | float) -> Array:
-        """Returns noisy copies of a motion within the bounds: one for each value, shape (n, steps, joints)."""
-        sizes = np.atleast_1d(stddev)
-        white = self._rng.standard_normal((len(sizes), len(self._noise), motion.shape[1]))
-        copies = np.repeat(motion[None], len(sizes), axis=0)
-        copies[:, 1:-1] += np.einsum("ij,njk->nik", self._noise, white) * sizes[:, None, None]
+    def noisy_copies(self, motion: Array, stddev: Array | float) -> Array:
+        """Returns a noisy copy of a motion per standard deviation, within the bounds, shape (n, steps, joints)."""
+        stddevs = np.atleast_1d(stddev)
+        white = self._rng.standard_normal((len(stddevs), len(self._noise), motion.shape[1]))
+        copies = np.repeat(motion[None], len(stddevs), axis=0)
+        copies[:, 1:-1] += np.einsum("ij,njk->nik", self._noise, white) * stddevs[:, None, None]
         return np.clip(copies, np.minimum(self._lower, motion.min(axis=0)), np.maximum(self._upper, motion.max(axis=0)))
 
     def costs(self, motions: Array, state_costs: CostFunction) -> Array:
-        """Returns costs of the states of some motions (n, steps, joints), shape (n, steps)."""
+        """Returns the costs of the states of motions (n, steps, joints), shape (n, steps)."""
         count, steps, joints = motions.shape
         settings = self._settings
         accelerations = np.zeros_like(motions)
@@ -63,7 +63,13 @@ class Optimiser:
         return state_costs(motions.reshape(-1, joints)).reshape(count, steps) + control
 
     def update(self, motion: Array, copies: Array, costs: Array) -> Array:
-        """Returns the motion moved towards the cheaper copies, at each time step for itself, then smoothed."""
+        """Returns the motion moved towards its cheaper copies and smoothed.
+
+        Args:
+            motion: Current motion, shape (steps, joints) [rad or m].
+            copies: Noisy copies, shape (n, steps, joints) [rad or m].
+            costs: Costs of the copies, shape (n, steps); each time step is weighted separately.
+        """
         low, high = costs.min(axis=0), costs.max(axis=0)
         weights = np.exp(-self._settings.exponentiated_cost_sensitivity * (costs - low) / np.maximum(high - low, 1e-9))
         weights /= weights.sum(axis=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters of STOMP, read and checked once."""
+"""STOMP parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NAMESPACE = "stomp_moveit"
 
 @dataclass(frozen=True, slots=True)
 class StompSettings:
-    """Parameters as `parameters/stomp.yaml` declares them."""
+    """Parameters declared in `parameters/stomp.yaml`."""
 
     num_timesteps: int
     num_iterations: int
@@ -31,22 +31,22 @@ class StompSettings:
 
 
 def read_settings(parameters: Mapping[str, Any], group: str = "") -> StompSettings:
-    """Reads the parameters of the pipeline.
+    """Returns the settings of a planning group.
 
     Args:
-        parameters: from their own level, then below `stomp_moveit` (MoveIt 2), then below `stomp/GROUP/optimization`
-            (MoveIt 1); later ones count.
-        group: planning group.
+        parameters: Parameters of the pipeline. Values below `stomp_moveit` (MoveIt 2) override values at the top level;
+            values below `stomp/GROUP/optimization` (MoveIt 1) override both.
+        group: Planning group.
 
     Raises:
-        PlanningError: lists every value that is not allowed.
+        PlanningError: Lists every invalid value.
     """
-    of_group = (parameters.get("stomp") or {}).get(group) or {}
-    given = {**parameters, **(parameters.get(NAMESPACE) or {}), **(of_group.get("optimization") or {})}
+    group_parameters = (parameters.get("stomp") or {}).get(group) or {}
+    merged = {**parameters, **(parameters.get(NAMESPACE) or {}), **(group_parameters.get("optimization") or {})}
     try:
         declared = existing_declaration("modular_framework_planning", "stomp")
         return StompSettings(
-            *ParameterReader(declared, given.get).values(*(item.name for item in fields(StompSettings)))
+            *ParameterReader(declared, merged.get).values(*(item.name for item in fields(StompSettings)))
         )
     except ParameterError as error:
         raise PlanningError(ErrorCode.PLANNING_FAILED, f"parameters of STOMP: {error}") from error
