@@ -404,7 +404,7 @@ def test_names_of_checkers() -> None:
     assert collision_detector() is collision_detector("") is collision_detector("Hybrid") is ExactCollisionChecker
     assert collision_detector(PLAIN) is PlainCoalChecker
     for name, reason in (
-        ("Unknown", "known are FCL, Bullet, HYBRID and module/Class"),
+        ("Unknown", "allowed: FCL, Bullet, HYBRID and module/Class"),
         ("no_such_module/Checker", "no_such_module"),
         ("plain_coal_checker/Missing", "Missing"),
         ("test_collision_checkers/Half", "no method build, path_is_free, colliding_state"),

@@ -49,7 +49,7 @@ class AlongTheWay:
         self._path_prefix = path_prefix
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
-        return PlannedPath(WAY, path_prefix=self._path_prefix, is_short=True)
+        return PlannedPath(WAY, path_prefix=self._path_prefix, keep_shape=True)
 
 
 def motion(corner: int | None, path_prefix: int = 0) -> Trajectory:

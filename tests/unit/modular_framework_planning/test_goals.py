@@ -198,14 +198,14 @@ MIMICS = {"right": Mimic("left", -2.0, 0.1)}
 
 
 def test_a_joint_that_mimics_asks_its_leader() -> None:
-    goal = JointGoal({"right": 0.05}, {"right": 0.02}, {"right": 0.04}).of_independent_joints(MIMICS)
+    goal = JointGoal({"right": 0.05}, {"right": 0.02}, {"right": 0.04}).without_mimic_joints(MIMICS)
     assert goal.positions == pytest.approx({"left": 0.025})
     assert (goal.below["left"], goal.above["left"]) == pytest.approx((0.02, 0.01)), "the multiplier turns them round"
-    both = JointGoal({"left": 0.025, "right": 0.05}, {"left": 0.005}, {"left": 0.01}).of_independent_joints(MIMICS)
+    both = JointGoal({"left": 0.025, "right": 0.05}, {"left": 0.005}, {"left": 0.01}).without_mimic_joints(MIMICS)
     assert both.positions == pytest.approx({"left": 0.025})
     assert (both.below["left"], both.above["left"]) == pytest.approx((0.0, 0.0)), "the narrower range counts"
-    with pytest.raises(PlanningError, match="'right' at 0.3000 asks 'left', which it mimics, to be at -0.1000"):
-        JointGoal({"left": 0.025, "right": 0.3}).of_independent_joints(MIMICS)
+    with pytest.raises(PlanningError, match="'right' at 0.3000 requires 'left', which it mimics, at -0.1000"):
+        JointGoal({"left": 0.025, "right": 0.3}).without_mimic_joints(MIMICS)
 
 
 def test_position_only_ik_leaves_the_orientation_of_a_pose_goal_open() -> None:

@@ -30,7 +30,7 @@ def log(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         ("Bullet", "Bullet", ()),
         ("hybrid", "hybrid", ()),
         ("my_checkers/MyChecker", "my_checkers/MyChecker", ()),
-        ("Distance_Field", "", ("logerr", "'Distance_Field'", "known are FCL, Bullet, HYBRID", "FCL is used")),
+        ("Distance_Field", "", ("logerr", "'Distance_Field'", "allowed: FCL, Bullet, HYBRID", "FCL is used")),
         ({"name": "FCL"}, "", ("logwarn", "/collision_detector", "FCL is used")),
     ],
 )

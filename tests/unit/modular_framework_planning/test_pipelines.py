@@ -139,7 +139,7 @@ def test_projections_and_segment_lengths_of_the_group_are_honoured(model: RobotM
     for text in ("joints(shoulder_pan_joint,elbow_joint)", f"link({TIP})"):
         given = spec(groups={GROUP: {"projection_evaluator": text, "longest_valid_segment_fraction": 0.001}})
         assert arrives(given.build(model, pool).plan(wall_request(model, planner_id="KPIECE")))
-    for text, part in (("joints(nobody)", "nobody"), ("link(nobody)", "nobody"), ("cells", "allowed are")):
+    for text, part in (("joints(nobody)", "nobody"), ("link(nobody)", "nobody"), ("cells", "must be joints")):
         given = spec(groups={GROUP: {"projection_evaluator": text}})
         assert part in failure(given.build(model, pool), wall_request(model, planner_id="KPIECE")).reason
 

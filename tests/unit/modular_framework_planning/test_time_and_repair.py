@@ -288,6 +288,6 @@ def test_of_many_goals_no_more_are_looked_at_than_time_allows(model: RobotModel,
     )
     checker = ExactCollisionChecker(asked.scene.with_object(block), indices)
     motion = MotionChecker(checker, indices, asked.scene.positions)
-    with pytest.raises(PlanningError, match="1 of 3 alternatives were looked at.*'block'") as caught:
+    with pytest.raises(PlanningError, match="1 of 3 goals were tried.*'block'") as caught:
         found(hit, hit, *free)
     assert caught.value.code == ErrorCode.TIMED_OUT

@@ -54,7 +54,7 @@ class OverTwoPoints:
     """A planner whose path goes over two given points."""
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
-        return PlannedPath(np.array([START, *BETWEEN, GOAL]), is_short=True)
+        return PlannedPath(np.array([START, *BETWEEN, GOAL]), keep_shape=True)
 
 
 def planned(

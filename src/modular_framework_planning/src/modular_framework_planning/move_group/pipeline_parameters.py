@@ -99,7 +99,7 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         return replace(
             request,
             seed=derived_seed(seed, "planning", digest, number),
-            most_iterations=max(1, int(SEEDED_ITERATIONS_PER_S * request.allowed_time_s)),
+            max_iterations=max(1, int(SEEDED_ITERATIONS_PER_S * request.allowed_time_s)),
             allowed_time_s=CLOCK_MARGIN * request.allowed_time_s,
         )
 

@@ -13,7 +13,7 @@ from modular_framework_planning.kinematics.kinematics_settings import Kinematics
 from modular_framework_planning.planning_interface.collision_detectors import (
     COLLISION_DETECTORS,
     DEFAULT_COLLISION_DETECTOR,
-    is_known,
+    is_detector_name,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_ros.parameter_search import nearest_parameter
@@ -87,9 +87,9 @@ def collision_detector_name() -> str:
             "parameter %s is no text but %r: it is ignored, and %s is used", found, name, DEFAULT_COLLISION_DETECTOR
         )
         return ""
-    if "/" not in name and not is_known(name):
+    if "/" not in name and not is_detector_name(name):
         rospy.logerr(
-            "parameter %s: collision_detector '%s' is not known; known are %s and module/Class; %s is used",
+            "parameter %s: collision_detector '%s' is not known; allowed: %s and module/Class; %s is used",
             found,
             name,
             ", ".join(COLLISION_DETECTORS),

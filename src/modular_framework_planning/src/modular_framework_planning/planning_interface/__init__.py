@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interface of planners: requests, collision checkers, problems and responses."""
+"""Interface between planners and planning pipelines: requests, problems, results and collision checkers."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interface of every collision checker, used by planners, adapters and services."""
+"""Collision checker interface, used by planners, request adapters and services."""
 
 from __future__ import annotations
 
@@ -18,75 +18,75 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 
 class CollisionChecker(Protocol):
-    """Checks states and paths of the robot in one snapshot of the scene; belongs to one thread.
+    """Checks states and paths of the robot in a snapshot of the scene; an instance belongs to one thread.
 
-    Two bodies are checked unless the scene's allowed collision matrix allows them to touch, they hang on the same
-    joint, or one is a link that the other, a held object, may touch (`touch_links`). Bodies of the robot keep the
-    scene's padding from the world: nearer than that counts as touching. A body wholly inside a closed one, whose
-    surfaces do not touch, may count as touching at single states; the shipped checker does so. Pairs whose relative
-    pose the moving joints cannot change are left out of all answers, unless a method says otherwise.
+    A pair of bodies is checked unless the allowed collision matrix allows their contact, both move with the same
+    joint, or one is an attached object and the other one of its `touch_links`. Robot bodies closer to the world than
+    the padding of the scene count as touching. A body completely inside a closed body may count as touching in
+    `is_free`, as in the default checker. Methods ignore fixed pairs, whose relative pose the moving joints cannot
+    change, unless stated otherwise.
 
-    Positions are those of the whole robot, in the order of `model.joint_names`, mimic joints included [rad or m].
-    `path_is_free` is called some thousand times a plan; the other methods rarely.
+    Positions have the order of `model.joint_names`, including mimic joints [rad or m]. `path_is_free` is called
+    thousands of times per plan, the other methods rarely.
     """
 
     @property
     def model(self) -> RobotModel:
-        """The robot."""
+        """Robot model."""
         ...
 
     def build(self, check_interrupt: Callable[[], None]) -> None:
-        """Builds now what the first check would have to build, which may take long.
+        """Builds the data structures of the first check in advance, which can take long.
 
         Args:
-            check_interrupt: called now and then; raises an exception to stop.
+            check_interrupt: Function called regularly; it raises an exception to stop the build.
         """
         ...
 
     def is_free(self, positions: Array) -> bool:
-        """Whether no pair touches in this state, shape (joints,)."""
+        """Checks that no pair touches in a state of shape (joints,)."""
         ...
 
     def path_is_free(self, vertices: Array, step: float, first: int = 0) -> bool:
-        """Whether the straight pieces between states are free at samples at most `step` apart in every joint.
+        """Checks that the straight edges between states are free.
 
-        A piece of length d (of the joint that moves farthest) has ceil(d / step) samples behind its start, evenly
-        spaced, its end included.
+        An edge on which the fastest joint moves by d is checked at ceil(d / step) evenly spaced states after its start,
+        including its end.
 
         Args:
-            vertices: shape (n, joints), n at least 1. It may be working memory of the caller: keep no reference.
-            step: above 0 [rad or m].
-            first: number of the first sample that has to be free: 1 leaves the first vertex out.
+            vertices: States of the robot, shape (n, joints), n >= 1. Keep no reference, the caller reuses the array.
+            step: Maximum joint displacement between checked states, above 0 [rad or m].
+            first: Index of the first checked state; 1 skips the first vertex.
         """
         ...
 
     def colliding_state(self, vertices: Array, step: float) -> Array | None:
-        """Returns a colliding sample, shape (joints,), of those that path_is_free checks; None where all are free."""
+        """Returns a colliding state among those checked by path_is_free, shape (joints,), or None."""
         ...
 
     def contacts(self, positions: Array, include_fixed: bool = True) -> list[Contact]:
-        """Returns every pair that touches in a state, the deepest contact of each, deepest pair first.
+        """Returns the deepest contact of every touching pair, deepest first.
 
         Args:
-            positions: shape (joints,).
-            include_fixed: whether pairs that the moving joints cannot change count, too.
+            positions: State of the robot, shape (joints,).
+            include_fixed: Whether to include fixed pairs.
         """
         ...
 
     def fixed_contacts(self, positions: Array) -> list[Contact]:
-        """Returns the contacts of the pairs alone that the moving joints cannot change."""
+        """Returns the contacts of the fixed pairs only."""
         ...
 
     def distance(self, positions: Array) -> float:
-        """Returns the smallest distance [m] of all checked pairs, padding not counted, fixed pairs included.
+        """Returns the minimum distance of all checked pairs, without padding and including fixed pairs [m].
 
-        0 or less where bodies touch, infinite where no pair is checked.
+        The distance is 0 or negative if bodies touch, and infinite if no pair is checked.
         """
         ...
 
 
 class CollisionCheckerFactory(Protocol):
-    """Makes checkers; mostly the checker's class itself. Threads share it."""
+    """Creates checkers, usually the checker class itself; shared by threads."""
 
     def __call__(
         self,
@@ -94,52 +94,52 @@ class CollisionCheckerFactory(Protocol):
         moving: Sequence[int] | NDArray[np.int64] | None = None,
         tolerated: Sequence[Contact] = (),
     ) -> CollisionChecker:
-        """Makes the checker of a scene.
+        """Returns the checker of a scene.
 
         Args:
-            scene: the snapshot to check in.
-            moving: joints that will move, as indices in a position vector (their mimics follow); None for all.
-            tolerated: contacts that may stay but not deepen; their pairs touch only where they are deeper than that.
+            scene: Snapshot of the planning scene.
+            moving: Indices of the moving joints in a position vector, without mimic joints; None for all joints.
+            tolerated: Existing contacts. Their pairs count as touching only if the contact becomes deeper.
 
         Raises:
-            PlanningError: a shape cannot be checked.
+            PlanningError: A shape cannot be checked.
         """
         ...
 
 
 @runtime_checkable
 class CollisionCostEstimator(Protocol):
-    """An optional method of checkers for optimisers (STOMP), which otherwise use the slower `contacts`."""
+    """Optional method of checkers for optimisers such as STOMP, which otherwise use the slower `contacts`."""
 
     def collision_costs(self, states: Array) -> Array:
-        """Returns smooth collision costs of states, shape (n,), as a guide for an optimiser; not a collision check.
+        """Returns smooth collision costs of states, shape (n,), which guide an optimiser but are no collision check.
 
-        The cost is the sum of depth and TOUCH_COST_M over the pairs that touch [m], and 0 where none does.
+        The cost is the sum of penetration depth and TOUCH_COST_M over the touching pairs [m].
 
         Args:
-            states: shape (n, joints).
+            states: States of the robot, shape (n, joints).
         """
         ...
 
 
 class CompiledChecks(Protocol):
-    """An optional property of checkers for searches that are compiled; without it they call `path_is_free`."""
+    """Optional property of checkers for compiled searches; without it, searches call `path_is_free`."""
 
     @property
     def compiled_world(self) -> World | None:
-        """The world as `compiled_paths.check_path` takes it; None where some pair needs more than that knows."""
+        """World for `compiled_paths.check_path`; None if compiled checks do not cover all pairs."""
         ...
 
 
 @runtime_checkable
 class CountsChecks(Protocol):
-    """An optional part of checkers, for reports about plans."""
+    """Optional part of checkers that counts checks for planning statistics."""
 
     @property
     def check_counts(self) -> NDArray[np.int64]:
-        """What was counted since the checker was made, see `compiled_collision.CHECK_COUNTS`; it counts on in place."""
+        """Counts since the creation of the checker, see `compiled_collision.CHECK_COUNTS`; updated in place."""
         ...
 
     def most_refusals(self) -> Refusals | None:
-        """Returns the two bodies that touched in the most checks; None where none did."""
+        """Returns the pair of bodies that touched in most checks, or None."""
         ...

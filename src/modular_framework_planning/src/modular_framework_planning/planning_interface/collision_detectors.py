@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds collision checkers by what the parameter `collision_detector` calls them: MoveIt's names, or `module/Class`.
+"""Collision checker selection by the parameter `collision_detector`: a MoveIt name or `module/Class`.
 
-Nothing else in the package chooses a checker: classes that need one receive a factory.
+Only this module chooses a checker; classes that need a checker receive a factory.
 """
 
 from __future__ import annotations
@@ -12,37 +12,37 @@ from modular_framework_planning.planning_interface.collision_checker import Coll
 from modular_framework_planning.planning_interface.plugin_classes import plugin_class
 
 DEFAULT_COLLISION_DETECTOR = "FCL"
-# MoveIt's names of its checkers all mean the one whose verdicts are exact.
+# All MoveIt names select the exact checker.
 COLLISION_DETECTORS: dict[str, CollisionCheckerFactory] = {
     "FCL": ExactCollisionChecker,
     "Bullet": ExactCollisionChecker,
     "HYBRID": ExactCollisionChecker,
 }
 DEFAULT_CHECKER = COLLISION_DETECTORS[DEFAULT_COLLISION_DETECTOR]
-SHIPPED = {key.lower(): factory for key, factory in COLLISION_DETECTORS.items()}
+DETECTORS_BY_NAME = {key.lower(): factory for key, factory in COLLISION_DETECTORS.items()}
 METHODS = ("build", "is_free", "path_is_free", "colliding_state", "contacts", "fixed_contacts", "distance")
 
 
-def is_known(name: str) -> bool:
-    """Whether this is a name of COLLISION_DETECTORS, in capitals or not, or empty for the default."""
-    return not name or name.lower() in SHIPPED
+def is_detector_name(name: str) -> bool:
+    """Checks whether a name is a key of COLLISION_DETECTORS, in any case, or empty for the default."""
+    return not name or name.lower() in DETECTORS_BY_NAME
 
 
 def collision_detector(name: str = DEFAULT_COLLISION_DETECTOR) -> CollisionCheckerFactory:
-    """Returns the factory of a kind of checkers.
+    """Returns the factory of a collision checker.
 
     Args:
-        name: a name of COLLISION_DETECTORS, in capitals or not, or `module/Class` of a class whose instances have
-            the methods of CollisionChecker; empty for the default.
+        name: Key of COLLISION_DETECTORS, in any case, or `module/Class` of a class with the methods of
+            CollisionChecker; empty for the default.
 
     Raises:
-        ModelError: there is no such class, or it lacks methods; lists the checkers there are.
+        ModelError: The class does not exist or lacks methods; lists the allowed names.
     """
-    known = f"known are {', '.join(COLLISION_DETECTORS)} and module/Class with the methods of CollisionChecker"
-    if is_known(name):
-        return SHIPPED[(name or DEFAULT_COLLISION_DETECTOR).lower()]
-    kind: CollisionCheckerFactory = plugin_class(name, f"collision_detector '{name}'", known)
+    allowed = f"allowed: {', '.join(COLLISION_DETECTORS)} and module/Class with the methods of CollisionChecker"
+    if is_detector_name(name):
+        return DETECTORS_BY_NAME[(name or DEFAULT_COLLISION_DETECTOR).lower()]
+    kind: CollisionCheckerFactory = plugin_class(name, f"collision_detector '{name}'", allowed)
     missing = [method for method in METHODS if not callable(getattr(kind, method, None))]
     if missing:
-        raise ModelError(f"collision_detector '{name}': no method {', '.join(missing)}; {known}")
+        raise ModelError(f"collision_detector '{name}' has no method {', '.join(missing)}; {allowed}")
     return kind

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Resolves the goals of a request to free joint vectors, or reports why there is none.
+"""Conversion of planning goals to free joint vectors.
 
-The search is bounded by numbers of samples, never by the clock, so that a seed repeats its goals.
+The number of samples per goal is fixed and does not depend on the clock, so that a seed repeats its goals.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from modular_framework_planning.planning_interface.planning_request import (
 from modular_framework_planning.robot_model.robot_model import BEYOND_BOUND, JointGroup
 
 MAX_GOAL_STATES = 8
-MAX_SAMPLES = 64  # states tried within the tolerances of one goal
-MAX_POSES = 16  # poses tried within the tolerances of one goal
+MAX_SAMPLES = 64  # states tried within the tolerances of a goal
+MAX_POSES = 16  # poses tried within the tolerances of a goal
 
 
 class GoalResolver:
-    """Resolves the goals of one request."""
+    """Converts the goals of a request to joint vectors."""
 
     def __init__(
         self,
@@ -46,21 +46,21 @@ class GoalResolver:
         motion: MotionChecker,
         rng: np.random.Generator,
         path_constraints: KinematicConstraints | None = None,
-        interrupted: Callable[[], bool] = lambda: False,
+        must_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Stores the parts.
+        """Stores the arguments.
 
         Args:
-            request: whose goals are resolved.
-            group: the joints to move.
-            kinematics: solvers of all groups.
-            checker: collision checks of the whole robot.
-            motion: collision checks of the group.
-            rng: source of random numbers.
-            path_constraints: what goal states must satisfy.
-            interrupted: whether no further goal may be tried.
+            request: Planning request with the goals.
+            group: Joints of the planning group.
+            kinematics: Kinematics solvers of all groups.
+            checker: Collision checker of the whole robot.
+            motion: Motion checker of the group.
+            rng: Random generator.
+            path_constraints: Path constraints that goal states must satisfy.
+            must_stop: Returns True to skip the remaining goals.
         """
-        self._interrupted = interrupted
+        self._must_stop = must_stop
         self._request, self._group, self._kinematics = request, group, kinematics
         self._checker, self._motion, self._rng = checker, motion, rng
         self._path_constraints = path_constraints
@@ -72,24 +72,24 @@ class GoalResolver:
         """Returns free goal vectors of the group, nearest to the start first, shape (n, joints).
 
         Raises:
-            PlanningError: no goal was given, or none can be reached; the reason is that of the first goal.
+            PlanningError: The request has no goal, or no goal can be reached; gives the reason for the first goal.
         """
         if not self._request.goals:
             raise PlanningError(
                 ErrorCode.INVALID_GOAL_CONSTRAINTS,
-                "the request has no goal; give joint constraints or a position and an orientation constraint",
+                "the request has no goal; add joint constraints, or a position and an orientation constraint",
             )
         vectors: list[Array] = []
         failures: list[PlanningError] = []
-        for number, goal in enumerate(self._request.goals):
-            if number and self._interrupted():
+        for index, goal in enumerate(self._request.goals):
+            if index and self._must_stop():
                 if vectors:
                     break
                 raise PlanningError(
                     ErrorCode.TIMED_OUT,
-                    f"goal_constraints: {number} of {len(self._request.goals)} "
-                    f"alternatives were looked at in the allowed {self._request.allowed_time_s:.2f} s, "
-                    f"none can be reached ({failures[0].reason}); allow more time or give fewer goals",
+                    f"goal_constraints: {index} of {len(self._request.goals)} "
+                    f"goals were tried in the allowed {self._request.allowed_time_s:.2f} s, "
+                    f"and none can be reached ({failures[0].reason}); allow more time or request fewer goals",
                 )
             try:
                 vectors += self._vectors(goal)
@@ -111,80 +111,80 @@ class GoalResolver:
         raise TypeError(f"{type(goal).__name__} is not a goal")
 
     def _is_valid(self, values: Array) -> bool:
-        """Whether a state satisfies the path constraints and is free."""
+        """Checks that a state satisfies the path constraints and is free."""
         constraints = self._path_constraints
         return (constraints is None or constraints.satisfied(self._motion.full_positions(values))) and (
             self._motion.state_is_free(values)
         )
 
-    def _rejection(self, values: Array, what: str) -> PlanningError:
-        """Says what is wrong with the best candidate of a goal."""
+    def _rejection(self, values: Array, subject: str) -> PlanningError:
+        """Returns the error that explains why the best candidate of a goal is invalid."""
         full, constraints = self._motion.full_positions(values), self._path_constraints
         if constraints is not None and not constraints.satisfied(full):
             return PlanningError(
                 ErrorCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
-                f"{what} violates the path constraints: "
+                f"{subject} violates the path constraints: "
                 f"{constraints.describe(full)}; move the goal or widen the tolerances",
             )
         contacts = self._checker.contacts(full, include_fixed=False)
         return PlanningError(
-            ErrorCode.GOAL_IN_COLLISION, f"{what} in collision: {describe_contacts(contacts)}", contacts
+            ErrorCode.GOAL_IN_COLLISION, f"{subject} is in collision: {describe_contacts(contacts)}", contacts
         )
 
     def _joint(self, goal: JointGoal) -> Array:
-        """Returns the exact target; where that is not free, the first free state found within the tolerances."""
+        """Returns the target if it is valid, otherwise the first valid state found within the tolerances."""
         target, low, high = self._joint_ranges(goal)
         if self._is_valid(target):
             return target
         if (high > low).any():
-            for number in range(MAX_SAMPLES):
-                share = (number + 1) / MAX_SAMPLES
-                values = target + share * (self._rng.uniform(low, high) - target)
+            for index in range(MAX_SAMPLES):
+                fraction = (index + 1) / MAX_SAMPLES
+                values = target + fraction * (self._rng.uniform(low, high) - target)
                 if self._is_valid(values):
                     return values
         raise self._rejection(target, "goal")
 
     def _joint_ranges(self, goal: JointGoal) -> tuple[Array, Array, Array]:
-        """Returns target, lowest and highest allowed values of the group's joints; a turn without ends is nearest."""
-        goal = goal.of_independent_joints(self._model.document.mimics)
+        """Returns target, minimum and maximum of the group's joints, with the nearest rotation of continuous joints."""
+        goal = goal.without_mimic_joints(self._model.document.mimics)
         values = np.array(self._start)
         low, high = values.copy(), values.copy()
-        for name, wanted in goal.positions.items():
+        for name, target_value in goal.positions.items():
             if name not in self._group.joints:
                 raise PlanningError(
                     ErrorCode.INVALID_GOAL_CONSTRAINTS,
                     f"goal: joint '{name}' is not in group "
                     f"'{self._group.name}'; its joints are {', '.join(self._group.joints)}",
                 )
-            number, column = self._model.index[name], self._group.joints.index(name)
+            index, column = self._model.index[name], self._group.joints.index(name)
             bounds = self._bounds[0][column], self._bounds[1][column]
-            if self._model.is_continuous(number):
-                wanted += 2.0 * np.pi * np.round((values[column] - wanted) / (2.0 * np.pi))
-            least = max(bounds[0], wanted - goal.below.get(name, 0.0))
-            most = min(bounds[1], wanted + goal.above.get(name, 0.0))
-            if least > most + BEYOND_BOUND:
+            if self._model.is_continuous(index):
+                target_value += 2.0 * np.pi * np.round((values[column] - target_value) / (2.0 * np.pi))
+            min_value = max(bounds[0], target_value - goal.below.get(name, 0.0))
+            max_value = min(bounds[1], target_value + goal.above.get(name, 0.0))
+            if min_value > max_value + BEYOND_BOUND:
                 raise PlanningError(
                     ErrorCode.GOAL_STATE_INVALID,
-                    f"goal: joint '{name}' at {wanted:.6f} is outside "
-                    f"[{bounds[0]:.6f}, {bounds[1]:.6f}]; give a position at most {BEYOND_BOUND} beyond a bound"
-                    + ("; the base's are those of workspace_parameters" if self._is_of_base(name) else ""),
+                    f"goal: joint '{name}' at {target_value:.6f} is outside "
+                    f"[{bounds[0]:.6f}, {bounds[1]:.6f}]; choose a position at most {BEYOND_BOUND} beyond a bound"
+                    + ("; workspace_parameters bound the base" if self._is_base_variable(name) else ""),
                 )
-            low[column], high[column] = np.clip((min(least, most), max(least, most)), *bounds)
-            values[column] = np.clip(wanted, low[column], high[column])
+            low[column], high[column] = np.clip((min(min_value, max_value), max(min_value, max_value)), *bounds)
+            values[column] = np.clip(target_value, low[column], high[column])
         return values, low, high
 
-    def _is_of_base(self, joint: str) -> bool:
+    def _is_base_variable(self, joint: str) -> bool:
         return self._model.base is not None and joint in self._model.base.variables
 
     def _in_workspace(self, constraints: KinematicConstraints) -> KinematicConstraints:
-        """Returns the constraints and, where the group moves the base, one more on each coordinate of its position."""
-        moved = [
+        """Returns the constraints with bounds on the base position added, if the group moves the base."""
+        base_joints = [
             name for name in (self._model.base.translations if self._model.base else ()) if name in self._group.joints
         ]
-        if not moved:
+        if not base_joints:
             return constraints
         limits = []
-        for name in moved:
+        for name in base_joints:
             low, high = (float(values[self._group.joints.index(name)]) for values in self._bounds)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
             limits.append(JointConstraint(name, self._model.index[name], middle, half, half))
@@ -197,7 +197,7 @@ class GoalResolver:
         )
 
     def _pose(self, goal: PoseGoal) -> list[Array]:
-        """Returns free solutions at the target; where there are none, at other poses that are allowed."""
+        """Returns free solutions at the target pose or, if none exists, at poses within the tolerances."""
         seed, allowed = self._request.scene.positions, goal.allowed
         try:
             solver = self._kinematics.solver(self._group.name)
@@ -207,7 +207,7 @@ class GoalResolver:
         except PlanningError:
             if allowed is None:
                 raise
-            return self._region(allowed)  # no chain to that link: least squares instead of inverse kinematics
+            return self._region(allowed)  # least squares without a chain to the link
         candidates = [positions[self._group.indices] for positions in found]
         free = first_free(candidates, self._is_valid, MAX_GOAL_STATES)
         if allowed is not None and allowed.is_loose:
@@ -215,21 +215,21 @@ class GoalResolver:
             if nearest is not None and self._is_valid(nearest[self._group.indices]):
                 free.append(nearest[self._group.indices])
             if not free:
-                others = self._at_other_poses(goal, allowed, solver)
-                free, candidates = first_free(others, self._is_valid, MAX_GOAL_STATES), candidates + others
+                alternatives = self._solutions_within_tolerances(goal, allowed, solver)
+                free, candidates = first_free(alternatives, self._is_valid, MAX_GOAL_STATES), candidates + alternatives
         if free:
             return free
         if not candidates:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
         raise self._rejection(
             candidates[0],
-            f"goal: all {len(candidates)} inverse kinematics solutions for '{goal.link}' collide; the nearest is"
+            f"goal: all {len(candidates)} inverse kinematics solutions for '{goal.link}' collide; the nearest"
             if self._path_constraints is None
-            else f"goal: none of {len(candidates)} inverse kinematics solutions for '{goal.link}' will do; the nearest",
+            else f"goal: all {len(candidates)} inverse kinematics solutions for '{goal.link}' are invalid; the nearest",
         )
 
     def _position(self, goal: PoseGoal, solver: InverseKinematics) -> list[Array]:
-        """Returns free solutions that bring the goal's point to its position, whatever the orientation."""
+        """Returns free solutions that place the goal's point at its position, in any orientation."""
         seed, allowed, indices = self._request.scene.positions, goal.allowed, self._group.indices
         point, position = np.zeros(3), goal.target.translation
         if allowed is not None:
@@ -245,11 +245,13 @@ class GoalResolver:
             return self._region(KinematicConstraints(self._model, (), allowed.positions, (), allowed.name))
         if candidates:
             raise self._rejection(
-                candidates[0], f"goal: every solution found for '{goal.link}' is refused; the nearest"
+                candidates[0], f"goal: all solutions found for '{goal.link}' are invalid; the nearest"
             )
         raise PlanningError(ErrorCode.NO_IK_SOLUTION, solver.explain_unreachable(goal.link, goal.target, seed))
 
-    def _at_other_poses(self, goal: PoseGoal, allowed: KinematicConstraints, solver: InverseKinematics) -> list[Array]:
+    def _solutions_within_tolerances(
+        self, goal: PoseGoal, allowed: KinematicConstraints, solver: InverseKinematics
+    ) -> list[Array]:
         """Returns solutions at random poses within the tolerances."""
         seed, indices = self._request.scene.positions, self._group.indices
         to_link = allowed.pose_target(seed).inverse() * goal.target
@@ -261,14 +263,14 @@ class GoalResolver:
         return found
 
     def _region(self, constraints: KinematicConstraints) -> list[Array]:
-        """Returns free states that satisfy: the nearest to the start, then random ones."""
+        """Returns free states that satisfy the constraints: the state nearest to the start and random states."""
         seed, indices = self._request.scene.positions, self._group.indices
         constraints = self._in_workspace(constraints)
         free: list[Array] = []
         rejected: list[Array] = []
-        for number in range(MAX_SAMPLES):
+        for index in range(MAX_SAMPLES):
             found = (
-                constraints.project(seed, indices) if number == 0 else (constraints.sample(self._rng, seed, indices, 1))
+                constraints.project(seed, indices) if index == 0 else (constraints.sample(self._rng, seed, indices, 1))
             )
             if found is not None:
                 (free if self._is_valid(found[indices]) else rejected).append(found[indices])
@@ -278,7 +280,7 @@ class GoalResolver:
             return free
         if rejected:
             raise self._rejection(
-                rejected[0], f"goal: all {len(rejected)} states found that satisfy it are refused; the nearest is"
+                rejected[0], f"goal: all {len(rejected)} states found in the goal region are invalid; the nearest"
             )
         raise PlanningError(
             ErrorCode.GOAL_CONSTRAINTS_VIOLATED,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads motion-planning problems kept as YAML (a PlanningScene and a MotionPlanRequest each) without a ROS master."""
+"""Motion planning problems in YAML files (a PlanningScene and a MotionPlanRequest each), read without a ROS master."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SHAPES: dict[str, type[Any]] = {"box": Box, "cylinder": Cylinder, "sphere": Sphe
 
 @dataclass(frozen=True, slots=True)
 class MotionProblem:
-    """One problem: its name, scene and request."""
+    """A named planning request with its scene."""
 
     name: str
     request: PlanningRequest
@@ -46,12 +46,12 @@ def _pose(entry: Mapping[str, Sequence[float]] | None, where: str) -> Transform:
 def _shape(entry: Mapping[str, Any], where: str) -> Shape:
     kind = str(entry["type"])
     if kind not in SHAPES:
-        raise GeometryError(f"{where}: primitive '{kind}'; allowed are {', '.join(SHAPES)}")
+        raise GeometryError(f"{where}: primitive '{kind}'; allowed: {', '.join(SHAPES)}")
     return SHAPES[kind](*entry["dimensions"])
 
 
 def _with_base(scene: PlanningScene, state: Mapping[str, Any] | None, where: str) -> PlanningScene:
-    """Returns the scene with a planar or floating base where a robot state's multi_dof_joint_state puts it."""
+    """Returns the scene with the planar or floating base at its pose in the multi_dof_joint_state of a robot state."""
     entry, base = (state or {}).get("multi_dof_joint_state") or {}, scene.model.base
     frame = str((entry.get("header") or {}).get("frame_id", ""))
     for name, item in zip(entry.get("joint_names") or (), entry.get("transforms") or (), strict=True):
@@ -63,7 +63,7 @@ def _with_base(scene: PlanningScene, state: Mapping[str, Any] | None, where: str
 
 
 def read_scene(model: RobotModel, path: Path) -> PlanningScene:
-    """Returns the scene of a YAML file; the robot's own allowed collisions come from its SRDF."""
+    """Returns the scene of a YAML file; allowed collisions of the robot come from its SRDF."""
     content = _load(path)
     scene = _with_base(empty_scene(model), content.get("robot_state"), path.name)
     for entry in content["world"]["collision_objects"]:
@@ -78,7 +78,14 @@ def read_scene(model: RobotModel, path: Path) -> PlanningScene:
 
 
 def read_problem(model: RobotModel, scene_path: Path, request_path: Path, allowed_time_s: float) -> MotionProblem:
-    """Returns one problem; joints of its start state the robot does not have are left out."""
+    """Returns a problem; joints in the start state that the robot does not have are ignored.
+
+    Args:
+        model: Robot model.
+        scene_path: YAML file of the planning scene.
+        request_path: YAML file of the planning request.
+        allowed_time_s: Allowed planning time [s].
+    """
     request = _load(request_path)
     state = request["start_state"]["joint_state"]
     values = {
@@ -98,7 +105,13 @@ def read_problem(model: RobotModel, scene_path: Path, request_path: Path, allowe
 
 
 def read_problems(model: RobotModel, folder: Path, allowed_time_s: float) -> Iterator[MotionProblem]:
-    """Yields every problem below a folder (<family>/sceneNNNN.yaml with requestNNNN.yaml), in the order of names."""
+    """Yields the problems below a folder (<family>/sceneNNNN.yaml with requestNNNN.yaml), sorted by name.
+
+    Args:
+        model: Robot model.
+        folder: Folder of the problem families.
+        allowed_time_s: Allowed planning time of each problem [s].
+    """
     for scene_path in sorted(folder.glob("*/scene*.yaml")):
         yield read_problem(
             model, scene_path, scene_path.with_name(scene_path.name.replace("scene", "request")), allowed_time_s

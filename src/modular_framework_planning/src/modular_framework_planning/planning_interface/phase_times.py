@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long the parts of a plan took, and what they asked the collision checker."""
+"""Durations and collision check counts of the planning phases."""
 
 from __future__ import annotations
 
@@ -27,56 +27,56 @@ SETUP, GOALS, SEARCH, REPAIR, SHORTENING, TIMING, CHECK = (
 
 
 class PhaseTimes:
-    """Adds up the seconds and the collision checks of each part; a part inside another one counts for itself alone.
+    """Sums the durations and collision checks per phase; a nested phase does not count for its enclosing phase.
 
     Args:
-        processor_clock: processor time of what plans [s]: of its thread, or of its process.
+        processor_clock: Returns the processor time of the planning thread or process [s].
     """
 
     def __init__(self, processor_clock: Callable[[], float] = time.thread_time) -> None:
-        self._processor_clock, self._processor_begun_s = processor_clock, processor_clock()
+        self._processor_clock, self._processor_start_s = processor_clock, processor_clock()
         self.seconds: dict[str, float] = {}
         self._checks: dict[str, NDArray[np.int64]] = {}
         self._checker: CountsChecks | None = None
-        self._counts = np.zeros(CHECK_COUNTS, np.int64)  # of the checker; it counts on in this array
+        self._counts = np.zeros(CHECK_COUNTS, np.int64)  # updated in place by the checker
         self.run: PlannerRun | None = None
-        self._inner = [0.0]  # time of the parts inside each open part
-        self._inner_checks = [np.zeros(CHECK_COUNTS, np.int64)]
+        self._nested_s = [0.0]  # time of the nested phases of each open phase
+        self._nested_checks = [np.zeros(CHECK_COUNTS, np.int64)]
 
-    def searched_by(self, implementation: str) -> None:
-        """Notes who searches; what repairs the path later does not count."""
+    def record_implementation(self, implementation: str) -> None:
+        """Records the implementation of the search; later calls, for path repair, are ignored."""
         if self.run is not None and not self.run.implementation:
             self.run = replace(self.run, implementation=implementation)
 
     def watch(self, checker: CollisionChecker) -> None:
-        """Takes over what a new checker has counted, and what it will count; nothing where it does not count."""
+        """Uses the past and future counts of a new checker, if it counts checks."""
         if isinstance(checker, CountsChecks):
             self._checker, self._counts = checker, checker.check_counts
 
     @contextmanager
     def measured(self, phase: str) -> Iterator[None]:
-        """Adds the time and the checks of the block to a part, also where it raises an exception."""
-        begun, before = time.monotonic(), self._counts.copy()
-        self._inner.append(0.0)
-        self._inner_checks.append(np.zeros(CHECK_COUNTS, np.int64))
+        """Adds the time and the checks of the block to a phase, even if the block raises an exception."""
+        start_s, before = time.monotonic(), self._counts.copy()
+        self._nested_s.append(0.0)
+        self._nested_checks.append(np.zeros(CHECK_COUNTS, np.int64))
         try:
             yield
         finally:
-            spent, checks = time.monotonic() - begun, self._counts - before
-            self.seconds[phase] = self.seconds.get(phase, 0.0) + spent - self._inner.pop()
-            self._checks[phase] = self._checks.get(phase, 0) + checks - self._inner_checks.pop()
-            self._inner[-1] += spent
-            self._inner_checks[-1] += checks
+            elapsed_s, checks = time.monotonic() - start_s, self._counts - before
+            self.seconds[phase] = self.seconds.get(phase, 0.0) + elapsed_s - self._nested_s.pop()
+            self._checks[phase] = self._checks.get(phase, 0) + checks - self._nested_checks.pop()
+            self._nested_s[-1] += elapsed_s
+            self._nested_checks[-1] += checks
 
     def statistics(self) -> PlanStatistics:
-        """Returns what was measured until now."""
-        processor_s = self._processor_clock() - self._processor_begun_s
+        """Returns the statistics so far."""
+        processor_s = self._processor_clock() - self._processor_start_s
         if self._checker is None:
             return PlanStatistics(dict(self.seconds), run=self.run, processor_s=processor_s)
         counts = {}
         for phase, row in self._checks.items():
-            asked, free, touching, states, exactly = row.tolist()
-            if asked:
-                undecided = asked - free - touching
-                counts[phase] = CheckCounts(asked, free, touching, undecided, exactly, states)
+            checked, free, touching, states, exactly = row.tolist()
+            if checked:
+                undecided = checked - free - touching
+                counts[phase] = CheckCounts(checked, free, touching, undecided, exactly, states)
         return PlanStatistics(dict(self.seconds), counts, self._checker.most_refusals(), self.run, processor_s)

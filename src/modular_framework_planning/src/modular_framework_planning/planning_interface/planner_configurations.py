@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The named settings of a pipeline's planners, which clients may read and change while the node runs."""
+"""Named planner configurations of a pipeline, which clients can read and change at runtime."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 
 class PlannerConfigurations:
-    """Settings by name, for all groups or for one; safe to share between threads."""
+    """Planner settings, keyed by configuration name, for all groups or a single group; thread-safe."""
 
     def __init__(self, named: Mapping[str, Mapping[str, Any]]) -> None:
         """Copies the settings.
 
         Args:
-            named: planner_configs of the pipeline's parameters.
+            named: Entry planner_configs of the pipeline parameters.
         """
         self._lock = threading.Lock()
         self._entries: dict[tuple[str, str], dict[str, Any]] = {
@@ -23,22 +23,22 @@ class PlannerConfigurations:
         }
 
     def names(self) -> tuple[str, ...]:
-        """Returns the names that settings exist for."""
+        """Returns the configuration names."""
         with self._lock:
             return tuple(dict.fromkeys(name for _, name in self._entries))
 
     def get(self, name: str, group: str = "") -> dict[str, Any]:
-        """Returns a copy of the settings of a name; those of the group come before those of all groups."""
+        """Returns a copy of the settings of a configuration; group settings override general settings."""
         with self._lock:
             return {**self._entries.get(("", name), {}), **(self._entries.get((group, name), {}) if group else {})}
 
     def snapshot(self) -> dict[tuple[str, str], dict[str, Any]]:
-        """Returns everything, for `restore` in another process."""
+        """Returns a copy of all settings, for `restore` in a different process."""
         with self._lock:
             return {key: dict(entry) for key, entry in self._entries.items()}
 
     def restore(self, entries: Mapping[tuple[str, str], Mapping[str, Any]]) -> None:
-        """Takes over what `snapshot` returned."""
+        """Replaces all settings by a snapshot."""
         with self._lock:
             self._entries = {key: dict(entry) for key, entry in entries.items()}
 
@@ -46,10 +46,10 @@ class PlannerConfigurations:
         """Changes settings.
 
         Args:
-            name: of the settings; a new name is added.
-            group: they are for; empty for all groups.
-            values: new values by key.
-            replace: drop all keys that are not given.
+            name: Configuration name; a new name is added.
+            group: Planning group; empty for all groups.
+            values: New values, keyed by setting.
+            replace: Whether to delete all other settings of the configuration.
         """
         with self._lock:
             old = {} if replace else self._entries.get((group, name), {})
@@ -57,22 +57,22 @@ class PlannerConfigurations:
 
 
 def planner_kind(
-    own: Mapping[str, Any], groups: Mapping[str, Mapping[str, Any]], name: str, group: str
+    configuration: Mapping[str, Any], groups: Mapping[str, Mapping[str, Any]], name: str, group: str
 ) -> tuple[str, dict[str, Any]]:
-    """Returns the planner of a configuration's name, and its settings with those of the group.
+    """Returns the planner of a configuration, and its settings merged with the group's settings.
 
     Args:
-        own: Settings of that name.
-        groups: Settings of the pipeline's groups.
+        configuration: Settings of the configuration.
+        groups: Settings of the pipeline, keyed by group.
         name: Name of the planner or configuration.
         group: Planning group.
     """
-    kind = str(own.get("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
-    not_settings = ("planner_configs", "default_planner_config")
-    of_group = {key: value for key, value in groups.get(group, {}).items() if key not in not_settings}
-    return kind, of_group | {key: value for key, value in own.items() if key != "type"}
+    planner_type = str(configuration.get("type", name)).removeprefix("geometric::").removesuffix("kConfigDefault")
+    ignored_keys = ("planner_configs", "default_planner_config")
+    group_settings = {key: value for key, value in groups.get(group, {}).items() if key not in ignored_keys}
+    return planner_type, group_settings | {key: value for key, value in configuration.items() if key != "type"}
 
 
 def without_group(planner_id: str) -> str:
-    """Returns the planner in a name such as arm[RRTConnect]."""
+    """Returns the planner id without its group, such as RRTConnect for arm[RRTConnect]."""
     return planner_id.split("[")[-1].rstrip("]") if planner_id.endswith("]") and "[" in planner_id else planner_id

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Requests to the planner and its answers, free of messages."""
+"""Planning requests, pipeline settings and planning results, independent of ROS messages."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from modular_framework_urdf.mimics import Mimic
 if TYPE_CHECKING:
     from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
 
-PARTS_OF_MOTION_STEP = 100  # costs nothing away from contact: a known clearance covers many samples at once
+CHECKS_PER_MOTION_STEP = 100  # cheap away from contact, where a known clearance covers many states
 DEFAULT_PLANNER = "default_planner_config"  # parameter of a group or a pipeline
-SAME_POSITION = 1.0e-4  # [rad or m]; positions of joints that follow each other need not agree better
+MIMIC_TOLERANCE = 1.0e-4  # accepted difference between a mimic joint and its leader [rad or m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +33,11 @@ class JointGoal:
     below: Mapping[str, float] = field(default_factory=dict)
     above: Mapping[str, float] = field(default_factory=dict)
 
-    def of_independent_joints(self, mimics: Mapping[str, Mimic]) -> JointGoal:
-        """Returns the goal in which mimic joints are replaced by what they ask of their leaders.
+    def without_mimic_joints(self, mimics: Mapping[str, Mimic]) -> JointGoal:
+        """Returns the goal with the targets of mimic joints converted to targets of their leaders.
 
         Raises:
-            PlanningError: no position of a leader satisfies all that is asked of it.
+            PlanningError: The targets of a leader contradict each other.
         """
         targets = {name: value for name, value in self.positions.items() if name not in mimics}
         low = {name: value - self.below.get(name, 0.0) for name, value in targets.items()}
@@ -51,25 +51,24 @@ class JointGoal:
             leader = mimic.leader
             low[leader], high[leader] = max(low.get(leader, -np.inf), ends[0]), min(high.get(leader, np.inf), ends[1])
             targets.setdefault(leader, mimic.leader_position(value))
-            if low[leader] > high[leader] + SAME_POSITION:
+            if low[leader] > high[leader] + MIMIC_TOLERANCE:
                 raise PlanningError(
                     ErrorCode.INVALID_GOAL_CONSTRAINTS,
-                    f"goal: joint '{name}' at {value:.4f} asks "
-                    f"'{leader}', which it mimics, to be at {mimic.leader_position(value):.4f}; the goal asks "
-                    f"another position of '{leader}', too; give positions that fit, or leave joints "
-                    "that mimic out",
+                    f"goal: joint '{name}' at {value:.4f} requires "
+                    f"'{leader}', which it mimics, at {mimic.leader_position(value):.4f}; the goal also requires a "
+                    f"different position of '{leader}'; choose consistent positions or omit mimic joints",
                 )
-        inside = {name: max(low[name], min(target, high[name])) for name, target in targets.items()}
+        clipped = {name: max(low[name], min(target, high[name])) for name, target in targets.items()}
         return JointGoal(
-            inside,
-            {name: max(target - low[name], 0.0) for name, target in inside.items()},
-            {name: max(high[name] - target, 0.0) for name, target in inside.items()},
+            clipped,
+            {name: max(target - low[name], 0.0) for name, target in clipped.items()},
+            {name: max(high[name] - target, 0.0) for name, target in clipped.items()},
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal:
-    """A link's target pose in the planning frame; `allowed` constrains the other poses that reach the goal."""
+    """Target pose of a link in the planning frame; `allowed` describes all poses that reach the goal."""
 
     link: str
     target: Transform
@@ -78,40 +77,46 @@ class PoseGoal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstraintGoal:
-    """Any state that satisfies constraints of any mix."""
+    """Any state that satisfies the constraints."""
 
     constraints: KinematicConstraints
 
 
 @dataclass(frozen=True, slots=True)
 class SamplingSettings:
-    """Parameters below ~ompl: whether the paths that are found are shortened."""
+    """Parameters below ~ompl.
+
+    Attributes:
+        simplify_solutions: Whether planned paths are shortened.
+    """
 
     simplify_solutions: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class PipelineSettings:
-    """Settings of a pipeline, for what a request leaves open; names as in the config package.
+    """Settings of a pipeline, named after the parameters in a MoveIt config package.
 
     Attributes:
-        start_state_max_bounds_error: how far out of bounds a start is pulled back [rad or m].
-        jiggle_fraction: how far from a colliding start a free one is searched (share of the joint's range).
-        start_state_collision_depth: a start that collides deeper than this is refused at once [m].
-        start_state_contact_tolerance: depth of a held body's contact tolerated at the start [m].
-        motion_step: distance of checks along a motion [rad or m]; collisions of the returned one are checked at
-            `finest_step`.
-        blend_deviation: most distance a rounded corner keeps from the corner [rad or m].
-        start_state_max_dt: longest way back from a start out of bounds to the bounds [s].
-        default_workspace_bounds: edge of the cube a request's workspace is where it gives none [m].
-        planner_configs: named settings of planners; groups: what the pipeline's parameters hold below each group.
-        parameters: everything below the pipeline's name on the parameter server.
-        robot_planning: robot_description_planning (joint_limits, cartesian_limits, ...).
-        seed: of every plan of the pipeline; None for fresh random numbers each time.
-        seeded_iterations: after how many a planner that goes on to improve its path stops, where a seed is set.
-        search_threads: searches of RRTConnect that run at the same time for one request, of which the first path wins;
-            0 for as many as pay.
-        sampling: of paths that are searched.
+        start_state_max_bounds_error: Maximum bounds violation of a start that is corrected [rad or m].
+        start_state_max_dt: Maximum duration of the motion from a start out of bounds to the bounds [s].
+        jiggle_fraction: Search range for a free start around a colliding start, as a fraction of the joint ranges.
+        max_sampling_attempts: Maximum number of states tried around a colliding start.
+        start_state_collision_depth: Maximum contact depth of a start that is corrected [m].
+        start_state_contact_tolerance: Maximum contact depth of an attached object that is tolerated at the start [m].
+        search_step: Maximum joint displacement between collision checks of a search [rad or m].
+        motion_step: Maximum joint displacement between constraint checks of a motion [rad or m]; collision checks of
+            the returned motion use `finest_step`.
+        blend_deviation: Maximum distance between a waypoint and its blend [rad or m].
+        default_workspace_bounds: Edge length of the default workspace cube [m].
+        planner_configs: Named planner configurations.
+        groups: Parameters of the pipeline, keyed by group.
+        parameters: All parameters below the pipeline's name.
+        robot_planning: Parameters of robot_description_planning (joint_limits, cartesian_limits, ...).
+        seed: Random seed of every plan; None for a new seed per plan.
+        seeded_iterations: Iteration limit of anytime planners if a seed is set.
+        search_threads: Number of parallel RRTConnect searches per request; 0 for automatic.
+        sampling: Settings of sampling-based planners.
     """
 
     start_state_max_bounds_error: float = 0.1
@@ -137,30 +142,33 @@ class PipelineSettings:
 
     @property
     def finest_step(self) -> float:
-        """Distance of states checked before a motion is returned [rad or m]: bodies that graze touch only briefly."""
-        return self.motion_step / PARTS_OF_MOTION_STEP
+        """Joint displacement between collision checks of the final validation [rad or m]."""
+        return self.motion_step / CHECKS_PER_MOTION_STEP
 
     def default_planner(self, group: str) -> str:
-        """Returns the planner of requests that name none; empty where no parameter says.
+        """Returns the default planner of a group, empty if no parameter sets it.
 
-        MoveIt's Setup Assistant writes `None` for a group without one.
+        MoveIt's Setup Assistant writes `None` for a group without a default planner.
         """
-        given = (self.groups.get(group, {}).get(DEFAULT_PLANNER), self.parameters.get(DEFAULT_PLANNER))
-        return next((str(name) for name in given if name and name != "None"), "")
+        candidates = (self.groups.get(group, {}).get(DEFAULT_PLANNER), self.parameters.get(DEFAULT_PLANNER))
+        return next((str(name) for name in candidates if name and name != "None"), "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Workspace:
-    """The box a moving base may be in: lower and upper corner in the planning frame [m], each of shape (3,)."""
+    """Bounding box of a moving base: lower and upper corner in the planning frame, each of shape (3,) [m]."""
 
     lower: Array
     upper: Array
 
 
 def group_bounds(model: RobotModel, group: JointGroup, workspace: Workspace | None) -> tuple[Array, Array]:
-    """Returns lower and upper bounds of a group's joints, each of shape (joints,) [rad or m].
+    """Returns the lower and upper bounds of a group's joints, each of shape (joints,) [rad or m].
 
-    As in MoveIt the workspace bounds where a planar or floating base may be, if the group moves it.
+    Args:
+        model: Robot model.
+        group: Joints of the planning group.
+        workspace: Bounds of a planar or floating base that the group moves, as in MoveIt; None for no bounds.
     """
     lower, upper = model.lower[group.indices], model.upper[group.indices]
     if model.base is None or workspace is None:
@@ -175,7 +183,7 @@ def group_bounds(model: RobotModel, group: JointGroup, workspace: Workspace | No
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AuxiliaryPoint:
-    """A point that shapes a motion: "center" or "interim" of a circle, in the planning frame [m], shape (3,)."""
+    """Point "center" or "interim" of a circular motion in the planning frame, shape (3,) [m]."""
 
     name: str
     position: Array
@@ -183,19 +191,24 @@ class AuxiliaryPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanningRequest:
-    """One request to the planner.
+    """A planning request.
 
     Attributes:
-        scene: snapshot with the start positions and attached objects already in it.
-        goals: alternatives; reaching one is enough.
-        velocity_scaling, acceleration_scaling: 0 asks for the default.
-        pipeline_id, planner_id: empty for the default.
-        start_velocities: joint velocities at the start that are known [rad/s or m/s].
-        path_constraints: what every state of the motion must satisfy.
-        max_cartesian_speed: of cartesian_speed_limited_link [m/s]; 0 for none.
-        seed: makes the plan repeatable; None for the pipeline's own.
-        most_iterations: of one search that would go on until its time is over; None where the clock alone bounds it.
-        auxiliary_point: of a circular motion.
+        scene: Planning scene with the start positions and the attached objects.
+        group: Name of the planning group.
+        goals: Alternative goals.
+        pipeline_id, planner_id: Names of pipeline and planner; empty for the defaults.
+        attempts: Number of searches, of which the shortest path is returned.
+        allowed_time_s: Allowed planning time [s].
+        velocity_scaling, acceleration_scaling: Fractions of the joint limits; 0 for the defaults.
+        cancelled: Returns True to cancel the request.
+        start_velocities: Known joint velocities at the start [rad/s or m/s].
+        path_constraints: Constraints of every state of the motion.
+        max_cartesian_speed: Speed limit of `cartesian_speed_limited_link` [m/s]; 0 for no limit.
+        workspace: Bounds of a moving base.
+        seed: Random seed; None for the seed of the pipeline.
+        max_iterations: Iteration limit of a search; None for no limit but time.
+        auxiliary_point: Auxiliary point of a circular motion.
     """
 
     scene: PlanningScene
@@ -214,19 +227,22 @@ class PlanningRequest:
     cartesian_speed_limited_link: str = ""
     workspace: Workspace | None = None
     seed: int | None = None
-    most_iterations: int | None = None
+    max_iterations: int | None = None
     auxiliary_point: AuxiliaryPoint | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanningAnswer:
-    """A checked motion.
+    """A validated motion.
 
     Attributes:
-        start, goal: positions of the whole robot.
-        planning_time_s: time until a path was found; total_time_s: until the checked, timed motion was ready.
-        path: vertices of the shortened path, shape (n, joints).
-        statistics: what the parts of the plan took, see phase_times.
+        trajectory: Timed motion.
+        start, goal: Positions of the whole robot at both ends [rad or m].
+        path: Vertices of the shortened path, shape (n, joints).
+        planner_id: Name of the planner.
+        planning_time_s: Duration of the search [s].
+        total_time_s: Duration including time parameterization and validation [s].
+        statistics: Durations and check counts of the planning phases.
     """
 
     trajectory: Trajectory
@@ -240,5 +256,5 @@ class PlanningAnswer:
 
     @property
     def phases_s(self) -> Mapping[str, float]:
-        """How long the parts of the plan took [s]."""
+        """Durations of the planning phases [s]."""
         return self.statistics.phases_s

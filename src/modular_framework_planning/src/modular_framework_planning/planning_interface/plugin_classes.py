@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Imports the class that a parameter names as `module/Class`."""
+"""Import of plugin classes named `module/Class` in parameters."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from typing import Any
 from modular_framework_planning.errors import ModelError, PlanningError
 
 
-def plugin_class(path: str, where: str, known: str) -> Any:
-    """Imports a class.
+def plugin_class(path: str, where: str, allowed: str) -> Any:
+    """Returns a plugin class.
 
     Args:
-        path: `module/Class`.
-        where: the parameter and what it names, for the reason of a failure.
-        known: what it may name, for the same.
+        path: Class name as `module/Class`.
+        where: Parameter and value, for error messages.
+        allowed: Allowed values, for error messages.
 
     Raises:
-        ModelError: there is none, or its module fails.
+        ModelError: The class does not exist, or its module cannot be imported.
     """
     module, _, name = path.partition("/")
     if not re.fullmatch(r"[A-Za-z_][\w.]*", module) or not name.isidentifier():
-        raise ModelError(f"{where} is not known; {known}")
+        raise ModelError(f"{where} is not known; {allowed}")
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise ModelError(f"{where} is not known ({error}); {known}") from error
+        raise ModelError(f"{where} is not known ({error}); {allowed}") from error
     except PlanningError:
         raise
     except Exception as error:  # noqa: BLE001 - a user's module may fail in any way; the cause must be reported
-        raise ModelError(f"{where}: its module fails with {type(error).__name__}: {error}; mend the module") from error
+        raise ModelError(f"{where}: its module fails with {type(error).__name__}: {error}; fix the module") from error

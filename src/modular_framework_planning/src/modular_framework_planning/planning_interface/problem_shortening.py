@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shortens a path of a problem; what is accepted was checked as finely as the solution validator does."""
+"""Path shortening with edge checks at the step of the final validation."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ def shortened(problem: PlanningProblem, path: Array, deadline: float, rng: np.ra
     """Returns a path with the same ends, not longer than the given one.
 
     Args:
-        problem: whose collisions and path constraints count.
-        path: vertices, shape (n, joints).
-        deadline: monotonic time [s] at which to stop.
-        rng: source of the random choices; None: vertices are left out, and nothing else is done.
+        problem: Planning problem with collision checks and path constraints.
+        path: Path vertices, shape (n, joints).
+        deadline: Monotonic time at which to stop [s].
+        rng: Random generator; None to only remove vertices.
     """
     fine, world = problem.settings.finest_step, problem.compiled_world
     compiled = None if world is None else CompiledTest(problem.motion.edges(fine), problem.motion.memory, world)

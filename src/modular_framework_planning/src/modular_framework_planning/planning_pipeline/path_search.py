@@ -39,12 +39,12 @@ class PathSearch:
                 found = self._planner.plan(problem)
             now = time.monotonic()
             self._found = (
-                PlannedPath(found.positions, found, found_s=now, is_short=True)
+                PlannedPath(found.positions, found, found_s=now, keep_shape=True)
                 if isinstance(found, Trajectory)
                 else replace(found, found_s=now)
             )
         path = self._found
-        if path.is_short or path.trajectory is not None:
+        if path.keep_shape or path.trajectory is not None:
             return path
         simplify, vertices = problem.settings.sampling.simplify_solutions, path.vertices
         if simplify:  # first, so that fewer edges have to be repaired
@@ -111,7 +111,7 @@ def _cut_along_constraints(problem: PlanningProblem, path: Array, deadline: floa
     fine = problem.settings.finest_step
 
     def is_valid(polyline: Array) -> bool:
-        return problem.keeps_constraints(polyline, fine) and all(
+        return problem.satisfies_constraints(polyline, fine) and all(
             problem.motion.edge_is_free(first, second, fine) for first, second in pairwise(polyline)
         )
 

@@ -156,7 +156,7 @@ class PlanningPipeline:
             else:
                 if answer is not None:
                     return answer
-                if path.is_short or problem.cancelled() or time.monotonic() > problem.end_s:
+                if path.keep_shape or problem.cancelled() or time.monotonic() > problem.end_s:
                     break
                 if search.repairs:  # what the check saw between two samples of the repair, with finer ones
                     problem = replace(

@@ -67,7 +67,7 @@ def _first_fault(problem: PlanningProblem, path: PlannedPath) -> Callable[[], st
         hit = _colliding_state(problem, line)
         if hit is not None:
             return partial(_describe_collision, problem, hit)
-    return _find_violation(problem, curve[_sample_at(curve, path, path.unconstrained) :])
+    return _find_violation(problem, curve[_sample_at(curve, path, path.unconstrained_prefix) :])
 
 
 def _sample_at(samples: Array, path: PlannedPath, vertex: int) -> int:

@@ -72,8 +72,8 @@ class OmplPlanner:
             if problem.edge_is_valid(start, goal, problem.settings.finest_step):
                 return PlannedPath(np.vstack([start, goal]))
         if problem.constraints is not None and (problem.planner_id == "RRTConnect" or constraints_are_tight(problem)):
-            problem.phases.searched_by(NAME)
-            max_states = problem.request.most_iterations
+            problem.phases.record_implementation(NAME)
+            max_states = problem.request.max_iterations
             return ConstrainedSearch(problem, step, max_states=math.inf if max_states is None else max_states).run()
         if problem.repeatable and problem.planner_id in THREADED:
             raise PlanningError(
@@ -104,7 +104,7 @@ def _stages(problem: PlanningProblem, goals: Array) -> list[tuple[PlanningProble
 
     Continuous joints rotate to their goals the short way. If half of the time finds no path, both ways are allowed.
     """
-    long_way_goals = problem.other_ways_round(goals)
+    long_way_goals = problem.long_way_goals(goals)
     if not len(long_way_goals):
         return [(problem, goals)]
     both = np.vstack([goals, long_way_goals])
@@ -119,7 +119,7 @@ def _paths(problem: PlanningProblem, goals: Array, step: float) -> tuple[list[Ar
     paths, checks = [], 0
     for _ in range(max(1, problem.request.attempts)):
         search = _search(problem, goals, step)
-        problem.phases.searched_by("OMPL" if isinstance(search, _Search) else "compiled")
+        problem.phases.record_implementation("OMPL" if isinstance(search, _Search) else "compiled")
         path = search.run()
         checks += search.checks
         if path is not None:
@@ -187,7 +187,7 @@ def _max_iterations(problem: PlanningProblem, iteration_limit: int | None) -> in
     """Returns the maximum number of iterations of a search; None if only the clock ends the search."""
     if iteration_limit is None and problem.repeatable and problem.planner_id in ANYTIME:
         return problem.settings.seeded_iterations
-    return problem.request.most_iterations if iteration_limit is None else iteration_limit
+    return problem.request.max_iterations if iteration_limit is None else iteration_limit
 
 
 def search_threads(problem: PlanningProblem) -> int:

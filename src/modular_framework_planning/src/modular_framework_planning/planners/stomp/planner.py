@@ -53,7 +53,7 @@ class StompPlanner:
         for attempt in range(settings.num_attempts):
             search = _Attempt(problem, settings, goals[attempt % len(goals)], is_bowed=attempt >= len(goals))
             if search.run():
-                return PlannedPath(search.motion, is_short=True)
+                return PlannedPath(search.motion, keep_shape=True)
             invalid = search.invalid_states()
             if best is None or invalid < min_invalid:
                 best, min_invalid = search.motion, invalid

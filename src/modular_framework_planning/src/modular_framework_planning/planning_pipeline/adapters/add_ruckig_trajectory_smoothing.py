@@ -46,7 +46,7 @@ class AddRuckigTrajectorySmoothing(RequestAdapter):
         limits = (problem.max_velocity, problem.max_acceleration, problem.model.max_jerk[problem.group.indices])
         yield slowed_to_limits(path.trajectory, *limits)
         yield averaged_curve(path.trajectory, *limits)
-        if not path.is_short:
+        if not path.keep_shape:
             yield along_straight_lines(path.trajectory.joint_names, path.vertices, *limits)
 
 

@@ -83,7 +83,7 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
 
 def _corner_is_valid(problem: PlanningProblem, curve: Array) -> bool:
     """Whether a rounded corner is free and keeps the path constraints."""
-    if not problem.keeps_constraints(curve, problem.settings.motion_step):
+    if not problem.satisfies_constraints(curve, problem.settings.motion_step):
         return False
     return problem.motion.polyline_is_free(curve, problem.settings.finest_step)
 

@@ -29,7 +29,7 @@ def with_path_prefix(problem: PlanningProblem, path: PlannedPath, collides: bool
     result = replace(
         path,
         vertices=np.vstack([start, path.vertices]),
-        unconstrained=path.unconstrained + 1,
+        unconstrained_prefix=path.unconstrained_prefix + 1,
         path_prefix=path.path_prefix + 1 if collides or path.path_prefix else 0,
     )
     if path.trajectory is None or np.abs(path.vertices[0] - start).max() < 1e-9:
