@@ -127,7 +127,7 @@ def test_a_name_that_is_not_there_is_refused_with_the_list(session: Any, changes
 def test_a_planner_that_is_not_there_is_replaced_by_the_default_one_with_a_warning(session: Any) -> None:
     answer, report = report_of(lambda: plan(request(GOAL, planner_id="BiTRRT")))
     assert answer.error_code.val == OK and report["planner_id"] == "RRTConnect"
-    assert "planner_id 'BiTRRT': pipeline 'ompl' has no such planner, available: RRTConnect" in session.log()
+    assert "planner_id 'BiTRRT': pipeline 'ompl' has no such planner; allowed: RRTConnect" in session.log()
 
 
 def test_pipelines_and_planners_are_listed_also_by_group(session: Any) -> None:

@@ -177,10 +177,14 @@ def test_industrial_motions_in_collision_are_invalid_motion_plans(model: RobotMo
         model.merge(inside.scene.positions, dict(zip(model.group(GROUP).joints, GOAL, strict=True)))
     )["wrist_2_link"].translation
     start = model.link_transforms(inside.scene.positions)["wrist_2_link"].translation
-    for where, words in ((tip, "goal in collision"), (start, "start state in collision"), (BOARD_AT, "last check")):
+    for where, words in (
+        (tip, "goal is in collision"),
+        (start, "start state is in collision"),
+        (BOARD_AT, "final validation"),
+    ):
         block = CollisionObject("block", pin.SE3(np.eye(3), where), ((Box(0.05, 0.05, 0.05), pin.SE3.Identity()),))
         scene = empty_scene(model, inside.scene.positions)
-        scene = scene.with_object(block) if words != "last check" else inside.scene
+        scene = scene.with_object(block) if words != "final validation" else inside.scene
         with pytest.raises(PlanningError, match=words) as caught:
             pipeline.plan(replace(inside, scene=scene, planner_id="PTP"))
         assert caught.value.code == ErrorCode.INVALID_MOTION_PLAN, words

@@ -111,13 +111,13 @@ def test_scaling_factors_out_of_range_are_1(model: RobotModel, factor: float, ca
         for value in (1.0, factor)
     )
     assert other.times.tolist() == full.times.tolist()
-    assert f"max_velocity_scaling_factor is {factor:g}; allowed is 0 < factor <= 1" in caplog.text
+    assert f"max_velocity_scaling_factor is {factor:g}; it must be in (0, 1]" in caplog.text
 
 
 @pytest.mark.parametrize("factor", [np.nan, np.inf])
 def test_scaling_factors_that_are_no_numbers_are_refused(model: RobotModel, factor: float) -> None:
     for name in ("velocity_scaling", "acceleration_scaling"):
-        with pytest.raises(PlanningError, match="allowed is 0 < factor <= 1"):
+        with pytest.raises(PlanningError, match=r"must be in \(0, 1\]"):
             planned(model, [AddTimeOptimalParameterization()], **{name: factor})
 
 
@@ -221,8 +221,8 @@ def test_speed_limit_of_the_tip_and_what_is_refused(model: RobotModel) -> None:
     motion = planned(model, adapters, max_cartesian_speed=0.1).trajectory
     assert speeds_by_difference(model, motion, model.group(GROUP).tip_link).max() <= 0.1
     for request, code, text in (
-        ({"max_cartesian_speed": -1.0}, ErrorCode.INVALID_MOTION_PLAN, "allowed is a speed above 0"),
-        ({"max_cartesian_speed": float("nan")}, ErrorCode.INVALID_MOTION_PLAN, "allowed is a speed above 0"),
+        ({"max_cartesian_speed": -1.0}, ErrorCode.INVALID_MOTION_PLAN, "it must be above 0"),
+        ({"max_cartesian_speed": float("nan")}, ErrorCode.INVALID_MOTION_PLAN, "it must be above 0"),
         (
             {"max_cartesian_speed": 1.0, "cartesian_speed_limited_link": "no_link"},
             ErrorCode.INVALID_LINK_NAME,

@@ -56,7 +56,7 @@ class PlannerConfigurations:
             self._entries[group, name] = {**old, **values}
 
 
-def planner_kind(
+def resolve_configuration(
     configuration: Mapping[str, Any], groups: Mapping[str, Mapping[str, Any]], name: str, group: str
 ) -> tuple[str, dict[str, Any]]:
     """Returns the planner of a configuration, and its settings merged with the group's settings.

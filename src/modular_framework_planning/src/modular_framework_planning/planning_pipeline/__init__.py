@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A planner with the request adapters around it and the check every motion has to pass."""
+"""Planning pipelines: a planner, its request adapters and the final validation of every motion."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The innermost step of a pipeline: the planner's path from a valid start, repaired and shortened."""
+"""Innermost step of a pipeline: path search from a valid start, path repair and shortening."""
 
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ from modular_framework_planning.trajectory_processing.constrained_shortening imp
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_SHORTENING_S = 1.0
-SHORTENING_SHARE = 0.3  # of the time left where a planner used all of its own
+SHORTENING_FRACTION = 0.3  # fraction of the remaining time, if the planner has used all of its time
 BOUNDS_TOLERANCE = 1.0e-6  # [rad or m]
 
 
 class PathSearch:
-    """Checks the start, runs the planner once, lets it repair its path, shortens that."""
+    """Checks the start, plans once, repairs and shortens the path."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
-        self._found: PlannedPath | None = None
+        self._path: PlannedPath | None = None
         self.repairs = hasattr(planner, "repaired")
 
     def __call__(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the path; that of the first call, repaired once more, where it is called again."""
+        """Returns the path; a further call repairs the path of the first call again."""
         _require_start(problem)
-        if self._found is None:
+        if self._path is None:
             with problem.phases.measured(SEARCH):
-                found = self._planner.plan(problem)
+                result = self._planner.plan(problem)
             now = time.monotonic()
-            self._found = (
-                PlannedPath(found.positions, found, found_s=now, keep_shape=True)
-                if isinstance(found, Trajectory)
-                else replace(found, found_s=now)
+            self._path = (
+                PlannedPath(result.positions, result, found_s=now, keep_shape=True)
+                if isinstance(result, Trajectory)
+                else replace(result, found_s=now)
             )
-        path = self._found
+        path = self._path
         if path.keep_shape or path.trajectory is not None:
             return path
         simplify, vertices = problem.settings.sampling.simplify_solutions, path.vertices
-        if simplify:  # first, so that fewer edges have to be repaired
+        if simplify:  # leaves fewer edges to repair
             vertices = _shortened(problem, vertices, _without_vertices)
         if self.repairs:
             with problem.phases.measured(REPAIR):
@@ -56,12 +56,12 @@ class PathSearch:
             vertices = _shortened(problem, vertices, _cut_along_constraints)
         if simplify:
             vertices = _shortened(problem, vertices, _short)
-        self._found = replace(path, vertices=vertices)
-        return self._found
+        self._path = replace(path, vertices=vertices)
+        return self._path
 
 
 def _require_start(problem: PlanningProblem) -> None:
-    """Raises PlanningError unless the start is within bounds, free, and keeps the path constraints."""
+    """Raises PlanningError unless the start is within bounds, free and satisfies the path constraints."""
     model, group = problem.model, problem.group
     faults = model.bound_violations(problem.start, group.indices, BOUNDS_TOLERANCE, problem.bounds)
     if faults:
@@ -69,14 +69,14 @@ def _require_start(problem: PlanningProblem) -> None:
         raise PlanningError(
             ErrorCode.START_STATE_INVALID,
             f"start state: {'; '.join(faults)}; move the robot within its bounds or use the adapter FixStartStateBounds"
-            + ("; the base's are those of workspace_parameters" if moves_base else ""),
+            + ("; workspace_parameters bound the base" if moves_base else ""),
         )
     if not problem.motion.state_is_free(problem.start_values):
         contacts = problem.checker.contacts(problem.start, include_fixed=False)
         raise PlanningError(
             ErrorCode.START_STATE_IN_COLLISION,
-            f"start state in collision: "
-            f"{describe_contacts(contacts)}; allow the pair, move it, or use the adapter "
+            f"start state is in collision: "
+            f"{describe_contacts(contacts)}; allow this collision, move one of the bodies, or use the adapter "
             "FixStartStateCollision",
             contacts,
         )
@@ -85,16 +85,16 @@ def _require_start(problem: PlanningProblem) -> None:
             ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
             "start state: "
             f"{problem.constraints.describe(problem.start)}; start from a state that satisfies the "
-            "path constraints or use the adapter FixStartStatePathConstraints",
+            "path constraints, or use the adapter FixStartStatePathConstraints",
         )
 
 
 def _shortened(
     problem: PlanningProblem, path: Array, shorten_path: Callable[[PlanningProblem, Array, float], Array]
 ) -> Array:
-    """Shortens a path; what it accepts was checked as finely as the solution validator does."""
+    """Shortens a path within the available time, with checks at the step of the final validation."""
     now = time.monotonic()
-    limit = min(max(problem.deadline_s, now + SHORTENING_SHARE * (problem.end_s - now)), now + MAX_SHORTENING_S)
+    limit = min(max(problem.deadline_s, now + SHORTENING_FRACTION * (problem.end_s - now)), now + MAX_SHORTENING_S)
     with problem.phases.measured(SHORTENING):
         return shorten_path(problem, path, math.inf if problem.repeatable else limit)
 
@@ -108,11 +108,11 @@ def _without_vertices(problem: PlanningProblem, path: Array, deadline: float) ->
 
 
 def _cut_along_constraints(problem: PlanningProblem, path: Array, deadline: float) -> Array:
-    fine = problem.settings.finest_step
+    step = problem.settings.finest_step
 
     def is_valid(polyline: Array) -> bool:
-        return problem.satisfies_constraints(polyline, fine) and all(
-            problem.motion.edge_is_free(first, second, fine) for first, second in pairwise(polyline)
+        return problem.satisfies_constraints(polyline, step) and all(
+            problem.motion.edge_is_free(first, second, step) for first, second in pairwise(polyline)
         )
 
     return cut_along(path, problem.constrained_motion(problem.step).way, is_valid, deadline, problem.rng)

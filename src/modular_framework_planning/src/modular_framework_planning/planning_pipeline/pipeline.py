@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One planning pipeline: a planner, the request adapters around it, and the check every motion has to pass."""
+"""Planning pipeline: runs request adapters and planner, and validates every motion before it is returned."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from modular_framework_planning.planning_interface.path_repair import EdgeError
 from modular_framework_planning.planning_interface.phase_times import SETUP, PhaseTimes
 from modular_framework_planning.planning_interface.planner_configurations import (
     PlannerConfigurations,
-    planner_kind,
+    resolve_configuration,
     without_group,
 )
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, Planner, PlanningProblem
@@ -43,14 +43,14 @@ from modular_framework_planning.planning_pipeline.trajectory_validator import Tr
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-RESERVED_S, RESERVED_SHARE = 0.25, 0.2  # of the allowed time, for what follows the search
-RESERVED_AFTER_IMPROVING_S = 1.0  # where the planner always uses all of its time, so that nothing else is left
+RESERVED_S, RESERVED_FRACTION = 0.25, 0.2  # part of the allowed time reserved for repair, timing and validation
+RESERVED_IMPROVING_S = 1.0  # more for planners that improve their path, because they always use all of their time
 COLLISIONS = (ErrorCode.START_STATE_IN_COLLISION, ErrorCode.GOAL_IN_COLLISION)
 LOGGER = logging.getLogger("rosout.planning_pipeline")
 
 
 class PlanningPipeline:
-    """Plans for one robot; threads may share it, each plan has its own collision world."""
+    """Plans motions of a robot; thread-safe, because each plan has its own collision checker."""
 
     def __init__(
         self,
@@ -62,16 +62,16 @@ class PlanningPipeline:
         name: str = "ompl",
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
     ) -> None:
-        """Stores the parts; PipelineSpec builds them from their names.
+        """Stores the parts, which PipelineSpec creates from their names.
 
         Args:
-            model: the robot.
-            kinematics: inverse kinematics of its groups.
-            settings: the pipeline's parameters.
-            planner: finds the path.
-            adapters: outermost first.
-            name: what `pipeline_id` calls it.
-            new_checker: makes the collision checkers.
+            model: Robot model.
+            kinematics: Kinematics solvers of the groups.
+            settings: Settings of the pipeline.
+            planner: Planner.
+            adapters: Request adapters, outermost first.
+            name: Name of the pipeline (`pipeline_id`).
+            new_checker: Factory of collision checkers.
         """
         self._model = model
         self._kinematics = kinematics
@@ -84,45 +84,45 @@ class PlanningPipeline:
 
     @property
     def planner_ids(self) -> tuple[str, ...]:
-        """Values of planner_id that the planner accepts; empty if it accepts any."""
+        """Accepted values of planner_id; empty if the planner accepts any value."""
         return tuple(getattr(self._planner, "planner_ids", ()))
 
     @property
     def description(self) -> str:
-        """The planner's own description."""
+        """Description of the planner."""
         return str(getattr(self._planner, "description", type(self._planner).__name__))
 
     @property
     def _replaces_bad_values(self) -> bool:
-        """Whether an unknown planner_id and scaling out of range are replaced by defaults, with a warning."""
+        """Whether an unknown planner_id and invalid scaling factors are replaced by defaults with a warning."""
         return bool(getattr(self._planner, "replaces_bad_values", True))
 
     @property
     def auxiliary_constraints(self) -> tuple[str, ...]:
-        """Names of path constraints that are input of the planner and need not be kept."""
+        """Names of path constraints that are planner inputs and do not constrain the motion."""
         return tuple(getattr(self._planner, "auxiliary_constraints", ()))
 
     def group_planners(self, group: str) -> tuple[str, ...]:
-        """Returns the names in a group's planner_configs whose planner there is."""
+        """Returns the planner_configs of a group whose planner exists."""
         names = [str(name) for name in self.settings.groups.get(group, {}).get("planner_configs") or ()]
-        known = self.planner_ids
-        return tuple(name for name in names if not known or self._kind(name, group)[0] in known)
+        allowed = self.planner_ids
+        return tuple(name for name in names if not allowed or self._configuration(name, group)[0] in allowed)
 
     def parameter_faults(self, name: str, group: str = "") -> list[str]:
-        """Returns what is wrong with the settings of a planner, one sentence each; nothing without a check."""
-        kind, parameters = self._kind(name, group)
+        """Returns a message per invalid setting of a planner; none if the planner has no check."""
+        planner_id, parameters = self._configuration(name, group)
         check = getattr(self._planner, "parameter_faults", None)
-        return list(check(kind, parameters)) if check else []
+        return list(check(planner_id, parameters)) if check else []
 
     def plan(self, request: PlanningRequest, repeatable: bool = False) -> PlanningAnswer:
-        """Plans a motion.
+        """Returns a validated motion, never a partial result.
 
         Args:
-            request: what to plan.
-            repeatable: bound searches by iterations; the clock only ends them with a failure.
+            request: Planning request.
+            repeatable: Whether iterations bound the searches. A search that the clock stops then fails.
 
         Raises:
-            PlanningError: with the code and the reason; a partial result is never returned.
+            PlanningError: Planning failed; gives error code and reason.
         """
         phases = PhaseTimes(time.process_time if repeatable else time.thread_time)
         try:
@@ -135,10 +135,10 @@ class PlanningPipeline:
             raise
 
     def _plan(self, request: PlanningRequest, repeatable: bool, phases: PhaseTimes) -> PlanningAnswer:
-        """Searches, and repairs what the check of the motion finds, until the motion passes or the time is over."""
-        begun = time.monotonic()
+        """Searches and repairs until a motion passes the final validation or the time is over."""
+        start_s = time.monotonic()
         with phases.measured(SETUP):
-            problem = self._problem(request, begun, repeatable, phases)
+            problem = self._problem(request, start_s, repeatable, phases)
             phases.watch(problem.checker)
         adapters, fault, steps = self._adapters_for(request), "", list(self._steps())
         search = PathSearch(self._planner)
@@ -146,9 +146,9 @@ class PlanningPipeline:
             problem = replace(problem, step=steps.pop(0), _goals=[])
             try:
                 path = chain(adapters, search)(problem)
-                fault, answer = self._checked(problem, path, begun)
+                fault, answer = self._checked(problem, path, start_s)
             except EdgeError as error:
-                fault, search = error.reason, PathSearch(self._planner)  # the next one checks edges more finely
+                fault, search = error.reason, PathSearch(self._planner)  # the next search checks edges more finely
                 if problem.interrupted():
                     break
             except PlanningError as error:
@@ -158,7 +158,7 @@ class PlanningPipeline:
                     return answer
                 if path.keep_shape or problem.cancelled() or time.monotonic() > problem.end_s:
                     break
-                if search.repairs:  # what the check saw between two samples of the repair, with finer ones
+                if search.repairs:  # repair again with a finer step
                     problem = replace(
                         problem, settings=replace(problem.settings, motion_step=problem.settings.motion_step / 4.0)
                     )
@@ -167,7 +167,7 @@ class PlanningPipeline:
         raise _failed(problem, fault)
 
     def _adapters_for(self, request: PlanningRequest) -> tuple[RequestAdapter, ...]:
-        """Returns the adapters; a speed limit that is asked for is kept even where no parameter names its adapter."""
+        """Returns the request adapters, with the Cartesian speed limit added if the request needs it."""
         if request.max_cartesian_speed == 0.0 or any(
             isinstance(item, LimitMaxCartesianLinkSpeed) for item in self._adapters
         ):
@@ -175,11 +175,13 @@ class PlanningPipeline:
         return LimitMaxCartesianLinkSpeed(), *self._adapters
 
     def _steps(self) -> tuple[float, ...]:
-        """Edge steps of the search: the next one counts where an edge of a path could not be repaired."""
+        """Returns the edge steps of consecutive searches; a search follows if an edge could not be repaired."""
         finest = self.settings.finest_step
         return self.settings.search_step, 0.4 * self.settings.search_step, finest, finest
 
-    def _checked(self, problem: PlanningProblem, path: PlannedPath, begun: float) -> tuple[str, PlanningAnswer | None]:
+    def _checked(
+        self, problem: PlanningProblem, path: PlannedPath, start_s: float
+    ) -> tuple[str, PlanningAnswer | None]:
         if path.trajectory is None:
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
@@ -197,24 +199,24 @@ class PlanningPipeline:
             problem.motion.full_positions(path.vertices[-1]),
             path.vertices,
             path.planner_id or problem.planner_id,
-            path.found_s - begun,
-            time.monotonic() - begun,
+            path.found_s - start_s,
+            time.monotonic() - start_s,
             problem.phases.statistics(),
         )
 
     def checker(
         self, scene: PlanningScene, group: JointGroup, start: Array, check_interrupt: Callable[[], None] = lambda: None
     ) -> CollisionChecker:
-        """Returns the collision world of a motion, with shallow contacts of held bodies tolerated.
+        """Returns the collision checker of a motion, which tolerates shallow contacts of attached objects.
 
         Args:
-            scene: the world.
-            group: the joints that will move.
-            start: positions of the whole robot the motion begins at.
-            check_interrupt: called now and then while the world is built; raises an exception to stop that.
+            scene: Planning scene.
+            group: Moving joints.
+            start: Start positions of the whole robot [rad or m].
+            check_interrupt: Function called regularly during the build; it raises an exception to stop the build.
 
         Raises:
-            PlanningError: bodies touch that the group cannot separate.
+            PlanningError: Bodies touch at the start that the group cannot separate.
         """
         checker = self._new_checker(scene, group.indices)
         checker.build(check_interrupt)
@@ -222,8 +224,8 @@ class PlanningPipeline:
         if fixed:
             raise PlanningError(
                 ErrorCode.START_STATE_IN_COLLISION,
-                f"start state: {describe_contacts(fixed)}; no "
-                f"joint of group '{group.name}' can change that; allow the pair or move it",
+                f"start state: {describe_contacts(fixed)}; no joint of group '{group.name}' can resolve this "
+                "collision; allow the collision or move one of the bodies",
                 fixed,
             )
         if checker.is_free(start):
@@ -236,15 +238,17 @@ class PlanningPipeline:
         ]
         return self._new_checker(scene, group.indices, shallow) if shallow else checker
 
-    def _problem(self, request: PlanningRequest, begun: float, repeatable: bool, phases: PhaseTimes) -> PlanningProblem:
-        """Reads the request; everything that can be refused without planning is refused here."""
+    def _problem(
+        self, request: PlanningRequest, start_s: float, repeatable: bool, phases: PhaseTimes
+    ) -> PlanningProblem:
+        """Returns the planning problem of a request; raises PlanningError for an invalid request."""
         if not request.allowed_time_s > 0.0:
             raise PlanningError(
                 ErrorCode.TIMED_OUT, f"allowed_planning_time is {request.allowed_time_s} s; it must be above 0"
             )
         group = self._model.group(request.group)
         if not group.joints:
-            raise PlanningError(ErrorCode.INVALID_GROUP_NAME, f"group '{group.name}' has no joint that can be moved")
+            raise PlanningError(ErrorCode.INVALID_GROUP_NAME, f"group '{group.name}' has no movable joint")
         planner_id, parameters, replaced = self._chosen_planner(request.planner_id, group.name)
         adapters = tuple(type(item).__name__ for item in self._adapters_for(request))
         phases.run = PlannerRun(
@@ -255,7 +259,7 @@ class PlanningPipeline:
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "start state: a joint position is not finite")
         velocity, acceleration = self._scaled_limits(request, group)
         seed = self.settings.seed if request.seed is None else request.seed
-        checker = self.checker(request.scene, group, start, partial(_require_time, request, begun))
+        checker = self.checker(request.scene, group, start, partial(_require_time, request, start_s))
         return PlanningProblem(
             request,
             request.scene.model,
@@ -268,9 +272,9 @@ class PlanningPipeline:
             velocity,
             acceleration,
             np.random.default_rng(seed),
-            begun,
-            begun + request.allowed_time_s - self._reserved(request.allowed_time_s, planner_id),
-            begun + request.allowed_time_s,
+            start_s,
+            start_s + request.allowed_time_s - self._reserved_s(request.allowed_time_s, planner_id),
+            start_s + request.allowed_time_s,
             TrajectoryValidator(),
             planner_id,
             parameters,
@@ -280,47 +284,48 @@ class PlanningPipeline:
         )
 
     def _solver(self, request: PlanningRequest) -> str:
-        """Returns the method of the inverse kinematics of pose goals; "" without one."""
+        """Returns the inverse kinematics method of pose goals, empty if the request has none."""
         if not any(isinstance(goal, PoseGoal) for goal in request.goals):
             return ""
         try:
             return self._kinematics.solver(request.group).method
         except PlanningError:
-            return ""  # not a chain: pose goals are projected
+            return ""  # pose goals are projected, because the group is not a chain
 
-    def _reserved(self, allowed_time_s: float, planner_id: str) -> float:
-        """Returns how much of the allowed time is kept for repairing, timing and checking the path found [s]."""
+    def _reserved_s(self, allowed_time_s: float, planner_id: str) -> float:
+        """Returns the time reserved for path repair, time parameterization and validation [s]."""
         improves = planner_id in getattr(self._planner, "improving_ids", ())
-        return min(RESERVED_AFTER_IMPROVING_S if improves else RESERVED_S, RESERVED_SHARE * allowed_time_s)
+        return min(RESERVED_IMPROVING_S if improves else RESERVED_S, RESERVED_FRACTION * allowed_time_s)
 
-    def _chosen_planner(self, asked: str, group: str) -> tuple[str, dict[str, Any], str]:
-        """Returns the planner's name and settings, and the name it replaces; raises PlanningError with known names."""
-        default, known = self.settings.default_planner(group), self.planner_ids
-        kind, parameters = self._kind(without_group(asked or default), group)
+    def _chosen_planner(self, requested: str, group: str) -> tuple[str, dict[str, Any], str]:
+        """Returns the planner name, its settings and the replaced name; raises PlanningError for an unknown name."""
+        default, allowed = self.settings.default_planner(group), self.planner_ids
+        planner_id, parameters = self._configuration(without_group(requested or default), group)
         replaced = ""
-        if asked and known and kind not in known and self._replaces_bad_values:
-            kind, parameters = self._kind(without_group(default), group)
-            replaced = asked
+        if requested and allowed and planner_id not in allowed and self._replaces_bad_values:
+            planner_id, parameters = self._configuration(without_group(default), group)
+            replaced = requested
             LOGGER.warning(
-                "planner_id '%s': pipeline '%s' has no such planner, available: %s; group '%s' is planned "
-                "for by the default planner '%s'",
-                asked,
+                "planner_id '%s': pipeline '%s' has no such planner; allowed: %s; group '%s' uses "
+                "the default planner '%s'",
+                requested,
                 self.name,
-                ", ".join(known),
+                ", ".join(allowed),
                 group,
-                kind or known[0],
+                planner_id or allowed[0],
             )
-        kind = kind or (known[0] if known else "")
-        if known and kind not in known:
+        planner_id = planner_id or (allowed[0] if allowed else "")
+        if allowed and planner_id not in allowed:
             raise PlanningError(
                 ErrorCode.PLANNING_FAILED,
-                f"planner_id '{asked}': pipeline '{self.name}' has no planner '{kind}'; available: {', '.join(known)}",
+                f"planner_id '{requested}': pipeline '{self.name}' has no planner '{planner_id}'; "
+                f"allowed: {', '.join(allowed)}",
             )
-        return kind, parameters, replaced
+        return planner_id, parameters, replaced
 
-    def _kind(self, name: str, group: str) -> tuple[str, dict[str, Any]]:
-        """Returns the planner of a configuration's name, and its settings with those of the group."""
-        return planner_kind(self.configurations.get(name, group), self.settings.groups, name, group)
+    def _configuration(self, name: str, group: str) -> tuple[str, dict[str, Any]]:
+        """Returns the planner name of a configuration, and its settings merged with the group's settings."""
+        return resolve_configuration(self.configurations.get(name, group), self.settings.groups, name, group)
 
     def _scaled_limits(self, request: PlanningRequest, group: JointGroup) -> tuple[Array, Array]:
         factors = []
@@ -334,13 +339,13 @@ class PlanningPipeline:
         ):
             if np.isfinite(value) and not 0.0 <= value <= 1.0 and self._replaces_bad_values:
                 LOGGER.warning(
-                    "%s is %g; allowed is 0 < factor <= 1, or 0 for the default %g; 1 is used", name, value, default
+                    "%s is %g; it must be in (0, 1], or 0 for the default %g; 1 is used", name, value, default
                 )
                 value = 1.0
             if not np.isfinite(value) or value < 0.0 or value > 1.0:
                 raise PlanningError(
                     ErrorCode.INVALID_MOTION_PLAN,
-                    f"{name} is {value}; allowed is 0 < factor <= 1, or 0 for the default {default}",
+                    f"{name} is {value}; it must be in (0, 1], or 0 for the default {default}",
                 )
             factors.append(value if value > 0.0 else default)
         return (
@@ -350,41 +355,42 @@ class PlanningPipeline:
 
 
 def _require_time(request: PlanningRequest, begun_s: float) -> None:
-    """Raises PlanningError when a request is over before its search began."""
-    spent = time.monotonic() - begun_s
+    """Raises PlanningError if a request is cancelled or out of time before the search."""
+    elapsed_s = time.monotonic() - begun_s
     if request.cancelled():
         raise PlanningError(
-            ErrorCode.PREEMPTED, f"planning was cancelled after {spent:.2f} s, while the collision world was built"
+            ErrorCode.PREEMPTED,
+            f"planning was cancelled after {elapsed_s:.2f} s, during the build of the collision world",
         )
-    if spent > request.allowed_time_s:
+    if elapsed_s > request.allowed_time_s:
         raise PlanningError(
             ErrorCode.TIMED_OUT,
             f"the collision world of {len(request.scene.objects)} objects was "
-            f"not built in {spent:.2f} s (allowed {request.allowed_time_s:.2f} s); allow more time, "
-            "simplify meshes, or ask again: what was built is kept",
+            f"not built in {elapsed_s:.2f} s (allowed {request.allowed_time_s:.2f} s); allow more time, "
+            "simplify meshes, or repeat the request, which continues the build",
         )
 
 
 def _with_fault(error: PlanningError, fault: str) -> PlanningError:
-    """Adds the fault of an earlier path of the same request."""
+    """Returns the error with the fault of an earlier path of the same request appended."""
     if not fault:
         return error
     return PlanningError(error.code, f"{error.reason}; a path was found before, but {fault}", error.contacts)
 
 
 def _failed(problem: PlanningProblem, fault: str) -> PlanningError:
-    """Describes why no motion is returned although paths were found."""
+    """Returns the error of a request whose paths all failed the validation."""
     if problem.cancelled():
         return PlanningError(ErrorCode.PREEMPTED, f"planning was cancelled; a path was found, but {fault}")
-    spent = time.monotonic() - problem.begun_s
+    elapsed_s = time.monotonic() - problem.begun_s
     if problem.interrupted():
         return PlanningError(
             ErrorCode.TIMED_OUT,
             f"a path was found, but {fault}; time ran out after "
-            f"{spent:.2f} s (allowed {problem.request.allowed_time_s:.2f} s): allow more time",
+            f"{elapsed_s:.2f} s (allowed {problem.request.allowed_time_s:.2f} s): allow more time",
         )
     return PlanningError(
         ErrorCode.INVALID_MOTION_PLAN,
-        f"the motion found in {spent:.2f} s fails the last check: "
+        f"the motion found in {elapsed_s:.2f} s fails the final validation: "
         f"{fault}; move the goal or the start away from contact",
     )

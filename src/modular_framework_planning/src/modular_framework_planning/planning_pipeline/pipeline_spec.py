@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a pipeline is built from the names of its planner and request adapters."""
+"""Pipeline specification: builds a pipeline from parameters with the names of its planner and request adapters."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from modular_framework_ros.parameter_declarations import existing_declaration
 
 @dataclass(frozen=True, slots=True)
 class PipelineSpec:
-    """Specification of a pipeline; can be sent to another process.
+    """Specification of a pipeline, which can be sent to a different process.
 
     Attributes:
-        name: what `pipeline_id` calls it.
-        planner, adapters: parameters planning_plugin and request_adapters.
-        settings: the pipeline's parameters.
-        collision_detector: parameter collision_detector.
+        name: Name of the pipeline (`pipeline_id`).
+        planner, adapters: Parameters planning_plugin and request_adapters.
+        settings: Settings of the pipeline.
+        collision_detector: Parameter collision_detector.
     """
 
     name: str = "ompl"
@@ -43,7 +43,7 @@ class PipelineSpec:
     collision_detector: str = DEFAULT_COLLISION_DETECTOR
 
     def build(self, model: RobotModel, kinematics: KinematicsPool) -> PlanningPipeline:
-        """Builds the pipeline; raises PlanningError for an unknown part or a parameter a part refuses."""
+        """Returns the pipeline; raises PlanningError for an unknown name or an invalid parameter."""
         return PlanningPipeline(
             model,
             kinematics,
@@ -56,21 +56,21 @@ class PipelineSpec:
 
 
 def pipelines_of(node: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], str]:
-    """Returns the parameters of every pipeline, by name, and the default's name.
+    """Returns the parameters of every pipeline, keyed by name, and the name of the default pipeline.
 
-    Noetic's layout is planning_pipelines/<name>/... and default_planning_pipeline; older config packages load the
-    parameters of their only pipeline into the node's own namespace.
+    In Noetic, parameters are at planning_pipelines/<name>/... and default_planning_pipeline. Older config packages load
+    the parameters of their only pipeline into the node's namespace.
 
     Args:
         node: Parameters of move_group.
     """
-    given = node.get("planning_pipelines") or {}
-    pipelines = {name: dict(item) for name, item in given.items() if isinstance(item, dict)}
+    entries = node.get("planning_pipelines") or {}
+    pipelines = {name: dict(item) for name, item in entries.items() if isinstance(item, dict)}
     default = str(node.get("default_planning_pipeline") or "")
     if not pipelines:
         name = default or str(node.get("planning_plugin") or DEFAULT_PLANNER).split("_interface")[0].split("/")[0]
-        inner = node.get(name)
-        pipelines = {name: {**node, **(inner if isinstance(inner, dict) else {})}}
+        nested = node.get(name)
+        pipelines = {name: {**node, **(nested if isinstance(nested, dict) else {})}}
     if not default:
         default = "ompl" if "ompl" in pipelines else next(iter(pipelines))
     return pipelines, default
@@ -83,14 +83,16 @@ def read_pipeline_spec(
     node: Mapping[str, Any],
     collision_detector: str = DEFAULT_COLLISION_DETECTOR,
 ) -> PipelineSpec:
-    """Reads a pipeline's specification; its own value comes before the node's, and that before the robot's.
+    """Returns the specification of a pipeline.
+
+    Parameters of the pipeline override parameters of the node, which override parameters of the robot.
 
     Args:
-        name: what `pipeline_id` calls it.
-        parameters: of the pipeline, as in ompl_planning.yaml.
-        planning: robot_description_planning.
-        node: parameters of the node that plans.
-        collision_detector: name of the collision checker.
+        name: Name of the pipeline (`pipeline_id`).
+        parameters: Parameters of the pipeline, as in ompl_planning.yaml.
+        planning: Parameters of the robot, robot_description_planning.
+        node: Parameters of the planning node.
+        collision_detector: Name of the collision checker.
 
     Raises:
         PlanningError: `search_threads` is not a whole number above 0.
@@ -99,11 +101,11 @@ def read_pipeline_spec(
     declared = existing_declaration("modular_framework_planning", "planning_pipeline").parameters["search_threads"]
     if threads is not None and declared.fault(threads):
         raise PlanningError(ErrorCode.PLANNING_FAILED, f"pipeline '{name}': search_threads {declared.fault(threads)}")
-    known = {item.name for item in fields(PipelineSettings)}
+    setting_names = {item.name for item in fields(PipelineSettings)}
     values: dict[str, Any] = {}
     for source in (planning, node, parameters):
         for key, value in source.items():
-            if key in known and isinstance(value, int | float) and not isinstance(value, bool):
+            if key in setting_names and isinstance(value, int | float) and not isinstance(value, bool):
                 values[key] = value
     values["planner_configs"] = {
         key: item for key, item in (parameters.get("planner_configs") or {}).items() if isinstance(item, dict)
@@ -111,11 +113,11 @@ def read_pipeline_spec(
     values["groups"] = {
         key: item for key, item in parameters.items() if isinstance(item, dict) and key != "planner_configs"
     }
-    given = parameters.get("request_adapters")
+    entries = parameters.get("request_adapters")
     return PipelineSpec(
         name,
         str(parameters.get("planning_plugin") or DEFAULT_PLANNER),
-        DEFAULT_ADAPTERS if given is None else " ".join(given) if isinstance(given, list) else str(given),
+        DEFAULT_ADAPTERS if entries is None else " ".join(entries) if isinstance(entries, list) else str(entries),
         PipelineSettings(**values, parameters=parameters, robot_planning=planning),
         collision_detector,
     )

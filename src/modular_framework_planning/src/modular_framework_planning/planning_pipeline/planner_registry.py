@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Resolves the names of planners, pipelines and request adapters from parameters alone, before any node starts."""
+"""Planner registry: resolves the names of pipelines, planners and request adapters from parameters, without a node."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from functools import partial
 from typing import Any
 
 from modular_framework_planning.errors import ModelError, PlanningError
-from modular_framework_planning.planning_interface.planner_configurations import planner_kind, without_group
+from modular_framework_planning.planning_interface.planner_configurations import resolve_configuration, without_group
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, pipelines_of, read_pipeline_spec
 from modular_framework_planning.planning_pipeline.plugins import make_adapters, planner_class
 
 
 class UnknownNameError(Exception):
-    """Nothing answers to a name.
+    """Raised for a name that does not exist.
 
     Attributes:
-        what: Kind of thing that was named.
-        name: The name.
-        known: Names there are.
+        what: Kind of the named item, such as "planner".
+        name: Unknown name.
+        known: Existing names.
     """
 
     def __init__(self, what: str, name: str, known: tuple[str, ...]) -> None:
@@ -30,14 +30,14 @@ class UnknownNameError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ResolvedPlanner:
-    """What plans the requests that ask for a planner by a name.
+    """The pipeline, plugin and planner that a requested name refers to.
 
     Attributes:
         pipeline: Name of the pipeline.
-        plugin: Its parameter planning_plugin.
-        planner: Name that the plugin knows the planner by.
-        settings: Settings of that planner, by the names of ompl_planning.yaml.
-        adapters: Parameter request_adapters: adapters around the planner, outermost first.
+        plugin: Parameter planning_plugin of the pipeline.
+        planner: Name of the planner within the plugin.
+        settings: Settings of the planner, keyed as in ompl_planning.yaml.
+        adapters: Parameter request_adapters, outermost first.
     """
 
     pipeline: str
@@ -52,7 +52,7 @@ class PlannerRegistry:
 
     Args:
         node: Parameters of move_group.
-        planning: robot_description_planning.
+        planning: Parameters of robot_description_planning.
 
     Raises:
         PlanningError: A parameter of a pipeline cannot be read.
@@ -63,74 +63,74 @@ class PlannerRegistry:
         self.specs = {name: read_pipeline_spec(name, item, planning or {}, node) for name, item in pipelines.items()}
 
     def names(self) -> tuple[str, ...]:
-        """Returns the planners by name: those of all pipelines, and as pipeline/planner those of the others."""
-        own = self._planners(self.specs[self.default]) if self.default in self.specs else ()
+        """Returns the planner names of the default pipeline, and pipeline/planner for all other pipelines."""
+        default_planners = self._planners(self.specs[self.default]) if self.default in self.specs else ()
         others = (f"{name}/{item}" for name, spec in self.specs.items() for item in self._planners(spec))
-        return (*own, *(name for name in others if name.partition("/")[0] != self.default))
+        return (*default_planners, *(name for name in others if name.partition("/")[0] != self.default))
 
     def all_names(self) -> tuple[str, ...]:
-        """Returns every name that a planner answers to: alone, and as PIPELINE/PLANNER."""
+        """Returns all accepted names, as PLANNER and as PIPELINE/PLANNER."""
         planners = [(name, item) for name, spec in self.specs.items() for item in self._planners(spec)]
         return tuple(dict.fromkeys(text for name, item in planners for text in (item, f"{name}/{item}")))
 
     def resolve(self, name: str, group: str = "", pipeline: str = "") -> ResolvedPlanner:
-        """Returns what plans.
+        """Returns the planner that a name refers to.
 
         Args:
-            name: Planner or configuration, or PIPELINE/PLANNER; empty for the default.
+            name: Planner, configuration or PIPELINE/PLANNER; empty for the default planner.
             group: Planning group.
-            pipeline: Name of the pipeline; empty for the default, or the only one that has the planner.
+            pipeline: Name of the pipeline; empty for the first pipeline with the planner, starting with the default.
 
         Raises:
-            UnknownNameError: There is no such pipeline or planner.
-            ModelError: The pipeline's planning_plugin cannot be imported.
+            UnknownNameError: The pipeline or planner does not exist.
+            ModelError: The planning_plugin of the pipeline cannot be imported.
         """
-        given, _, planner = name.rpartition("/")
-        wanted = pipeline or given
-        if wanted and wanted not in self.specs:
-            raise UnknownNameError("pipeline", wanted, tuple(self.specs))
-        order = [wanted] if wanted else [self.default, *(item for item in self.specs if item != self.default)]
-        for item in order:
+        named_pipeline, _, planner = name.rpartition("/")
+        requested_pipeline = pipeline or named_pipeline
+        if requested_pipeline and requested_pipeline not in self.specs:
+            raise UnknownNameError("pipeline", requested_pipeline, tuple(self.specs))
+        candidates = (
+            [requested_pipeline]
+            if requested_pipeline
+            else [self.default, *(item for item in self.specs if item != self.default)]
+        )
+        for item in candidates:
             spec = self.specs.get(item)
             if spec is None:
                 raise UnknownNameError("pipeline", item, tuple(self.specs))
             try:
                 known = planner_ids(spec)
             except ModelError:
-                if wanted or item == self.default:
+                if requested_pipeline or item == self.default:
                     raise
-                continue  # move_group leaves such a pipeline out
-            asked = without_group(planner or spec.settings.default_planner(group))
-            kind, settings = planner_kind(
-                spec.settings.planner_configs.get(asked) or {}, spec.settings.groups, asked, group
+                continue  # move_group skips a pipeline without plugin
+            configuration = without_group(planner or spec.settings.default_planner(group))
+            planner_id, settings = resolve_configuration(
+                spec.settings.planner_configs.get(configuration) or {}, spec.settings.groups, configuration, group
             )
-            if not asked and known:
-                kind = known[0]
-            if kind in known or (wanted and not known):
-                return ResolvedPlanner(item, spec.planner, kind, settings, spec.adapters)
+            if not configuration and known:
+                planner_id = known[0]
+            if planner_id in known or (requested_pipeline and not known):
+                return ResolvedPlanner(item, spec.planner, planner_id, settings, spec.adapters)
         raise UnknownNameError("planner", name, self.names())
 
     def faults(self, found: ResolvedPlanner, settings: Mapping[str, Any] | None = None) -> list[str]:
-        """Returns what is wrong with the settings of a planner, one sentence each.
+        """Returns a message per invalid setting of a planner.
 
         Args:
-            found: The planner.
-            settings: Settings to check; None for its own.
+            found: Resolved planner.
+            settings: Settings to check; None for the settings of the planner.
         """
         check = getattr(planner_class(found.plugin), "parameter_faults", None)
         return list(check(found.planner, found.settings if settings is None else settings)) if check else []
 
     @staticmethod
     def constrained_planner(found: ResolvedPlanner) -> str:
-        """Returns what searches in place of a planner that cannot keep path constraints; empty if nothing does."""
+        """Returns the search used if a planner cannot satisfy the path constraints, empty if none."""
         return str(getattr(planner_class(found.plugin), "constrained_planner", ""))
 
     def adapter_faults(self, pipelines: Iterable[str]) -> dict[str, str]:
-        """Returns what is wrong with the plugins and request adapters of some pipelines.
-
-        Returns:
-            A sentence by PIPELINE/PARAMETER.
-        """
+        """Returns messages about invalid plugins and request adapters of pipelines, keyed by PIPELINE/PARAMETER."""
         faults: dict[str, str] = {}
         for name in dict.fromkeys(pipelines):
             spec = self.specs.get(name)
@@ -155,11 +155,11 @@ class PlannerRegistry:
         named = (
             name
             for name, item in spec.settings.planner_configs.items()
-            if not known or planner_kind(item, {}, name, "")[0] in known
+            if not known or resolve_configuration(item, {}, name, "")[0] in known
         )
         return tuple(dict.fromkeys((*known, *named)))
 
 
 def planner_ids(spec: PipelineSpec) -> tuple[str, ...]:
-    """Returns the planners that a pipeline's plugin has; empty if it takes any name."""
+    """Returns the planner names of a pipeline's plugin; empty if the plugin accepts any name."""
     return tuple(getattr(planner_class(spec.planner), "planner_ids", ()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds planners and request adapters by the names config packages give them: MoveIt's, or `module/Class`."""
+"""Planners and request adapters by their names in config packages: a MoveIt name or `module/Class`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ADAPTERS = (
     "FixWorkspaceBounds",
     "LimitMaxCartesianLinkSpeed",
 )
-# Names of MoveIt's adapters that have no effect here, and why.
+# MoveIt adapters that are accepted without effect, with the reason.
 NOT_NEEDED = {"Empty": "does nothing", "ResolveConstraintFrames": "frames are resolved when a request is read"}
 DEFAULT_PLANNER = "ompl_interface/OMPLPlanner"
 MOVEIT_ADAPTERS = "default_planner_request_adapters"
@@ -49,43 +49,43 @@ DEFAULT_ADAPTERS = " ".join(
 
 
 def make_planner(plugin: str, model: RobotModel, settings: PipelineSettings) -> Planner:
-    """Makes the planner of a pipeline.
+    """Returns the planner of a pipeline.
 
     Args:
-        plugin: parameter `planning_plugin`: a name of PLANNERS ("::" may stand for "/"), or `module/Class`.
-        model: argument of the class method `configure` of planners that have one.
-        settings: its other argument.
+        plugin: Parameter `planning_plugin`: a key of PLANNERS, with "/" or "::", or `module/Class`.
+        model: Robot model, passed to the planner's optional method `configure`.
+        settings: Settings of the pipeline, passed to `configure`.
 
     Raises:
-        ModelError: there is no such class, or it has no method `plan`; lists the planners there are.
-        PlanningError: the planner refuses its parameters.
+        ModelError: The class does not exist or has no method `plan`; lists the allowed names.
+        PlanningError: A parameter of the planner is invalid.
     """
-    kind = planner_class(plugin)
-    planner: Planner = kind.configure(model, settings) if hasattr(kind, "configure") else kind()
+    planner_type = planner_class(plugin)
+    planner: Planner = planner_type.configure(model, settings) if hasattr(planner_type, "configure") else planner_type()
     return planner
 
 
 def planner_class(plugin: str) -> Any:
-    """Returns the class that a planning_plugin names; arguments and errors as for `make_planner`."""
+    """Returns the planner class of a planning_plugin; raises ModelError as `make_planner` does."""
     name = plugin.replace("::", "/")
-    known = f"known are {', '.join(sorted(PLANNERS))} and module/Class of a class with a method plan(problem)"
-    kind = plugin_class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", known)
-    if not callable(getattr(kind, "plan", None)):
-        raise ModelError(f"planning_plugin '{plugin}': class {kind.__name__} has no method plan; {known}")
-    return kind
+    allowed = f"allowed: {', '.join(sorted(PLANNERS))} and module/Class of a class with a method plan(problem)"
+    planner_type = plugin_class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", allowed)
+    if not callable(getattr(planner_type, "plan", None)):
+        raise ModelError(f"planning_plugin '{plugin}': class {planner_type.__name__} has no method plan; {allowed}")
+    return planner_type
 
 
 def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:
-    """Makes the adapters of a pipeline, outermost first.
+    """Returns the request adapters of a pipeline, outermost first.
 
     Args:
-        names: parameter `request_adapters`, separated by spaces; each MoveIt's name or `module/Class`.
+        names: Parameter `request_adapters`: MoveIt names or `module/Class`, separated by spaces.
 
     Raises:
-        ModelError: one is not known; lists those that are.
+        ModelError: A name is unknown; lists the allowed names.
     """
-    known = (
-        f"known are {', '.join(f'{MOVEIT_ADAPTERS}/{name}' for name in sorted({*ADAPTERS, *NOT_NEEDED}))} and "
+    allowed = (
+        f"allowed: {', '.join(f'{MOVEIT_ADAPTERS}/{name}' for name in sorted({*ADAPTERS, *NOT_NEEDED}))} and "
         "module/Class of a class with a method adapt_and_plan"
     )
     result = []
@@ -94,9 +94,9 @@ def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:
         if short in NOT_NEEDED:
             continue
         path = f"{PACKAGE}.planning_pipeline.adapters.{_snake_case(short)}/{short}" if short in ADAPTERS else name
-        adapter = plugin_class(path, f"request_adapters: '{name}'", known)()
+        adapter = plugin_class(path, f"request_adapters: '{name}'", allowed)()
         if not callable(getattr(adapter, "adapt_and_plan", None)):
-            raise ModelError(f"request_adapters: '{name}' has no method adapt_and_plan; {known}")
+            raise ModelError(f"request_adapters: '{name}' has no method adapt_and_plan; {allowed}")
         result.append(adapter)
     return tuple(result)
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Request adapters: steps around a planner that correct a request before planning and complete the path after it."""
+"""Request adapters, which modify the problem before planning and the path after planning."""

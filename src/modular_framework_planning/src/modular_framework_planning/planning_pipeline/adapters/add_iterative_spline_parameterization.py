@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The adapter of config packages that ask for MoveIt's spline timing."""
+"""Replacement of MoveIt's adapter for iterative spline parameterization."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ from modular_framework_planning.planning_pipeline.adapters.add_time_optimal_para
 
 
 class AddIterativeSplineParameterization(AddTimeOptimalParameterization):
-    """Times a path by TOPP-RA too: it never needs longer than an iteration over splines, and keeps the same limits."""
+    """Uses TOPP-RA, which satisfies the same limits as iterative splines and is never slower."""

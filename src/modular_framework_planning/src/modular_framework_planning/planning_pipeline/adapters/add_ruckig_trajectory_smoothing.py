@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the limits of jerk: the fastest of several smooth timings that passes the last check."""
+"""Jerk limits: replaces the trajectory by the fastest of several smooth trajectories that passes the validation."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 
 class AddRuckigTrajectorySmoothing(RequestAdapter):
-    """Limits of jerk are `max_jerk` of joint_limits.yaml (has_jerk_limits), 1000 rad/s^3 where there is none.
+    """Limits the jerk to `max_jerk` of joint_limits.yaml (has_jerk_limits), 1000 rad/s^3 by default.
 
-    Candidates: Ruckig's motion along the path's straight lines, with a stop at each vertex (paths of a planner that
-    does not time its motion); the timed motion averaged over a window; the timed motion run evenly slower.
+    Candidates are the trajectory slowed down uniformly, its moving average and, unless the shape must be kept, Ruckig's
+    motion along the straight lines of the path with a stop at each vertex.
     """
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans, then smooths; a motion that keeps the limits of jerk stays as it is."""
+        """Plans and smooths the motion, unless it already satisfies the jerk limits."""
         path = plan_next(problem)
         timed = path if path.trajectory is not None else time_path(problem, path)
         assert timed.trajectory is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The adapter of config packages that ask for MoveIt's iterative parabolic timing."""
+"""Replacement of MoveIt's adapter for iterative parabolic time parameterization."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ from modular_framework_planning.planning_pipeline.adapters.add_time_optimal_para
 
 
 class AddTimeParameterization(AddTimeOptimalParameterization):
-    """Times a path by TOPP-RA too: parabolic timing has jumps of acceleration at its points, this has none."""
+    """Uses TOPP-RA, which avoids the acceleration jumps of parabolic time parameterization."""

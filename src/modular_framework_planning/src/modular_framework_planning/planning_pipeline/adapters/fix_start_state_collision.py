@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Replaces a start state in slight collision by a free state nearby."""
+"""Correction of a start state in slight collision by a free state nearby."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ from modular_framework_planning.planning_pipeline.adapters.request_adapter impor
 
 
 class FixStartStateCollision(RequestAdapter):
-    """Parameters `jiggle_fraction`, `max_sampling_attempts` and `start_state_collision_depth` [m]."""
+    """Samples free states near the start.
+
+    Parameters: `jiggle_fraction`, `max_sampling_attempts` and `start_state_collision_depth` [m].
+    """
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans from a free state near a colliding start and puts the motion to it in front."""
+        """Plans from a free state near a colliding start and prepends the motion to this state."""
         if problem.motion.state_is_free(problem.start_values):
             return plan_next(problem)
         free = self._free_state(problem)
@@ -28,21 +31,21 @@ class FixStartStateCollision(RequestAdapter):
         settings, start = problem.settings, problem.start_values
         contacts = problem.checker.contacts(problem.start, include_fixed=False)
         low, high = problem.bounds
-        reach = settings.jiggle_fraction * np.minimum(high - low, 2.0 * np.pi)
+        max_offset = settings.jiggle_fraction * np.minimum(high - low, 2.0 * np.pi)
         shallow = all(item.depth <= settings.start_state_collision_depth for item in contacts)
-        for number in range(settings.max_sampling_attempts if shallow else 0):
-            share = (number + 1) / settings.max_sampling_attempts
-            moved = np.clip(start + share * problem.rng.uniform(-reach, reach), low, high)
-            if problem.motion.state_is_free(moved):
-                return moved
+        for attempt in range(settings.max_sampling_attempts if shallow else 0):
+            fraction = (attempt + 1) / settings.max_sampling_attempts
+            candidate = np.clip(start + fraction * problem.rng.uniform(-max_offset, max_offset), low, high)
+            if problem.motion.state_is_free(candidate):
+                return candidate
         raise PlanningError(
             ErrorCode.START_STATE_IN_COLLISION,
-            "start state in collision: "
+            "start state is in collision: "
             f"{describe_contacts(contacts)}; "
             + (
-                f"no free state within {settings.jiggle_fraction:.0%} of the joints' ranges"
+                f"no free state was found within {settings.jiggle_fraction:.0%} of the joint ranges"
                 if shallow
-                else "too deep to move out of; allow the pair or move the object"
+                else "the contact is too deep to correct; allow the collision or move the object"
             ),
             contacts,
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Replaces a start state that violates the path constraints by the nearest one that satisfies them."""
+"""Correction of a start state that violates the path constraints by the nearest state that satisfies them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from modular_framework_planning.planning_pipeline.adapters.request_adapter impor
 
 
 class FixStartStatePathConstraints(RequestAdapter):
-    """Puts a straight, free motion from the start to the constrained part in front of the path."""
+    """Prepends a straight, free motion from the start to a state that satisfies the path constraints."""
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans from a state that satisfies the constraints."""
+        """Plans from the nearest state that satisfies the path constraints."""
         constraints = problem.constraints
         if constraints is None or constraints.satisfied(problem.start):
             return plan_next(problem)
@@ -26,7 +26,7 @@ class FixStartStatePathConstraints(RequestAdapter):
                 ErrorCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
                 "start state: "
                 f"{constraints.describe(problem.start)}; no free straight motion leads to a state that "
-                "satisfies the path constraints: start from one that does",
+                "satisfies the path constraints; choose a different start",
             )
         path = plan_next(problem.with_start(nearest))
         return with_path_prefix(problem, path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives a request without a workspace the default one."""
+"""Default workspace of requests without a workspace."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from modular_framework_planning.planning_pipeline.adapters.request_adapter impor
 
 
 class FixWorkspaceBounds(RequestAdapter):
-    """Parameter `default_workspace_bounds` [m]: edge of the cube around the planning frame's origin."""
+    """Adds a cube around the origin of the planning frame with edge length `default_workspace_bounds` [m]."""
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans within a workspace, whatever the request says."""
+        """Plans within the workspace of the request or the default workspace."""
         if problem.request.workspace is not None:
             return plan_next(problem)
         half = np.full(3, 0.5 * problem.settings.default_workspace_bounds)

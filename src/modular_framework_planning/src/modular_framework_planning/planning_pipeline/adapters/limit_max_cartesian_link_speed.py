@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps a link's speed in space below the request's max_cartesian_speed."""
+"""Cartesian speed limit of a link, max_cartesian_speed of a request."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from modular_framework_planning.trajectory_processing.link_speed import with_lim
 
 
 class LimitMaxCartesianLinkSpeed(RequestAdapter):
-    """Does nothing where the request has no max_cartesian_speed; limits the group's tip where it names no link."""
+    """Slows a motion down to max_cartesian_speed; the limited link is the group's tip by default."""
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
-        """Plans, then slows down where the link is too fast.
+        """Plans and slows the motion down where the link is too fast.
 
         Raises:
-            PlanningError: the speed is not a number from 0 on, or there is no such link.
+            PlanningError: The speed is negative or not finite, or the link does not exist.
         """
-        highest = problem.request.max_cartesian_speed
-        if highest == 0.0:
+        max_speed = problem.request.max_cartesian_speed
+        if max_speed == 0.0:
             return plan_next(problem)
-        if not (math.isfinite(highest) and highest > 0.0):
+        if not (math.isfinite(max_speed) and max_speed > 0.0):
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
-                f"max_cartesian_speed is {highest} m/s; allowed is a speed above 0, or 0 for none",
+                f"max_cartesian_speed is {max_speed} m/s; it must be above 0, or 0 for no limit",
             )
         link = self._link(problem)
         path = plan_next(problem)
@@ -41,7 +41,7 @@ class LimitMaxCartesianLinkSpeed(RequestAdapter):
                 timed.trajectory,
                 problem.motion.full_positions,
                 link,
-                highest,
+                max_speed,
                 problem.max_velocity,
                 problem.max_acceleration,
             ),
@@ -53,8 +53,7 @@ class LimitMaxCartesianLinkSpeed(RequestAdapter):
         if not link:
             raise PlanningError(
                 ErrorCode.INVALID_LINK_NAME,
-                f"max_cartesian_speed: group '{problem.group.name}' has "
-                "no tip; name the link in cartesian_speed_limited_link",
+                f"max_cartesian_speed: group '{problem.group.name}' has no tip link; set cartesian_speed_limited_link",
             )
         if not problem.model.has_link(link):
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", link, problem.model.frame_ids)

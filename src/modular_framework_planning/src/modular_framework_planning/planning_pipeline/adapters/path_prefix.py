@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts a prefix in front of a path: from the real start to the corrected one it was planned from."""
+"""Path prefix from the robot's start state to the corrected start state of a plan."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 
 def with_path_prefix(problem: PlanningProblem, path: PlannedPath, collides: bool = False) -> PlannedPath:
-    """Returns the path with the problem's start in front.
+    """Returns the path with the problem's start prepended.
 
     Args:
-        problem: its start is where the robot is.
-        path: planned from a start that was corrected.
-        collides: the prefix may collide.
+        problem: Planning problem with the robot's start state.
+        path: Path planned from the corrected start state.
+        collides: Whether the prefix may collide.
 
     Raises:
-        PlanningError: the path is timed already, and the prefix takes longer than `start_state_max_dt`.
+        PlanningError: The path has a trajectory, and the prefix takes longer than `start_state_max_dt`.
     """
     start = problem.start_values
     result = replace(
@@ -37,25 +37,25 @@ def with_path_prefix(problem: PlanningProblem, path: PlannedPath, collides: bool
     return replace(result, trajectory=_joined(problem, start, path.trajectory))
 
 
-def _joined(problem: PlanningProblem, start: Array, rest: Trajectory) -> Trajectory:
+def _joined(problem: PlanningProblem, start: Array, trajectory: Trajectory) -> Trajectory:
     prefix = parameterize(
         problem.group.joints,
-        np.vstack([start, rest.positions[0]]),
+        np.vstack([start, trajectory.positions[0]]),
         np.zeros(0),
         problem.max_velocity,
         problem.max_acceleration,
     )
-    longest = problem.settings.start_state_max_dt
-    if prefix.duration_s > longest:
+    max_duration_s = problem.settings.start_state_max_dt
+    if prefix.duration_s > max_duration_s:
         raise PlanningError(
             ErrorCode.START_STATE_INVALID,
-            f"start state: the way to the first state of the motion "
-            f"takes {prefix.duration_s:.2f} s; start_state_max_dt allows {longest} s",
+            f"start state: the motion to the corrected start state "
+            f"takes {prefix.duration_s:.2f} s; start_state_max_dt allows {max_duration_s} s",
         )
     return Trajectory(
-        rest.joint_names,
-        np.concatenate([prefix.times, prefix.duration_s + rest.times[1:]]),
-        np.vstack([prefix.positions, rest.positions[1:]]),
-        np.vstack([prefix.velocities, rest.velocities[1:]]),
-        np.vstack([prefix.accelerations, rest.accelerations[1:]]),
+        trajectory.joint_names,
+        np.concatenate([prefix.times, prefix.duration_s + trajectory.times[1:]]),
+        np.vstack([prefix.positions, trajectory.positions[1:]]),
+        np.vstack([prefix.velocities, trajectory.velocities[1:]]),
+        np.vstack([prefix.accelerations, trajectory.accelerations[1:]]),
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One step around a planner, and the chain of them that a pipeline runs."""
+"""Base class of request adapters, and the adapter chain of a pipeline."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 
 
 class RequestAdapter:
-    """Changes the problem before, or the path after planning.
+    """Modifies the problem before planning or the path after planning.
 
-    An adapter is made without arguments and keeps nothing between requests: threads share it.
+    Adapters are created without arguments and are stateless, because threads share them.
     """
 
     def adapt_and_plan(self, problem: PlanningProblem, plan_next: PlanNext) -> PlannedPath:
         """Plans through the rest of the chain.
 
         Args:
-            problem: the request as the outer adapters changed it; parameters are in `problem.settings`.
-            plan_next: the inner adapters and the planner.
+            problem: Planning problem, modified by the outer adapters; parameters are in `problem.settings`.
+            plan_next: Inner adapters and planner.
 
         Raises:
-            PlanningError: with code and reason.
+            PlanningError: Planning failed; gives error code and reason.
         """
         return plan_next(problem)
 
 
 def chain(adapters: Sequence[RequestAdapter], planner: PlanNext) -> PlanNext:
-    """Returns the planner with all adapters around it, the first one outermost."""
+    """Returns the planner wrapped in all adapters; the first adapter is outermost."""
     result = planner
     for adapter in reversed(adapters):
         result = partial(adapter.adapt_and_plan, plan_next=result)
