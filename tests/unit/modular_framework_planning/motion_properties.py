@@ -161,7 +161,7 @@ def violations(
     faults = []
     if motion.times[0] != 0.0 or not (np.diff(motion.times) > 0.0).all():
         faults.append("times do not increase strictly")
-    positions, velocities, accelerations, _ = motion.at(motion.sample_times(0.001))
+    positions, velocities, accelerations, _ = motion.sample(motion.sample_times(0.001))
     shares = (
         (np.abs(velocities) / model.max_velocity[indices]).max(),
         (np.abs(accelerations) / model.max_acceleration[indices]).max(),

@@ -23,7 +23,7 @@ from moveit_commander.trajectory_timing import Limits, distinct, retime  # noqa:
 from modular_framework_planning.cartesian.cartesian_path import straight_line  # noqa: E402
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool  # noqa: E402
 from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
-from modular_framework_planning.trajectory_processing.compiled_timing import largest_blends  # noqa: E402
+from modular_framework_planning.trajectory_processing.compiled_timing import max_blends  # noqa: E402
 from modular_framework_planning.trajectory_processing.jerk_limits import (  # noqa: E402
     along_straight_lines,
     averaged_curve,
@@ -54,7 +54,7 @@ def rows_of(motion: Trajectory) -> Rows:
 
 
 def timed(path: np.ndarray, limits: Limits) -> Trajectory:
-    blends = largest_blends(np.ascontiguousarray(path), 0.05)
+    blends = max_blends(np.ascontiguousarray(path), 0.05)
     return parameterize(tuple("abcdefg"), path, blends, limits.velocity, limits.acceleration)
 
 
@@ -67,7 +67,7 @@ def with_slow_link(model: RobotModel, path: np.ndarray, limits: Limits) -> Traje
     motion = parameterize(
         model.group("arm").joints,
         path,
-        largest_blends(np.ascontiguousarray(path), 0.05),
+        max_blends(np.ascontiguousarray(path), 0.05),
         limits.velocity,
         limits.acceleration,
     )

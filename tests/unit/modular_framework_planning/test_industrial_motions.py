@@ -77,7 +77,7 @@ def joint_goal(model: RobotModel, values: np.ndarray) -> JointGoal:
 def check_limits(model: RobotModel, motion: Trajectory, factor: float = 1.0) -> None:
     """Along the curve a controller makes of the points, at every millisecond."""
     indices = model.group(GROUP).indices
-    _, velocity, acceleration, _ = motion.at(motion.sample_times())
+    _, velocity, acceleration, _ = motion.sample(motion.sample_times())
     assert (np.diff(motion.times) > 0).all() and motion.times[0] == 0.0
     assert (np.abs(velocity) <= model.max_velocity[indices] * factor * (1 + 2e-3)).all()
     assert (np.abs(acceleration) <= model.max_acceleration[indices] * factor * (1 + 2e-3)).all()
@@ -102,7 +102,7 @@ def test_ptp_moves_all_joints_in_the_phases_of_the_widest_move(
     peak = min(velocity, np.sqrt(0.9 * acceleration))
     closed_form = 0.9 / peak + peak / acceleration
     assert motion.duration_s == pytest.approx(closed_form + ROUNDING_S, abs=1e-9)
-    position, speed, _, _ = motion.at(motion.sample_times())
+    position, speed, _, _ = motion.sample(motion.sample_times())
     lead = (position[:, 0] - HOME[0]) / change[0]
     assert np.allclose(position - np.array(HOME), lead[:, None] * change, atol=1e-9), "one common profile"
     assert np.abs(speed[:, 0]).max() == pytest.approx(peak, rel=1e-3)
@@ -129,7 +129,7 @@ def test_a_faster_joint_does_not_run_ahead_of_the_strictest_limit(robot: object)
         PlanningRequest(scene, GROUP, (goal,), "PTP", velocity_scaling=1.0, acceleration_scaling=1.0)
     ).trajectory
     assert motion.duration_s == pytest.approx(1.0 / 0.5 + 0.5 * (0.5 / 0.8 + 0.5 / 0.4) + ROUNDING_S, abs=1e-9)
-    _, speed, change, _ = motion.at(motion.sample_times())
+    _, speed, change, _ = motion.sample(motion.sample_times())
     assert speed.max() == pytest.approx(0.5, rel=1e-6)
     assert change.max() == pytest.approx(0.8, rel=1e-6) and change.min() == pytest.approx(-0.4, rel=1e-6)
 
@@ -147,7 +147,7 @@ def test_lin_is_straight_at_every_millisecond(
         target = moved(home, shift, turn)
         motion = pipeline.plan(lin(scene, target)).trajectory
         whole_turn = pin.log3(home.rotation.T @ target.rotation)
-        rows = motion.at(motion.sample_times())[0]
+        rows = motion.sample(motion.sample_times())[0]
         for values in rows:
             pose = follower.pose(values)
             way = pose.translation - home.translation
@@ -169,7 +169,7 @@ def test_lin_keeps_the_cartesian_limits(
     peak = 0.3 * 1.0
     rise, fall = peak / (0.3 * 2.25), peak / (0.3 * 5.0)
     assert motion.duration_s == pytest.approx(0.25 / peak + 0.5 * (rise + fall) + ROUNDING_S, abs=1e-9)
-    points = np.array([follower.pose(values).translation for values in motion.at(motion.sample_times())[0]])
+    points = np.array([follower.pose(values).translation for values in motion.sample(motion.sample_times())[0]])
     step = np.diff(motion.sample_times())[0]
     speeds = np.linalg.norm(np.diff(points, axis=0), axis=1) / step
     assert speeds.max() == pytest.approx(peak, rel=1e-3)
@@ -216,7 +216,7 @@ def test_circ_stays_on_the_circle(
     )
     motion = pipeline.plan(request).trajectory
     centre = home.translation + np.array([0.1, 0.0, 0.0])
-    points = np.array([follower.pose(values).translation for values in motion.at(motion.sample_times())[0]])
+    points = np.array([follower.pose(values).translation for values in motion.sample(motion.sample_times())[0]])
     assert np.abs(np.linalg.norm(points - centre, axis=1) - 0.1).max() < STRAIGHT_M
     assert np.abs(points[:, 1] - centre[1]).max() < STRAIGHT_M, "in the plane"
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(0.1 * angle, rel=1e-3)
@@ -301,4 +301,4 @@ def test_the_sampling_time_changes_the_points_and_not_the_motion(
     one, other = pipeline.plan(request).trajectory, fine.plan(request).trajectory
     assert len(other.times) > 2 * len(one.times) and one.duration_s == other.duration_s
     times = one.sample_times()
-    assert np.abs(one.at(times)[0] - other.at(times)[0]).max() < 1e-5
+    assert np.abs(one.sample(times)[0] - other.sample(times)[0]).max() < 1e-5

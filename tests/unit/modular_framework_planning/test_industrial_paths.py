@@ -43,7 +43,7 @@ def test_phases_are_those_of_the_closed_form(
     assert (profile.rise_s, profile.cruise_s, profile.fall_s) == pytest.approx(phases, abs=1e-9)
     assert profile.duration_s == pytest.approx(sum(phases) + ROUNDING_S, abs=1e-9)
     middle = 0.5 * ROUNDING_S
-    assert profile.at(np.array([phases[0] + middle]))[0][0] == pytest.approx(
+    assert profile.sample(np.array([phases[0] + middle]))[0][0] == pytest.approx(
         0.5 * limits[1] * phases[0] ** 2, abs=limits[1] * ROUNDING_S**2
     ), "the end of the rise, a s^2 / 2"
 
@@ -55,7 +55,7 @@ def test_profiles_go_the_distance_within_limits_and_rest_at_both_ends(
 ) -> None:
     profile = fastest_profile(distance, velocity, acceleration, deceleration)
     times = np.linspace(0.0, profile.duration_s, 2001)
-    position, speed, change = profile.at(times)
+    position, speed, change = profile.sample(times)
     assert position[0] == speed[0] == change[0] == 0.0
     assert position[-1] == pytest.approx(distance, rel=1e-9)
     assert abs(speed[-1]) < 1e-9 * max(1.0, velocity) and abs(change[-1]) < 1e-6 * max(1.0, deceleration)

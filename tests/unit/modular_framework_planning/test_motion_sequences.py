@@ -66,7 +66,7 @@ class Robot:
         return items
 
     def points(self, motion: Trajectory) -> np.ndarray:
-        return np.array([self.follower.pose(values).translation for values in motion.at(motion.sample_times())[0]])
+        return np.array([self.follower.pose(values).translation for values in motion.sample(motion.sample_times())[0]])
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def test_a_blended_motion_has_continuous_velocity_within_the_joints_limits(
     motion = robot_at_home.joiner.join(robot_at_home.planned(steps))[0].trajectory
     assert (np.diff(motion.times) > 0.0).all() and motion.times[0] == 0.0
     times = motion.sample_times()
-    position, velocity, acceleration, _ = motion.at(times)
+    position, velocity, acceleration, _ = motion.sample(times)
     indices = model.group(GROUP).indices
     assert (np.abs(velocity) <= model.max_velocity[indices]).all()
     assert (np.abs(acceleration) <= model.max_acceleration[indices]).all()

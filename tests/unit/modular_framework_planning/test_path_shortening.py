@@ -15,7 +15,7 @@ from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
-from modular_framework_planning.trajectory_processing.path_shortening import CompiledTest, path_length, shorten
+from modular_framework_planning.trajectory_processing.path_shortening import CompiledEdgeTest, path_length, shorten
 
 CORNER = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]])
 GROUP, STEP = "arm_and_manipulator", 0.004
@@ -94,7 +94,7 @@ def test_the_compiled_test_of_edges_gives_the_path_that_single_tests_give(model:
             return motion.edge_is_free(first, second, STEP)
 
         assert checker.compiled_world is not None
-        compiled = CompiledTest(motion.edges(STEP), new_memory(len(group.joints)), checker.compiled_world)
+        compiled = CompiledEdgeTest(motion.edges(STEP), new_memory(len(group.joints)), checker.compiled_world)
         short = shorten(vertices, is_free, np.inf, np.random.default_rng(seed), compiled)
         assert np.array_equal(short, shorten(vertices, is_free, np.inf, np.random.default_rng(seed)))
         assert all(is_free(first, second) for first, second in zip(short[:-1], short[1:], strict=True))

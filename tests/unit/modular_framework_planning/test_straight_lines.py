@@ -62,7 +62,7 @@ def test_seven_joints_follow_a_line_and_are_timed_within_limits(seven: RobotMode
     assert off_line(line.rows, shift) < 1e-6
     assert np.abs(np.diff(line.rows, axis=0)).max() < 0.1
     motion = time_line(solver.group.joints, line.rows, seven.max_velocity, seven.max_acceleration, lambda _: True)
-    position, velocity, acceleration, _ = motion.at(motion.sample_times())
+    position, velocity, acceleration, _ = motion.sample(motion.sample_times())
     assert off_line(position, shift) < 3e-4
     assert (np.abs(velocity) <= 2.0).all() and (np.abs(acceleration) <= 10.0).all()
     assert (np.diff(motion.times) > 0.0).all()
@@ -133,7 +133,7 @@ def test_the_curve_that_touches_something_is_run_with_stops_or_not_at_all(
     motion = time_line(solver.group.joints, rows, seven.max_velocity, seven.max_acceleration, lambda _: next(verdicts))
     still = np.abs(motion.velocities).max(axis=1) < 1e-9
     assert still.sum() == len(rows), "it stops at every row"
-    with pytest.raises(PlanningError, match="touches something"):
+    with pytest.raises(PlanningError, match="is in collision"):
         time_line(solver.group.joints, rows, seven.max_velocity, seven.max_acceleration, lambda _: False)
 
 
@@ -156,7 +156,7 @@ def test_seven_joints_end_a_line_at_joint_values_and_blend(seven: RobotModel) ->
         .trajectory
     )
     times = joined.sample_times()
-    position, velocity, acceleration, _ = joined.at(times)
+    position, velocity, acceleration, _ = joined.sample(times)
     assert (np.abs(velocity) <= 2.0).all() and (np.abs(acceleration) <= 10.0 * 1.01).all()
     assert (np.abs(np.diff(velocity, axis=0)) <= 10.0 * np.diff(times)[:, None] * 1.05).all()
     assert np.allclose(position[-1], wanted, atol=1e-6)

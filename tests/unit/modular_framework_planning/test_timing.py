@@ -17,7 +17,7 @@ from modular_framework_planning.planning_interface.planner_interface import Plan
 from modular_framework_planning.planning_interface.planning_request import PipelineSettings
 from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
 from modular_framework_planning.trajectory_processing.compiled_curves import quintic_coefficients
-from modular_framework_planning.trajectory_processing.compiled_timing import SAMPLES_PER_SEGMENT, largest_shares
+from modular_framework_planning.trajectory_processing.compiled_timing import SAMPLES_PER_SEGMENT, max_limit_fractions
 from modular_framework_planning.trajectory_processing.time_parameterization import WINDOW_S, parameterize
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
@@ -36,7 +36,7 @@ def random_polyline(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 def shares(motion: Trajectory, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[float, float]:
     """Largest share of the limits at 1 ms samples of the controller's curve."""
-    _, velocities, accelerations, _ = motion.at(motion.sample_times(0.001))
+    _, velocities, accelerations, _ = motion.sample(motion.sample_times(0.001))
     return float((np.abs(velocities) / velocity).max()), float((np.abs(accelerations) / acceleration).max())
 
 
@@ -83,7 +83,7 @@ def test_motion_stays_on_its_path_but_for_the_averaging_of_curves() -> None:
     blends = np.full(3, 0.2)
     motion = parameterize(JOINTS, vertices, blends, VELOCITY, ACCELERATION)
     allowed = ACCELERATION.max() * WINDOW_S**2 / 24 + 3e-4
-    assert distance_to_path(BlendedPath(vertices, blends), motion.at(motion.sample_times(0.005))[0]) < allowed
+    assert distance_to_path(BlendedPath(vertices, blends), motion.sample(motion.sample_times(0.005))[0]) < allowed
 
 
 def fastest_duration(path: BlendedPath, velocity: np.ndarray, acceleration: np.ndarray) -> float:
@@ -127,7 +127,7 @@ def test_motion_is_as_fast_as_the_public_library_finds_but_for_the_window() -> N
 def test_one_vertex_is_a_motion_of_one_point() -> None:
     motion = parameterize(JOINTS, np.ones((1, 6)), np.zeros(0), VELOCITY, ACCELERATION)
     assert motion.duration_s == 0.0 and np.array_equal(motion.positions, np.ones((1, 6)))
-    assert np.array_equal(motion.at(np.zeros(2))[0], np.ones((2, 6)))
+    assert np.array_equal(motion.sample(np.zeros(2))[0], np.ones((2, 6)))
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
@@ -229,7 +229,7 @@ def test_the_curve_and_its_derivatives_are_those_of_the_quintics_through_the_poi
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 0.8, 5))])
     motion = Trajectory(("a", "b"), times, *rng.uniform(-1.0, 1.0, (3, 6, 2)))
     wanted = np.concatenate([rng.uniform(0.0, times[-1], 40), times])
-    values = motion.at(wanted)
+    values = motion.sample(wanted)
     assert np.array_equal(motion.positions_at(wanted), values[0])
     for joint in range(2):
         states = [
@@ -243,7 +243,7 @@ def test_the_curve_and_its_derivatives_are_those_of_the_quintics_through_the_poi
                 expected = pieces[row].deriv(order)(time - times[row]) if order else pieces[row](time - times[row])
                 assert values[order][number, joint] == pytest.approx(expected, abs=1e-7, rel=1e-7)
     for before in (-1.0, times[-1] + 1.0):
-        ends = motion.at(np.array([before]))[0][0]
+        ends = motion.sample(np.array([before]))[0][0]
         assert np.allclose(ends, motion.positions[0 if before < 0.0 else -1])
 
 
@@ -254,7 +254,7 @@ def test_the_largest_shares_are_those_of_all_samples() -> None:
         values = rng.normal(size=(31, 5)), rng.normal(size=(31, 5)), rng.normal(size=(31, 5))
         coefficients = quintic_coefficients(times, *values)
         limits = rng.uniform(0.5, 2.0, 5), rng.uniform(0.5, 2.0, 5)
-        found = largest_shares(times, coefficients, *limits, SAMPLES_PER_SEGMENT)
+        found = max_limit_fractions(times, coefficients, *limits, SAMPLES_PER_SEGMENT)
         seconds = np.diff(times)[:, None] * np.arange(SAMPLES_PER_SEGMENT + 1) / SAMPLES_PER_SEGMENT
         for share, limit, order in zip(found, limits, (1, 2), strict=True):
             curves = [

@@ -83,7 +83,7 @@ def planned(
 
 def largest(motion: Trajectory, order: int) -> np.ndarray:
     """Largest velocity (1), acceleration (2) or jerk (3) of each joint at 1 ms samples."""
-    return np.abs(motion.at(motion.sample_times(0.001))[order]).max(axis=0)
+    return np.abs(motion.sample(motion.sample_times(0.001))[order]).max(axis=0)
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_every_way_of_smoothing_keeps_the_limits_of_random_motions() -> None:
             assert (largest(motion, 3) <= jerk).all()
             assert np.diff(motion.times).min() > 1e-3
             assert np.allclose(motion.positions[[0, -1]], vertices[[0, -1]])
-        assert np.allclose(straight.at(straight.sample_times())[0][0], vertices[0])
+        assert np.allclose(straight.sample(straight.sample_times())[0][0], vertices[0])
 
 
 def speeds_by_difference(model: RobotModel, motion: Trajectory, link: str) -> np.ndarray:
@@ -188,7 +188,7 @@ def speeds_by_difference(model: RobotModel, motion: Trajectory, link: str) -> np
 
     def places(moments: np.ndarray) -> np.ndarray:
         result = []
-        for values in motion.at(moments)[0]:
+        for values in motion.sample(moments)[0]:
             positions = model.merge(model.default_positions(), dict(zip(motion.joint_names, values, strict=True)))
             pin.framesForwardKinematics(model.pin_model, data, positions)
             result.append(data.oMf[frame].translation.copy())
@@ -252,5 +252,5 @@ def test_a_trajectory_of_the_planner_is_slowed_too_but_not_timed_anew(model: Rob
     adapters = [LimitMaxCartesianLinkSpeed(), AddTimeOptimalParameterization()]
     plain = planned(model, adapters, planner=Timed()).trajectory
     slow = planned(model, adapters, planner=Timed(), max_cartesian_speed=0.05).trajectory
-    assert np.allclose(slow.at(slow.times[::7])[0], [nearest(plain, row) for row in slow.positions[::7]], atol=2e-3)
+    assert np.allclose(slow.sample(slow.times[::7])[0], [nearest(plain, row) for row in slow.positions[::7]], atol=2e-3)
     assert slow.duration_s > 3.0 * plain.duration_s

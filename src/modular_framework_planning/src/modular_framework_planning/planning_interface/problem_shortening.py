@@ -7,7 +7,7 @@ import numpy as np
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.planning_interface.planner_interface import PlanningProblem
-from modular_framework_planning.trajectory_processing.path_shortening import CompiledTest, shorten
+from modular_framework_planning.trajectory_processing.path_shortening import CompiledEdgeTest, shorten
 
 
 def shortened(problem: PlanningProblem, path: Array, deadline: float, rng: np.random.Generator | None) -> Array:
@@ -20,5 +20,5 @@ def shortened(problem: PlanningProblem, path: Array, deadline: float, rng: np.ra
         rng: Random generator; None to only remove vertices.
     """
     fine, world = problem.settings.finest_step, problem.compiled_world
-    compiled = None if world is None else CompiledTest(problem.motion.edges(fine), problem.motion.memory, world)
+    compiled = None if world is None else CompiledEdgeTest(problem.motion.edges(fine), problem.motion.memory, world)
     return shorten(path, lambda first, second: problem.edge_is_valid(first, second, fine), deadline, rng, compiled)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shortening and time parameterization of paths."""
+"""Path shortening and time parameterization."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Questions about polylines of joint vectors, compiled: which vertices are needed, and which pieces lie on known edges.
+"""Polylines of joint vectors: removal of redundant vertices, and pieces that lie on known edges.
 
-They are asked some times for each plan, of few vertices: NumPy's overhead would be most of the time.
+The functions are compiled, because NumPy's overhead would dominate for a few vertices.
 """
 
 from __future__ import annotations
@@ -15,89 +15,89 @@ from modular_framework_planning.geometry.spatial import Array
 
 @njit(cache=True, nogil=True)
 def needed_vertices(path: Array, tolerance: float) -> NDArray[np.int64]:
-    """Returns the numbers of the vertices without repetitions and those in the middle of a straight line.
+    """Returns the indices of the vertices that are neither repeated nor inside a straight line.
 
     Args:
-        path: polyline of shape (n, joints).
-        tolerance: shortest edge [rad or m], and most change of the unit direction of an edge at a dropped vertex.
+        path: Polyline, shape (n, joints).
+        tolerance: Minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex.
     """
     count, joints = path.shape
-    kept, used = np.zeros(count, np.int64), 1
+    kept, kept_count = np.zeros(count, np.int64), 1
     before, after = np.empty(joints), np.empty(joints)
-    end = 0  # of the last edge that moves
-    for number in range(1, count):
+    edge_end = 0  # end of the previous edge longer than the tolerance
+    for index in range(1, count):
         length = 0.0
         for joint in range(joints):
-            after[joint] = path[number, joint] - path[number - 1, joint]
+            after[joint] = path[index, joint] - path[index - 1, joint]
             length += after[joint] * after[joint]
         length = np.sqrt(length)
         if not length > tolerance:
             continue
-        turn = 0.0
+        direction_change = 0.0
         for joint in range(joints):
             after[joint] /= length
-            if end > 0:
-                turn = max(turn, abs(after[joint] - before[joint]))
+            if edge_end > 0:
+                direction_change = max(direction_change, abs(after[joint] - before[joint]))
             before[joint] = after[joint]
-        if turn > tolerance:
-            kept[used] = end
-            used += 1
-        end = number
-    if end > 0:
-        kept[used] = count - 1
-        used += 1
-    return kept[:used]
+        if direction_change > tolerance:
+            kept[kept_count] = edge_end
+            kept_count += 1
+        edge_end = index
+    if edge_end > 0:
+        kept[kept_count] = count - 1
+        kept_count += 1
+    return kept[:kept_count]
 
 
 @njit(cache=True, nogil=True)
 def pieces_on_edges(
-    path: Array, edges: Array, counts: NDArray[np.bool_], shortest: float, tolerance: float
+    path: Array, edges: Array, is_selected: NDArray[np.bool_], min_change: float, tolerance: float
 ) -> NDArray[np.int64]:
-    """Returns the numbers of the pieces of a polyline that lie on an edge.
+    """Returns the indices of the pieces of a polyline that lie on a selected edge.
 
     Args:
-        path: polyline of shape (n, joints).
-        edges: both ends of each, shape (m, 2, joints).
-        counts: whether an edge is one of those, shape (m,).
-        shortest: of the pieces that are looked for, by the joint that moves farthest [rad or m].
-        tolerance: distance of a point from an edge, of any joint, at which it lies on it [rad or m].
+        path: Polyline, shape (n, joints).
+        edges: Ends of the edges, shape (m, 2, joints).
+        is_selected: Whether an edge is considered, shape (m,).
+        min_change: Maximum joint displacement of a piece that is not looked up [rad or m].
+        tolerance: Maximum joint distance between an edge and a point on this edge [rad or m].
     """
     joints = path.shape[1]
-    found, used = np.empty(max(len(path) - 1, 0), np.int64), 0
-    for number in range(len(path) - 1):
-        widest = 0.0
+    pieces, kept_count = np.empty(max(len(path) - 1, 0), np.int64), 0
+    for index in range(len(path) - 1):
+        max_change = 0.0
         for joint in range(joints):
-            widest = max(widest, abs(path[number + 1, joint] - path[number, joint]))
-        if widest <= shortest:
+            max_change = max(max_change, abs(path[index + 1, joint] - path[index, joint]))
+        if max_change <= min_change:
             continue
         for edge in range(len(edges)):
             if (
-                counts[edge]
-                and _is_on(path[number], edges[edge], tolerance)
-                and _is_on(path[number + 1], edges[edge], tolerance)
+                is_selected[edge]
+                and _is_on_edge(path[index], edges[edge], tolerance)
+                and _is_on_edge(path[index + 1], edges[edge], tolerance)
             ):
-                found[used] = number
-                used += 1
+                pieces[kept_count] = index
+                kept_count += 1
                 break
-    return found[:used]
+    return pieces[:kept_count]
 
 
 @njit(cache=True, nogil=True)
-def _is_on(point: Array, edge: Array, tolerance: float) -> bool:
-    square, along = 0.0, 0.0
+def _is_on_edge(point: Array, edge: Array, tolerance: float) -> bool:
+    squared_length, projection = 0.0, 0.0
     for joint in range(len(point)):
-        way = edge[1, joint] - edge[0, joint]
-        square += way * way
-        along += way * (point[joint] - edge[0, joint])
-    share = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+        offset = edge[1, joint] - edge[0, joint]
+        squared_length += offset * offset
+        projection += offset * (point[joint] - edge[0, joint])
+    fraction = min(max(projection / squared_length, 0.0), 1.0) if squared_length > 0.0 else 0.0
     for joint in range(len(point)):
-        if not abs(edge[0, joint] + share * (edge[1, joint] - edge[0, joint]) - point[joint]) <= tolerance:
+        if not abs(edge[0, joint] + fraction * (edge[1, joint] - edge[0, joint]) - point[joint]) <= tolerance:
             return False
     return True
 
 
 def warm_up() -> None:
-    """Compiles the loops of this module, or loads them."""
+    """Compiles the functions of this module or loads them from the cache."""
     path = np.array([[0.0, 0.0], [1.0, 0.0]])
     needed_vertices(path, 0.0)
     pieces_on_edges(path, path[None], np.ones(1, dtype=bool), 0.0, 0.0)

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes a path short and straight, compiled: leaves out vertices, cuts corners, while the motion stays free.
+"""Compiled path shortening in three stages.
 
-Three things are done to a path, one after the other:
+- Dropping: vertices whose neighbours can be connected directly are removed, longest connections first.
+- Shortcutting: random pairs of points on the path are connected directly if that is shorter.
+- Pulling: each inner vertex is moved halfway towards the line between its neighbours.
 
-- Vertices whose neighbours can be joined directly are left out, longest jumps first.
-- Random pairs of points of the path are joined directly where that is shorter.
-- Each inner vertex is moved half of the way to the line between its neighbours.
-
-`ask` goes on to the next edge that would change the path, and `answer` takes whether that one is free.
+`next_edge` proposes the next edge that would change the path; `apply_verdict` changes the path if this edge is free.
 """
 
 from __future__ import annotations
@@ -32,258 +30,272 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 
-LEAST_GAIN = 0.01  # of a cut, as a share of the path's length
-LEAST_PULL = 0.003  # gain of a vertex that is moved, as a share of the path's length
-MOST_PULLS = 2  # of each vertex
-PATIENCE = 20  # cuts without success in a row after which no more are tried
-SAME = 1e-9  # [rad or m]; shortest edge, and least turn of a unit vector at a vertex
-EDGES = 100  # that are checked in one call, so that the time is checked in between
+MIN_SHORTCUT_GAIN = 0.01  # gain of a shortcut, as a fraction of the path length
+MIN_PULL_GAIN = 0.003  # gain of a pulled vertex, as a fraction of the path length
+MAX_PULL_ROUNDS = 2
+MAX_FAILURES = 20  # consecutive failures that end the shortcutting stage
+VERTEX_TOLERANCE = 1e-9  # minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex
+EDGES_PER_CALL = 100  # edge checks between two looks at the clock
 
-# What is being done to the path
-DROPS, CUTS, PULLS, DONE = range(4)
-# What `shorten_in` returns
+# Stages
+DROPS, SHORTCUTS, PULLS, DONE = range(4)
+# Return values of `shorten_in`
 FINISHED, UNDECIDED, PAUSED = range(3)
-# Places in Shortening.at: the stage and the number of vertices, and what the stages need
+# Indices into Shortening.progress: stage and number of vertices, then the values of each stage
 STAGE, SIZE = 0, 1
-HERE, CANDIDATE, KEPT = 2, 3, 4  # vertex that is joined to others, the other one, vertices that stay before
-ATTEMPT, FAILURES, FIRST, LAST = 2, 3, 4, 5  # cuts that were tried, without success in a row; vertices before its ends
-ROUND, VERTEX, HAS_MOVED, IS_SECOND = 2, 3, 4, 5  # vertex that is moved; whether the edge behind it is asked for
+BASE, CANDIDATE, KEPT = 2, 3, 4  # start and end vertex of the proposed edge, index of the last kept vertex
+ATTEMPT, FAILURES, FIRST, LAST = 2, 3, 4, 5  # attempts, consecutive failures, vertices before the ends of the shortcut
+PULL_ROUND, VERTEX, HAS_MOVED, CHECKS_SECOND_EDGE = 2, 3, 4, 5  # whether the pulled vertex's outgoing edge is checked
 
 
 class Shortening(NamedTuple):
-    """A path and what is being done to it.
+    """A path and the progress of its shortening.
 
     Attributes:
-        path: vertices of the path, and room for more; shape (room, joints).
-        edge: the edge that is asked for; shape (2, joints).
-        at: see the places above; shape (6,).
-        draws: random numbers from 0 to 1, two for each cut; shape (cuts, 2).
-        least: gain in length of a vertex that is moved [rad or m]; shape (1,).
+        path: Vertices of the path, shape (capacity, joints).
+        edge: Proposed edge, shape (2, joints).
+        progress: Values at the indices above, shape (6,).
+        random_numbers: Random numbers from 0 to 1, shape (shortcuts, 2).
+        min_gain: Minimum gain of a pulled vertex, shape (1,) [rad or m].
     """
 
     path: Array
     edge: Array
-    at: NDArray[np.int64]
-    draws: Array
-    least: Array
+    progress: NDArray[np.int64]
+    random_numbers: Array
+    min_gain: Array
 
 
 @njit(cache=True, nogil=True)
-def _gap(one, other):  # type: ignore[no-untyped-def]
-    squares = 0.0
-    for joint in range(len(one)):
-        squares += (other[joint] - one[joint]) ** 2
-    return np.sqrt(squares)
+def _distance(first, second):  # type: ignore[no-untyped-def]
+    squared_length = 0.0
+    for joint in range(len(first)):
+        squared_length += (second[joint] - first[joint]) ** 2
+    return np.sqrt(squared_length)
 
 
 @njit(cache=True, nogil=True)
 def _lengths(path, size):  # type: ignore[no-untyped-def]
-    """Returns how long a path is up to each vertex."""
+    """Returns the path length up to each vertex."""
     lengths = np.zeros(size)
-    for number in range(1, size):
-        lengths[number] = lengths[number - 1] + _gap(path[number - 1], path[number])
+    for index in range(1, size):
+        lengths[index] = lengths[index - 1] + _distance(path[index - 1], path[index])
     return lengths
 
 
 @njit(cache=True, nogil=True)
-def _begin(work, stage):  # type: ignore[no-untyped-def]
-    """Goes to a stage; one that a path of two vertices does not need is left out."""
-    path, _, at, _, least = work
+def _enter_stage(shortening, stage):  # type: ignore[no-untyped-def]
+    """Enters a stage; a path of two vertices is done."""
+    path, _, progress, _, min_gain = shortening
     if stage == PULLS:
-        kept = needed_vertices(path[: at[SIZE]], SAME)
-        for number in range(len(kept)):
-            path[number] = path[kept[number]]
-        at[SIZE] = len(kept)
-    at[STAGE] = stage if at[SIZE] > 2 else DONE
-    at[2:] = 0
+        kept = needed_vertices(path[: progress[SIZE]], VERTEX_TOLERANCE)
+        for index in range(len(kept)):
+            path[index] = path[kept[index]]
+        progress[SIZE] = len(kept)
+    progress[STAGE] = stage if progress[SIZE] > 2 else DONE
+    progress[2:] = 0
     if stage == DROPS:
-        at[CANDIDATE] = at[SIZE]
+        progress[CANDIDATE] = progress[SIZE]
     elif stage == PULLS:
-        least[0] = LEAST_PULL * _lengths(path, at[SIZE])[-1]
+        min_gain[0] = MIN_PULL_GAIN * _lengths(path, progress[SIZE])[-1]
 
 
 @njit(cache=True, nogil=True)
-def ask(work):  # type: ignore[no-untyped-def]
-    """Writes the next edge that would change the path; returns False where there is none left."""
-    at = work.at
-    while at[STAGE] != DONE:
-        stage = at[STAGE]
+def next_edge(shortening):  # type: ignore[no-untyped-def]
+    """Writes the next edge that would change the path; returns False if the shortening is done."""
+    progress = shortening.progress
+    while progress[STAGE] != DONE:
+        stage = progress[STAGE]
         if stage == DROPS:
-            is_found = _next_drop(work)
-        elif stage == CUTS:
-            is_found = _next_cut(work)
+            is_found = _next_drop(shortening)
+        elif stage == SHORTCUTS:
+            is_found = _next_shortcut(shortening)
         else:
-            is_found = _next_pull(work)
+            is_found = _next_pull(shortening)
         if is_found:
             return True
-        _begin(work, DONE if len(work.draws) == 0 else stage + 1)
+        _enter_stage(shortening, DONE if len(shortening.random_numbers) == 0 else stage + 1)
     return False
 
 
 @njit(cache=True, nogil=True)
-def answer(work, is_free):  # type: ignore[no-untyped-def]
-    """Changes the path where the edge that was asked for is free."""
-    stage = work.at[STAGE]
+def apply_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
+    """Changes the path if the proposed edge is free."""
+    stage = shortening.progress[STAGE]
     if stage == DROPS:
         if is_free:
-            _keep(work, work.at[CANDIDATE])
-    elif stage == CUTS:
-        _answer_cut(work, is_free)
+            _keep(shortening, shortening.progress[CANDIDATE])
+    elif stage == SHORTCUTS:
+        _apply_shortcut_verdict(shortening, is_free)
     else:
-        _answer_pull(work, is_free)
+        _apply_pull_verdict(shortening, is_free)
 
 
 @njit(cache=True, nogil=True)
-def _keep(work, vertex):  # type: ignore[no-untyped-def]
-    """Lets a vertex follow the last one that stays."""
-    path, _, at, _, _ = work
-    at[KEPT] += 1
-    path[at[KEPT]] = path[vertex]
-    at[HERE], at[CANDIDATE] = vertex, at[SIZE]
+def _keep(shortening, vertex):  # type: ignore[no-untyped-def]
+    """Appends a vertex to the kept vertices."""
+    path, _, progress, _, _ = shortening
+    progress[KEPT] += 1
+    path[progress[KEPT]] = path[vertex]
+    progress[BASE], progress[CANDIDATE] = vertex, progress[SIZE]
 
 
 @njit(cache=True, nogil=True)
-def _next_drop(work):  # type: ignore[no-untyped-def]
-    path, edge, at, _, _ = work
-    while at[HERE] < at[SIZE] - 1:
-        at[CANDIDATE] -= 1
-        if at[CANDIDATE] > at[HERE] + 1:
-            edge[0], edge[1] = path[at[KEPT]], path[at[CANDIDATE]]
+def _next_drop(shortening):  # type: ignore[no-untyped-def]
+    path, edge, progress, _, _ = shortening
+    while progress[BASE] < progress[SIZE] - 1:
+        progress[CANDIDATE] -= 1
+        if progress[CANDIDATE] > progress[BASE] + 1:
+            edge[0], edge[1] = path[progress[KEPT]], path[progress[CANDIDATE]]
             return True
-        _keep(work, at[HERE] + 1)
-    at[SIZE] = at[KEPT] + 1
+        _keep(shortening, progress[BASE] + 1)
+    progress[SIZE] = progress[KEPT] + 1
     return False
 
 
 @njit(cache=True, nogil=True)
-def _write_point(path, lengths, position, out):  # type: ignore[no-untyped-def]
-    """Writes the point of a path at a length, and returns the number of the vertex before it."""
-    number = min(max(np.searchsorted(lengths, position, side="right") - 1, 0), len(lengths) - 2)
-    span = lengths[number + 1] - lengths[number]
-    share = 0.0 if span <= 0.0 else (position - lengths[number]) / span
+def _write_point(path, lengths, path_position, out):  # type: ignore[no-untyped-def]
+    """Writes the point at a length along the path and returns the index of the vertex before this point."""
+    index = min(max(np.searchsorted(lengths, path_position, side="right") - 1, 0), len(lengths) - 2)
+    span = lengths[index + 1] - lengths[index]
+    fraction = 0.0 if span <= 0.0 else (path_position - lengths[index]) / span
     for joint in range(len(out)):
-        out[joint] = path[number, joint] + share * (path[number + 1, joint] - path[number, joint])
-    return number
+        out[joint] = path[index, joint] + fraction * (path[index + 1, joint] - path[index, joint])
+    return index
 
 
 @njit(cache=True, nogil=True)
-def _next_cut(work):  # type: ignore[no-untyped-def]
-    path, edge, at, draws, _ = work
-    if at[SIZE] < 3:
+def _next_shortcut(shortening):  # type: ignore[no-untyped-def]
+    path, edge, progress, random_numbers, _ = shortening
+    if progress[SIZE] < 3:
         return False
-    lengths = _lengths(path, at[SIZE])
-    while at[ATTEMPT] < len(draws) and at[FAILURES] < PATIENCE:
-        one, other = draws[at[ATTEMPT], 0] * lengths[-1], draws[at[ATTEMPT], 1] * lengths[-1]
-        low, high = min(one, other), max(one, other)
-        at[ATTEMPT] += 1
-        at[FIRST] = _write_point(path, lengths, low, edge[0])
-        at[LAST] = _write_point(path, lengths, high, edge[1])
-        if at[FIRST] != at[LAST] and _gap(edge[0], edge[1]) <= high - low - LEAST_GAIN * lengths[-1]:
+    lengths = _lengths(path, progress[SIZE])
+    while progress[ATTEMPT] < len(random_numbers) and progress[FAILURES] < MAX_FAILURES:
+        first_position, second_position = (
+            random_numbers[progress[ATTEMPT], 0] * lengths[-1],
+            random_numbers[progress[ATTEMPT], 1] * lengths[-1],
+        )
+        low, high = min(first_position, second_position), max(first_position, second_position)
+        progress[ATTEMPT] += 1
+        progress[FIRST] = _write_point(path, lengths, low, edge[0])
+        progress[LAST] = _write_point(path, lengths, high, edge[1])
+        if (
+            progress[FIRST] != progress[LAST]
+            and _distance(edge[0], edge[1]) <= high - low - MIN_SHORTCUT_GAIN * lengths[-1]
+        ):
             return True
-        at[FAILURES] += 1
+        progress[FAILURES] += 1
     return False
 
 
 @njit(cache=True, nogil=True)
-def _answer_cut(work, is_free):  # type: ignore[no-untyped-def]
-    path, edge, at, _, _ = work
+def _apply_shortcut_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
+    path, edge, progress, _, _ = shortening
     if not is_free:
-        at[FAILURES] += 1
+        progress[FAILURES] += 1
         return
-    first, last = at[FIRST], at[LAST]
-    shift = first + 2 - last  # of what follows: two points take the place of the vertices between
-    if shift > 0:
-        for number in range(at[SIZE] - 1, last, -1):
-            path[number + shift] = path[number]
+    first, last = progress[FIRST], progress[LAST]
+    index_shift = first + 2 - last  # of the vertices after the shortcut, whose two ends replace the vertices in between
+    if index_shift > 0:
+        for index in range(progress[SIZE] - 1, last, -1):
+            path[index + index_shift] = path[index]
     else:
-        for number in range(last + 1, at[SIZE]):
-            path[number + shift] = path[number]
+        for index in range(last + 1, progress[SIZE]):
+            path[index + index_shift] = path[index]
     path[first + 1], path[first + 2] = edge[0], edge[1]
-    at[SIZE], at[FAILURES] = at[SIZE] + shift, 0
+    progress[SIZE], progress[FAILURES] = progress[SIZE] + index_shift, 0
 
 
 @njit(cache=True, nogil=True)
-def _next_pull(work):  # type: ignore[no-untyped-def]
-    path, edge, at, _, least = work
-    if at[IS_SECOND]:
+def _next_pull(shortening):  # type: ignore[no-untyped-def]
+    path, edge, progress, _, min_gain = shortening
+    if progress[CHECKS_SECOND_EDGE]:
         return True
-    while at[ROUND] < MOST_PULLS:
-        at[VERTEX] += 1
-        if at[VERTEX] < at[SIZE] - 1:
-            before, vertex, after = path[at[VERTEX] - 1], path[at[VERTEX]], path[at[VERTEX] + 1]
-            along, squares = 0.0, 1e-30
+    while progress[PULL_ROUND] < MAX_PULL_ROUNDS:
+        progress[VERTEX] += 1
+        if progress[VERTEX] < progress[SIZE] - 1:
+            before, vertex, after = path[progress[VERTEX] - 1], path[progress[VERTEX]], path[progress[VERTEX] + 1]
+            projection, squared_length = 0.0, 1e-30
             for joint in range(len(vertex)):
-                way = after[joint] - before[joint]
-                along += (vertex[joint] - before[joint]) * way
-                squares += way * way
-            share = min(max(along / squares, 0.0), 1.0)
+                offset = after[joint] - before[joint]
+                projection += (vertex[joint] - before[joint]) * offset
+                squared_length += offset * offset
+            fraction = min(max(projection / squared_length, 0.0), 1.0)
             for joint in range(len(vertex)):
-                on_line = before[joint] + share * (after[joint] - before[joint])
+                on_line = before[joint] + fraction * (after[joint] - before[joint])
                 edge[0, joint], edge[1, joint] = before[joint], 0.5 * (vertex[joint] + on_line)
-            gain = _gap(before, vertex) + _gap(vertex, after) - _gap(before, edge[1]) - _gap(edge[1], after)
-            if gain >= least[0]:
+            gain = (
+                _distance(before, vertex)
+                + _distance(vertex, after)
+                - _distance(before, edge[1])
+                - _distance(edge[1], after)
+            )
+            if gain >= min_gain[0]:
                 return True
-        elif at[HAS_MOVED]:
-            at[ROUND], at[VERTEX], at[HAS_MOVED] = at[ROUND] + 1, 0, 0
+        elif progress[HAS_MOVED]:
+            progress[PULL_ROUND], progress[VERTEX], progress[HAS_MOVED] = progress[PULL_ROUND] + 1, 0, 0
         else:
             break
     return False
 
 
 @njit(cache=True, nogil=True)
-def _answer_pull(work, is_free):  # type: ignore[no-untyped-def]
-    path, edge, at, _, _ = work
-    if is_free and not at[IS_SECOND]:
-        edge[0], edge[1], at[IS_SECOND] = edge[1], path[at[VERTEX] + 1], 1
+def _apply_pull_verdict(shortening, is_free):  # type: ignore[no-untyped-def]
+    path, edge, progress, _, _ = shortening
+    if is_free and not progress[CHECKS_SECOND_EDGE]:
+        edge[0], edge[1], progress[CHECKS_SECOND_EDGE] = edge[1], path[progress[VERTEX] + 1], 1
         return
     if is_free:
-        path[at[VERTEX]], at[HAS_MOVED] = edge[0], 1
-    at[IS_SECOND] = 0
+        path[progress[VERTEX]], progress[HAS_MOVED] = edge[0], 1
+    progress[CHECKS_SECOND_EDGE] = 0
 
 
 @njit(cache=True, nogil=True)
-def begin(work):  # type: ignore[no-untyped-def]
-    """Begins with a new path; without random numbers only vertices are left out."""
-    _begin(work, DROPS)
+def begin(shortening):  # type: ignore[no-untyped-def]
+    """Starts the shortening of a new path; without random numbers, vertices are only dropped."""
+    _enter_stage(shortening, DROPS)
 
 
 @njit(cache=True, nogil=True)
-def shorten_in(work, edges, memory, verdict, *world):  # type: ignore[no-untyped-def]
-    """Shortens a path in a world of bodies.
+def shorten_in(shortening, edges, memory, verdict, *world):  # type: ignore[no-untyped-def]
+    """Shortens a path with compiled edge checks.
 
     Args:
-        work: what `begin` was called with; changed.
-        edges: how they are checked.
-        memory: of edges that were checked; changed.
-        verdict: FREE or BLOCKED about the edge for which the last call returned UNDECIDED; else UNKNOWN.
-        world: what `arguments` returns.
+        shortening: Path, initialised by `begin`; changed in place.
+        edges: Mapping and step of the edge checks.
+        memory: Remembered edges; changed in place.
+        verdict: FREE or BLOCKED for the edge on which the last call returned UNDECIDED; otherwise UNKNOWN.
+        world: Result of `arguments`.
 
     Returns:
-        FINISHED. UNDECIDED: the bounds do not decide on the edge. PAUSED: EDGES edges were checked; to be called again.
+        FINISHED. UNDECIDED: the proposed edge needs an exact check. PAUSED: the caller looks at the clock and calls
+        again.
     """
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(edges)
-    known = borrowed(memory)
-    status = _shorten_in(borrowed(work), borrowed(edges), known, verdict, bodies, borrowed(edge), borrowed(workspace))
+    edge_memory = borrowed(memory)
+    status = _shorten_in(
+        borrowed(shortening), borrowed(edges), edge_memory, verdict, bodies, borrowed(edge), borrowed(workspace)
+    )
     release(workspace)
     edge.numbers[0] = 0
     return status
 
 
 @njit(cache=True, nogil=True)
-def _shorten_in(work, edges, memory, verdict, world, samples, workspace):  # type: ignore[no-untyped-def]
+def _shorten_in(shortening, edges, memory, verdict, world, samples, workspace):  # type: ignore[no-untyped-def]
     no_rows = np.empty((0, 2), np.int64)
     if verdict != UNKNOWN:
-        answer(work, verdict == FREE)
-    for _ in range(EDGES):
-        if not ask(work):
+        apply_verdict(shortening, verdict == FREE)
+    for _ in range(EDGES_PER_CALL):
+        if not next_edge(shortening):
             return FINISHED
-        start, end = work.edge[0], work.edge[1]
+        start, end = shortening.edge[0], shortening.edge[1]
         verdict = recall(memory, start, end, edges.step)
         if verdict == UNKNOWN:
             verdict = check_edge(edges, world, start, end, samples, no_rows, workspace)
             if verdict == UNKNOWN:
                 return UNDECIDED
             remember(memory, start, end, edges.step, verdict)
-        answer(work, verdict == FREE)
+        apply_verdict(shortening, verdict == FREE)
     return PAUSED

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shortens a path on constraints: straight cuts would leave them, so the path is cut along them."""
+"""Path shortening under path constraints, which straight shortcuts would violate."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from collections.abc import Callable
 import numpy as np
 
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.trajectory_processing.path_shortening import cut_pieces, path_length
+from modular_framework_planning.trajectory_processing.path_shortening import path_length, shortcut_pieces
 
 
 def cut_along(
     path: Array,
-    way: Callable[[Array, Array], Array | None],
+    connect: Callable[[Array, Array], Array | None],
     is_valid: Callable[[Array], bool],
     deadline: float,
     rng: np.random.Generator,
 ) -> Array:
-    """Joins random pairs of points of the path by a way along the constraints where that is shorter and free.
+    """Returns the path with shortcuts along the constraints between random pairs of points.
 
     Args:
-        path: polyline of shape (n, joints) whose straight pieces satisfy the constraints.
-        way: gives a polyline along the constraints between two points, both included, or None.
-        is_valid: whether a polyline is free and satisfies the constraints.
-        deadline: monotonic time [s] at which to stop.
-        rng: source of the random choices.
+        path: Polyline whose edges satisfy the constraints, shape (n, joints).
+        connect: Returns a polyline along the constraints between two points, including both, or None.
+        is_valid: Checks that a polyline is free and satisfies the constraints.
+        deadline: Monotonic time at which to stop [s].
+        rng: Random generator.
     """
 
-    def along(start: Array, end: Array, longest: float) -> Array | None:
-        found = way(start, end)
-        return found if found is not None and path_length(found) <= longest and is_valid(found) else None
+    def connect_shorter(start: Array, end: Array, max_length: float) -> Array | None:
+        piece = connect(start, end)
+        return piece if piece is not None and path_length(piece) <= max_length and is_valid(piece) else None
 
-    return cut_pieces(path, along, deadline, rng)
+    return shortcut_pieces(path, connect_shorter, deadline, rng)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Slows a timed motion down where a link's Cartesian speed exceeds a limit; elsewhere the speed stays."""
+"""Cartesian speed limit of a link: slows a trajectory down only where the link exceeds the limit."""
 
 from __future__ import annotations
 
@@ -10,32 +10,36 @@ import pinocchio as pin
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.robot_model.robot_model import RobotModel
-from modular_framework_planning.trajectory_processing.time_parameterization import LONGEST_PERIOD_S, MARGIN, overrun
+from modular_framework_planning.trajectory_processing.time_parameterization import (
+    MARGIN,
+    MAX_PERIOD_S,
+    required_slowdown,
+)
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-PERIOD_S = 0.005  # of the samples of the link's speed that choose the slow-down
-MOST_SAMPLES = 20_000
-EASE_S = 0.1  # over which the pace changes, on both sides of a fast stretch
-LONGEST_SLOWED_PERIOD_S = 2.5 * LONGEST_PERIOD_S
+SAMPLE_PERIOD_S = 0.005  # sampling period of the link speed
+MAX_SAMPLES = 20_000
+EASE_S = 0.1  # duration of the transition on both sides of a slowed stretch
+MAX_SLOWED_PERIOD_S = 2.5 * MAX_PERIOD_S
 
 
 def link_speeds(
     model: RobotModel, trajectory: Trajectory, full_positions: Callable[[Array], Array], link: str, times: Array
 ) -> Array:
-    """Returns speeds of a link's origin [m/s] at some times, shape (m,).
+    """Returns the speeds of a link's origin, shape (m,) [m/s].
 
     Args:
-        model: the robot.
-        trajectory: motion of some joints.
-        full_positions: gives positions of the whole robot for a joint vector.
-        link: name of the link.
-        times: [s], shape (m,).
+        model: Robot model.
+        trajectory: Trajectory of the moving joints.
+        full_positions: Returns the positions of the whole robot for a joint vector.
+        link: Name of the link.
+        times: Sample times, shape (m,) [s].
     """
-    positions, velocities, _, _ = trajectory.at(times)
+    positions, velocities, _, _ = trajectory.sample(times)
     indices = [model.index[name] for name in trajectory.joint_names]
     data, frame = model.pin_model.createData(), model.frame_ids[link]
     result = np.empty(len(times))
-    for number, (values, rates) in enumerate(zip(positions, velocities, strict=True)):
+    for index, (values, rates) in enumerate(zip(positions, velocities, strict=True)):
         all_rates = np.zeros(len(model.joint_names))
         all_rates[indices] = rates
         for follower, leader, multiplier, _ in model.mimics:
@@ -43,44 +47,50 @@ def link_speeds(
         jacobian = pin.computeFrameJacobian(
             model.pin_model, data, full_positions(values), frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        result[number] = np.linalg.norm(jacobian[:3] @ all_rates)
+        result[index] = np.linalg.norm(jacobian[:3] @ all_rates)
     return result
 
 
-def _envelope(values: Array, reach: int) -> Array:
-    """Smooth curve above the values: the highest within `reach` samples, averaged twice over half of them each."""
-    padded = np.pad(values, reach, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(np.pad(padded, reach, mode="edge"), 2 * reach + 1).max(axis=1)
-    half = reach // 2
+def _envelope(values: Array, half_width: int) -> Array:
+    """Returns a smooth upper envelope: the maximum within `half_width` samples, averaged twice over half of them."""
+    padded = np.pad(values, half_width, mode="edge")
+    max_speed = np.lib.stride_tricks.sliding_window_view(
+        np.pad(padded, half_width, mode="edge"), 2 * half_width + 1
+    ).max(axis=1)
+    half = half_width // 2
     kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
-    return np.convolve(np.convolve(highest, kernel, mode="same"), kernel, mode="same")[reach : reach + len(values)]
+    return np.convolve(np.convolve(max_speed, kernel, mode="same"), kernel, mode="same")[
+        half_width : half_width + len(values)
+    ]
 
 
-def _eased(trajectory: Trajectory, times: Array, slowing: Array) -> Trajectory:
-    """Runs the trajectory slower by a factor that changes over time; all arrays of shape (m,)."""
-    from scipy.integrate import cumulative_trapezoid  # 0.4 s of import, for motions that are slowed only
+def _slowed_smoothly(trajectory: Trajectory, times: Array, slowing: Array) -> Trajectory:
+    """Returns the trajectory slowed by a time-dependent factor; all arrays have shape (m,)."""
+    from scipy.integrate import cumulative_trapezoid  # imported here, because the import takes 0.4 s
     from scipy.interpolate import CubicSpline
 
-    lowest = np.maximum(slowing, 1.0)
-    slowed = cumulative_trapezoid(lowest, times, initial=0.0)  # a pace that changes at once; it is eased in this time
-    samples = np.linspace(0.0, slowed[-1], min(int(slowed[-1] / PERIOD_S), MOST_SAMPLES) + 20)
-    reach = max(2, int(min(EASE_S, 0.25 * slowed[-1]) / samples[1]))
-    pace = CubicSpline(np.interp(samples, slowed, times), _envelope(np.interp(samples, slowed, lowest), reach))
-    clock = pace.antiderivative()
-    counts = np.ceil(np.diff(clock(trajectory.times)) / LONGEST_SLOWED_PERIOD_S).astype(int)
+    factors = np.maximum(slowing, 1.0)
+    slowed_times = cumulative_trapezoid(factors, times, initial=0.0)  # new times without smoothing of the factor
+    samples = np.linspace(0.0, slowed_times[-1], min(int(slowed_times[-1] / SAMPLE_PERIOD_S), MAX_SAMPLES) + 20)
+    half_width = max(2, int(min(EASE_S, 0.25 * slowed_times[-1]) / samples[1]))
+    slowdown = CubicSpline(
+        np.interp(samples, slowed_times, times), _envelope(np.interp(samples, slowed_times, factors), half_width)
+    )
+    new_time = slowdown.antiderivative()
+    counts = np.ceil(np.diff(new_time(trajectory.times)) / MAX_SLOWED_PERIOD_S).astype(int)
     pieces = [
         np.linspace(low, high, max(1, count), endpoint=False)
         for low, high, count in zip(trajectory.times[:-1], trajectory.times[1:], counts, strict=True)
     ]
-    old = np.append(np.concatenate(pieces), trajectory.duration_s)
-    positions, velocities, accelerations, _ = trajectory.at(old)
-    factor, change = pace(old)[:, None], pace(old, 1)[:, None]
+    old_times = np.append(np.concatenate(pieces), trajectory.duration_s)
+    positions, velocities, accelerations, _ = trajectory.sample(old_times)
+    factor, factor_rate = slowdown(old_times)[:, None], slowdown(old_times, 1)[:, None]
     return Trajectory(
         trajectory.joint_names,
-        clock(old),
+        new_time(old_times),
         positions,
         velocities / factor,
-        (accelerations - velocities * change / factor) / factor**2,
+        (accelerations - velocities * factor_rate / factor) / factor**2,
     )
 
 
@@ -89,29 +99,29 @@ def with_limited_link_speed(
     trajectory: Trajectory,
     full_positions: Callable[[Array], Array],
     link: str,
-    highest: float,
+    max_speed: float,
     velocity: Array,
     acceleration: Array,
 ) -> Trajectory:
-    """Returns the motion along the same curve with the link at or below a speed at every sample.
+    """Returns the trajectory along the same curve with a limited link speed.
 
     Args:
-        model: see link_speeds.
-        trajectory: see link_speeds.
-        full_positions: see link_speeds.
-        link: see link_speeds.
-        highest: speed [m/s], above 0.
-        velocity: limits of the joints, shape (joints,) [rad/s or m/s].
-        acceleration: limits of the joints, shape (joints,) [rad/s^2 or m/s^2].
+        model: Robot model.
+        trajectory: Trajectory of the moving joints.
+        full_positions: Returns the positions of the whole robot for a joint vector.
+        link: Name of the link.
+        max_speed: Speed limit, above 0 [m/s].
+        velocity: Joint velocity limits, shape (joints,) [rad/s or m/s].
+        acceleration: Joint acceleration limits, shape (joints,) [rad/s^2 or m/s^2].
     """
     if len(trajectory.times) < 2:
         return trajectory
-    allowed = highest * (1.0 - MARGIN)
-    times = trajectory.sample_times(min(PERIOD_S, trajectory.duration_s / 20.0))
-    slowing = link_speeds(model, trajectory, full_positions, link, times) / allowed
+    speed_limit = max_speed * (1.0 - MARGIN)
+    times = trajectory.sample_times(min(SAMPLE_PERIOD_S, trajectory.duration_s / 20.0))
+    slowing = link_speeds(model, trajectory, full_positions, link, times) / speed_limit
     if slowing.max() <= 1.0:
         return trajectory
-    eased = _eased(trajectory, times, slowing)
-    fastest = float(link_speeds(model, eased, full_positions, link, eased.sample_times()).max()) / allowed
-    factor = max(fastest, overrun(eased, velocity * (1.0 - MARGIN), acceleration * (1.0 - MARGIN)))
-    return eased.slowed(max(factor, 1.0))
+    slowed = _slowed_smoothly(trajectory, times, slowing)
+    excess = float(link_speeds(model, slowed, full_positions, link, slowed.sample_times()).max()) / speed_limit
+    factor = max(excess, required_slowdown(slowed, velocity * (1.0 - MARGIN), acceleration * (1.0 - MARGIN)))
+    return slowed.slowed(max(factor, 1.0))

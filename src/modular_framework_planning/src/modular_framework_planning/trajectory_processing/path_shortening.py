@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes a planner's path short and straight: leaves out vertices, cuts corners, while the motion stays free."""
+"""Path shortening: drops vertices, takes shortcuts and pulls vertices while all edges stay free."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.trajectory_processing.compiled_polylines import needed_vertices
 from modular_framework_planning.trajectory_processing.compiled_shortening import (
     FINISHED,
-    LEAST_GAIN,
-    PATIENCE,
-    SAME,
+    MAX_FAILURES,
+    MIN_SHORTCUT_GAIN,
     SIZE,
     UNDECIDED,
+    VERTEX_TOLERANCE,
     Shortening,
-    answer,
-    ask,
+    apply_verdict,
     begin,
+    next_edge,
     shorten_in,
 )
 
-CUTS = 60  # that are tried
+MAX_SHORTCUTS = 60  # attempted shortcuts per path
 EdgeTest = Callable[[Array, Array], bool]
 Join = Callable[[Array, Array, float], Array | None]
 
 
-class CompiledTest(NamedTuple):
-    """The same test as an EdgeTest on the arrays of a collision checker, which may leave an edge undecided.
+class CompiledEdgeTest(NamedTuple):
+    """A compiled equivalent of an EdgeTest, which can leave an edge undecided.
 
     Attributes:
-        edges: how they are checked.
-        memory: of edges that were checked, those by the EdgeTest among them.
-        world: where.
+        edges: Mapping and step of the edge checks.
+        memory: Remembered edges, shared with the EdgeTest.
+        world: World of the compiled checks.
     """
 
     edges: GroupEdges
@@ -66,80 +66,82 @@ def shorten(
     edge_is_free: EdgeTest,
     deadline: float,
     rng: np.random.Generator | None,
-    compiled: CompiledTest | None = None,
+    compiled: CompiledEdgeTest | None = None,
 ) -> Array:
     """Returns a path with the same ends, not longer than the given one.
 
     Args:
-        path: polyline of shape (n, joints).
-        edge_is_free: whether a straight motion may be part of the path.
-        deadline: monotonic time [s] at which to stop.
-        rng: source of the random choices; None: vertices are left out, and nothing else is done.
-        compiled: decides on most edges in place of `edge_is_free`.
+        path: Polyline, shape (n, joints).
+        edge_is_free: Checks an edge.
+        deadline: Monotonic time at which to stop [s].
+        rng: Random generator; None to only drop vertices.
+        compiled: Compiled edge check, used before `edge_is_free`.
     """
     path = without_repeats(path)
     if len(path) < 3:
         return path
-    draws = np.empty((0, 2)) if rng is None else rng.random((CUTS, 2))
-    room = np.empty((len(path) + 2 * len(draws), path.shape[1]))
-    room[: len(path)] = path
-    work = Shortening(room, np.empty((2, path.shape[1])), np.zeros(6, np.int64), draws, np.zeros(1))
-    work.at[SIZE] = len(path)
-    begin(work)
+    random_numbers = np.empty((0, 2)) if rng is None else rng.random((MAX_SHORTCUTS, 2))
+    buffer = np.empty((len(path) + 2 * len(random_numbers), path.shape[1]))
+    buffer[: len(path)] = path
+    shortening = Shortening(buffer, np.empty((2, path.shape[1])), np.zeros(6, np.int64), random_numbers, np.zeros(1))
+    shortening.progress[SIZE] = len(path)
+    begin(shortening)
 
     def is_free() -> bool:
-        return time.monotonic() <= deadline and edge_is_free(work.edge[0].copy(), work.edge[1].copy())
+        return time.monotonic() <= deadline and edge_is_free(shortening.edge[0].copy(), shortening.edge[1].copy())
 
     if compiled is not None:
-        _shorten_compiled(work, is_free, deadline, compiled)
-    while ask(work):
-        answer(work, is_free())
-    return room[: work.at[SIZE]].copy()
+        _shorten_compiled(shortening, is_free, deadline, compiled)
+    while next_edge(shortening):
+        apply_verdict(shortening, is_free())
+    return buffer[: shortening.progress[SIZE]].copy()
 
 
-def _shorten_compiled(work: Shortening, is_free: Callable[[], bool], deadline: float, compiled: CompiledTest) -> None:
-    """Shortens a path as far as the time goes."""
+def _shorten_compiled(
+    shortening: Shortening, is_free: Callable[[], bool], deadline: float, compiled: CompiledEdgeTest
+) -> None:
+    """Shortens a path until it is done or the time is over."""
     world, verdict = arguments(compiled.world), UNKNOWN
     while time.monotonic() <= deadline:
-        status = shorten_in(work, compiled.edges, compiled.memory, verdict, *world)
+        status = shorten_in(shortening, compiled.edges, compiled.memory, verdict, *world)
         if status == FINISHED:
             return
         verdict = UNKNOWN
         if status == UNDECIDED:
             verdict = FREE if is_free() else BLOCKED
     if verdict != UNKNOWN:
-        answer(work, verdict == FREE)
+        apply_verdict(shortening, verdict == FREE)
 
 
 def _lengths(path: Array) -> list[float]:
-    """Returns how long the path is up to each vertex."""
+    """Returns the path length up to each vertex."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]).tolist()
 
 
-def _point_at(path: Array, lengths: list[float], position: float) -> tuple[int, Array]:
-    number = min(max(bisect_right(lengths, position) - 1, 0), len(path) - 2)
-    span = lengths[number + 1] - lengths[number]
-    share = 0.0 if span <= 0.0 else (position - lengths[number]) / span
-    return number, path[number] + share * (path[number + 1] - path[number])
+def _point_on_path(path: Array, lengths: list[float], path_position: float) -> tuple[int, Array]:
+    index = min(max(bisect_right(lengths, path_position) - 1, 0), len(path) - 2)
+    span = lengths[index + 1] - lengths[index]
+    fraction = 0.0 if span <= 0.0 else (path_position - lengths[index]) / span
+    return index, path[index] + fraction * (path[index + 1] - path[index])
 
 
-def cut_pieces(path: Array, join: Join, deadline: float, rng: np.random.Generator) -> Array:
-    """Joins random pairs of points of the path by shorter pieces.
+def shortcut_pieces(path: Array, join: Join, deadline: float, rng: np.random.Generator) -> Array:
+    """Returns the path with shorter pieces between random pairs of points.
 
     Args:
-        path: polyline of shape (n, joints).
-        join: gives a valid polyline between two points, both included, that is no longer than a length; or None.
-        deadline: monotonic time [s] at which to stop.
-        rng: source of the random choices.
+        path: Polyline, shape (n, joints).
+        join: Returns a valid polyline between two points, including both, with at most the given length, or None.
+        deadline: Monotonic time at which to stop [s].
+        rng: Random generator.
     """
     failures, lengths = 0, _lengths(path)
-    for _ in range(CUTS):
-        if len(path) < 3 or failures >= PATIENCE or time.monotonic() > deadline:
+    for _ in range(MAX_SHORTCUTS):
+        if len(path) < 3 or failures >= MAX_FAILURES or time.monotonic() > deadline:
             break
         low, high = sorted(rng.uniform(0.0, lengths[-1], 2).tolist())
-        first, start = _point_at(path, lengths, low)
-        last, end = _point_at(path, lengths, high)
-        piece = None if first == last else join(start, end, high - low - LEAST_GAIN * lengths[-1])
+        first, start = _point_on_path(path, lengths, low)
+        last, end = _point_on_path(path, lengths, high)
+        piece = None if first == last else join(start, end, high - low - MIN_SHORTCUT_GAIN * lengths[-1])
         if piece is None:
             failures += 1
             continue
@@ -148,26 +150,26 @@ def cut_pieces(path: Array, join: Join, deadline: float, rng: np.random.Generato
     return path
 
 
-def without_repeats(path: Array, tolerance: float = SAME) -> Array:
-    """Drops vertices equal to their predecessor and those in the middle of a straight line; keeps both ends.
+def without_repeats(path: Array, tolerance: float = VERTEX_TOLERANCE) -> Array:
+    """Returns the path without repeated vertices and vertices inside a straight line.
 
-    Of a path that stays where it is, the first vertex is left.
+    A path that does not move keeps its first vertex only.
 
     Args:
-        path: polyline of shape (n, joints).
-        tolerance: shortest edge [rad or m], and most change of the unit direction of an edge at a dropped vertex.
+        path: Polyline, shape (n, joints).
+        tolerance: Minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex.
     """
     return path[needed_vertices(np.ascontiguousarray(path), tolerance)]
 
 
 def warm_up(world: World, positions: Array) -> None:
-    """Compiles the loop, or loads it from the cache.
+    """Compiles the loop or loads it from the cache.
 
     Args:
-        world: of a scene.
-        positions: of the whole robot.
+        world: World of any scene.
+        positions: Positions of the whole robot [rad or m].
     """
     state, memory = np.zeros(1), new_memory(1)
     remember(memory, state, state, 0.1, recall(memory, state, state, 0.1))
-    compiled = CompiledTest(GroupEdges(positions, np.zeros((len(positions), 1)), 0.1), memory, world)
+    compiled = CompiledEdgeTest(GroupEdges(positions, np.zeros((len(positions), 1)), 0.1), memory, world)
     shorten(np.array([[0.0], [1.0], [0.0]]), lambda first, second: False, np.inf, np.random.default_rng(), compiled)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The timed motion of a group, as planners return it, and the curve that a controller interpolates between its points.
+"""Joint trajectory of a group, and the curve that a controller interpolates between its points.
 
-A JointTrajectoryController joins points that give positions, velocities and accelerations by quintic polynomials:
-limits hold for the robot only if they hold along that curve, not just at the points.
+A JointTrajectoryController connects points with positions, velocities and accelerations by quintic polynomials. The
+robot satisfies limits only if this curve does, not just its points.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from modular_framework_planning.trajectory_processing.compiled_curves import (
     quintic_coefficients,
 )
 
-SAMPLE_PERIOD_S = 0.001  # of a controller
-STRAIGHT = 1.0e-5  # [rad or m]; a curve that leaves its chord by less counts as straight
+SAMPLE_PERIOD_S = 0.001  # typical period of a controller
+STRAIGHT_TOLERANCE = 1.0e-5  # maximum distance of a straight curve from its chord [rad or m]
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Samples of a motion.
+    """A joint trajectory.
 
     Attributes:
-        joint_names: joints, in the order of the columns.
-        times: strictly increasing, the first is 0 [s], shape (n,).
-        positions, velocities, accelerations: shape (n, joints) [rad or m, per s, per s^2].
+        joint_names: Joint names, in the order of the columns.
+        times: Strictly increasing times from 0, shape (n,) [s].
+        positions, velocities, accelerations: Values at the times, shape (n, joints) [rad or m, per s, per s^2].
     """
 
     joint_names: tuple[str, ...]
@@ -42,17 +42,17 @@ class Trajectory:
 
     @property
     def duration_s(self) -> float:
-        """Length of the motion."""
+        """Duration of the trajectory [s]."""
         return float(self.times[-1])
 
     @cached_property
     def coefficients(self) -> Array:
-        """The polynomials between the points, lowest power first, shape (n - 1, 6, joints)."""
+        """Coefficients of the polynomials between points, lowest power first, shape (n - 1, 6, joints)."""
         rows = (self.times, self.positions, self.velocities, self.accelerations)
         return quintic_coefficients(*(np.ascontiguousarray(item, dtype=float) for item in rows))
 
-    def at(self, times: Array) -> tuple[Array, Array, Array, Array]:
-        """Returns positions, velocities, accelerations and jerks of the curve at some times, shape (m, joints) each."""
+    def sample(self, times: Array) -> tuple[Array, Array, Array, Array]:
+        """Returns positions, velocities, accelerations and jerks of the curve at times [s], shape (m, joints) each."""
         if len(self.times) < 2:
             still = np.zeros((len(times), self.positions.shape[1]))
             return still + self.positions[0], still, still, still
@@ -60,7 +60,7 @@ class Trajectory:
         return positions, velocities, accelerations, jerks
 
     def positions_at(self, times: Array) -> Array:
-        """Returns positions of the curve at some times, shape (m, joints); the motion has two points at least."""
+        """Returns positions of the curve at times [s], shape (m, joints); needs at least two points."""
         return np.asarray(self._values(times, 1)[0])
 
     def _values(self, times: Array, orders: int) -> Array:
@@ -68,11 +68,11 @@ class Trajectory:
         return curve_values(np.ascontiguousarray(self.times, dtype=float), self.coefficients, wanted, orders)
 
     def sample_times(self, period_s: float = SAMPLE_PERIOD_S) -> Array:
-        """Returns even times from start to end, both included, at most `period_s` apart."""
+        """Returns uniform times from start to end, including both, at most `period_s` apart."""
         return np.linspace(0.0, self.duration_s, int(np.ceil(self.duration_s / period_s)) + 1)
 
     def curve(self, step: float) -> Array:
-        """Returns positions along the curve, neighbours about `step` [rad or m, any joint] apart or nearer."""
+        """Returns positions along the curve at most about `step` apart in every joint [rad or m]."""
         if len(self.times) < 2:
             return self.positions
         times, positions, velocities = (
@@ -81,22 +81,22 @@ class Trajectory:
         return curve_samples(times, self.coefficients, positions, velocities, step)
 
     def chords(self, first: int = 0) -> list[Array]:
-        """Returns polylines of points, from number `first` on, between which the curve leaves the straight line.
+        """Returns the polylines through points, from index `first`, where the curve differs from the straight line.
 
-        A controller that ignores velocities moves straight from point to point.
+        A controller that ignores velocities follows these polylines instead of the curve.
         """
         if len(self.times) < 2:
             return []
         times, positions = (np.ascontiguousarray(item, dtype=float) for item in (self.times, self.positions))
-        is_bent = bent_segments(times, self.coefficients, positions, STRAIGHT)
+        is_bent = bent_segments(times, self.coefficients, positions, STRAIGHT_TOLERANCE)
         bent = first + np.flatnonzero(is_bent[first:])
         runs = np.split(bent, np.flatnonzero(np.diff(bent) > 1) + 1) if len(bent) else []
         return [self.positions[run[0] : run[-1] + 2] for run in runs]
 
     def slowed(self, factor: float) -> Trajectory:
-        """Returns the same curve run `factor` times slower; its times are whole nanoseconds, as messages carry them."""
+        """Returns the trajectory slowed by a factor; times are rounded to whole nanoseconds, as in messages."""
         times = np.round(self.times * factor, 9)
-        positions, velocities, accelerations, _ = self.at(times / factor)
+        positions, velocities, accelerations, _ = self.sample(times / factor)
         positions[0], positions[-1] = self.positions[0], self.positions[-1]
         velocities[[0, -1]], accelerations[[0, -1]] = self.velocities[[0, -1]], self.accelerations[[0, -1]]
         return Trajectory(self.joint_names, times, positions, velocities / factor, accelerations / factor**2)

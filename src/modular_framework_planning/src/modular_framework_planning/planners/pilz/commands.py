@@ -62,7 +62,7 @@ def point_to_point(start: Array, goal: Array, limits: JointRateLimits, settings:
         float(limits.deceleration.min()) * settings.acceleration_scaling,
     )
     times = sample_times(profile.duration_s, profile.knots, settings.period_s)
-    position, velocity, acceleration = (values[:, None] / max_change * change for values in profile.at(times))
+    position, velocity, acceleration = (values[:, None] / max_change * change for values in profile.sample(times))
     positions = start + position
     positions[-1], velocity[-1], acceleration[-1] = goal, 0.0, 0.0
     return Trajectory(limits.joints, times, positions, velocity, acceleration)
@@ -105,7 +105,7 @@ def _posture_between(motion: TimedPath, start: Array, goal: Array) -> Posture:
     """Returns the preferred postures of a redundant arm on the way to a joint goal."""
 
     def posture(time_s: float) -> JointState:
-        progress = (float(values[0]) / motion.profile.distance for values in motion.profile.at(np.array([time_s])))
+        progress = (float(values[0]) / motion.profile.distance for values in motion.profile.sample(np.array([time_s])))
         fraction, rate, rate_change = progress
         return JointState(start + fraction * (goal - start), rate * (goal - start), rate_change * (goal - start))
 

@@ -44,7 +44,7 @@ def state_at(trajectory: Trajectory, time_s: float) -> JointState:
     """Returns the joint state of a trajectory at a time; before and after the trajectory, the joints are at rest."""
     if not 0.0 <= time_s <= trajectory.duration_s:
         return at_rest(trajectory.positions[0 if time_s < 0.0 else -1])
-    return JointState(*(rows[0] for rows in trajectory.at(np.array([time_s]))[:3]))
+    return JointState(*(rows[0] for rows in trajectory.sample(np.array([time_s]))[:3]))
 
 
 class PoseMotion(Protocol):

@@ -45,7 +45,7 @@ class TrapezoidalProfile:
         """Duration of the trapezoid and the rounding [s]."""
         return float(self.knots[-1])
 
-    def at(self, times: Array) -> tuple[Array, Array, Array]:
+    def sample(self, times: Array) -> tuple[Array, Array, Array]:
         """Returns position, velocity and acceleration at times [s]; times outside the profile are clipped."""
         clipped = np.clip(times, 0.0, self.duration_s)
         piece = np.clip(np.searchsorted(self.knots, clipped, side="right") - 1, 0, len(self.knots) - 2)

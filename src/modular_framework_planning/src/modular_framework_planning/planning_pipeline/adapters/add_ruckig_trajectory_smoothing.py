@@ -12,7 +12,7 @@ from modular_framework_planning.planning_pipeline.adapters.request_adapter impor
 from modular_framework_planning.trajectory_processing.jerk_limits import (
     along_straight_lines,
     averaged_curve,
-    jerk_overrun,
+    required_jerk_slowdown,
     slowed_to_limits,
 )
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
@@ -32,7 +32,7 @@ class AddRuckigTrajectorySmoothing(RequestAdapter):
         assert timed.trajectory is not None
         jerk = problem.model.max_jerk[problem.group.indices]
         limits = problem.max_velocity, problem.max_acceleration, jerk
-        if jerk_overrun(timed.trajectory, *limits) <= 1.0:
+        if required_jerk_slowdown(timed.trajectory, *limits) <= 1.0:
             return timed
         candidates = [replace(timed, trajectory=item) for item in self._candidates(problem, timed)]
         for candidate in sorted(candidates, key=_duration):

@@ -14,10 +14,10 @@ from modular_framework_planning.planning_interface.phase_times import TIMING
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanNext, PlanningProblem
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.trajectory_processing.blended_path import free_blends
-from modular_framework_planning.trajectory_processing.compiled_timing import largest_blends
+from modular_framework_planning.trajectory_processing.compiled_timing import max_blends
 from modular_framework_planning.trajectory_processing.time_parameterization import (
-    LONGEST_PERIOD_S,
-    SHORTEST_PERIOD_S,
+    MAX_PERIOD_S,
+    MIN_PERIOD_S,
     parameterize,
 )
 
@@ -50,7 +50,7 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
     vertices = np.ascontiguousarray(path.vertices, dtype=float)
     differ = np.abs(np.diff(vertices, axis=0)).max(axis=1) >= VERTEX_TOLERANCE
     vertices = vertices[np.append(differ, True)]  # keeps the last of equal vertices, so that the goal is exact
-    period = _number(problem.settings.parameters, "resample_dt", LONGEST_PERIOD_S, SHORTEST_PERIOD_S)
+    period = _number(problem.settings.parameters, "resample_dt", MAX_PERIOD_S, MIN_PERIOD_S)
     tolerance = _number(problem.settings.parameters, "path_tolerance", problem.settings.blend_deviation, 0.0)
 
     def timed(blends: Array, divisor: float = 1.0) -> PlannedPath:
@@ -66,7 +66,7 @@ def _timed(problem: PlanningProblem, path: PlannedPath) -> PlannedPath:
             ),
         )
 
-    largest = largest_blends(vertices, float(tolerance))
+    largest = max_blends(vertices, float(tolerance))
     tries_largest = (
         problem.constraints is None and path.path_prefix == 0
     )  # otherwise the validation does not cover all blends
