@@ -120,7 +120,7 @@ def test_a_way_keeps_the_constraint_between_its_states_and_arrives_exactly(
         end = constraints.project(near, indices)
         if end is None:
             continue
-        way = ConstrainedMotion(constraints, indices, start, 0.004, 0.004).way(start[indices], end[indices])
+        way = ConstrainedMotion(constraints, indices, start, 0.004, 0.004).connect(start[indices], end[indices])
         if way is None:
             continue
         arrived += 1

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Constraints on states of the robot."""
+"""Kinematic constraints on robot states."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks states and edges against pose constraints, and projects states onto them, as compiled loops.
+"""Compiled checks of states and edges against constraints, and projection of states onto constraints.
 
-A constraint compares the pose of a link with that of a reference frame: by three angles, or by the place of a point in
-regions. A projection takes Gauss-Newton steps with the geometric Jacobian, as in Berenson, Srinivasa, Ferguson,
-Kuffner: Manipulation planning on constraint manifolds, ICRA 2009.
+A constraint limits a link's pose in a reference frame, by three angles or by regions for a point of the link. A
+projection takes Gauss-Newton steps with the geometric Jacobian, as in Berenson, Srinivasa, Ferguson, Kuffner:
+Manipulation planning on constraint manifolds, ICRA 2009.
 """
 
 from __future__ import annotations
@@ -22,44 +22,45 @@ from modular_framework_planning.kinematics.compiled_kinematics import (
     rotation_vector,
 )
 
-SLACK = 1.0e-6  # [m] or [rad]; the accuracy of inverse kinematics, so that a region of no extent can be met
-TIGHT = 0.005  # [m] or [rad]; within smaller tolerances projections aim at the middle, also where others are violated
-INNER_SHARE = 0.9  # of a tolerance, which projections aim at: straight motions between two states bulge
-INSIDE = 1.0e-5  # [m]; projections aim this far inside a hull
-WIDEST_STEP = 0.3  # [rad or m]; of any joint in one step of a projection
+TOLERANCE = 1.0e-6  # accuracy of inverse kinematics, so that a zero-size region stays reachable [m or rad]
+TIGHT_TOLERANCE = 0.005  # projections aim at the centre of smaller tolerances, even if satisfied [m or rad]
+INNER_FRACTION = 0.9  # fraction of a tolerance that projections aim at, because edges between two states bulge
+HULL_MARGIN = 1.0e-5  # projections aim this far inside a hull [m]
+MAX_STEP = 0.3  # maximum joint displacement in a projection step [rad or m]
 DAMPING = 1.0e-6
 IDENTITY = np.eye(3)
-SAME = 1.0e-9  # [rad or m]; distance of two states that count as the same
-CLOSE_STEPS = 8  # of the projection of a step of a walk, which begins near the constraints
-LEAST_PROGRESS = 0.1  # of a step of a walk, towards its target
-EULER_ANGLES, ROTATION_VECTOR, POINT = range(3)  # what is compared
-BOX, BALL, CYLINDER, CONE, HULL = range(5)  # regions
+SAME_STATE_DISTANCE = 1.0e-9  # [rad or m]
+MAX_PROJECTION_STEPS = 8  # limit in a walk, where projections start close to the constraints
+MIN_PROGRESS = 0.1  # minimum progress of a walk step towards the target, as a fraction of its length
+EULER_ANGLES, ROTATION_VECTOR, POINT = range(3)  # compared quantities
+BOX, SPHERE, CYLINDER, CONE, HULL = range(5)  # region shapes
 
 
-class Conditions(NamedTuple):
-    """What has to hold of a state.
+class ConstraintArrays(NamedTuple):
+    """Constraints as arrays.
 
     Attributes:
-        tree: the n joints that move a link or a reference frame of a constraint.
-        ranges: target, tolerance below and above of k joints [rad or m], shape (k, 3). Their values stand behind those
-            of the tree's joints.
-        turns: which of the k joints turn without end, shape (k,).
-        kinds: what is compared in each of m poses, shape (m,).
-        frames: the tree's joint that moves the link, and the one that moves the reference, -1 for none; shape (m, 2).
-        placements: of both in the frames of these joints, shape (m, 2, 3, 4). In terms of EULER_ANGLES the wanted
-            rotation is part of the reference's; in terms of a ROTATION_VECTOR, its inverse of the link's.
-        signs: 1 where a joint moves the link alone, -1 the reference alone, 0 both or none; shape (m, n).
-        tolerances: of the angles [rad], shape (m, 3).
-        regions: first and last (exclusive) of the regions of a POINT, shape (m, 2).
-        shapes: BOX, BALL, ... of each region; sizes: edges, or radius, or height and radius [m]; shapes (r,), (r, 3).
-        poses: of the regions in the reference frame, shape (r, 3, 4).
-        face_ranges: first and last (exclusive) of the faces of a HULL, shape (r, 2).
-        faces: outward normal and offset, a point p is inside where normal . p + offset <= 0; shape (f, 4).
+        tree: The n joints that move links or reference frames of pose constraints.
+        ranges: Target, lower and upper tolerance of k joint constraints, shape (k, 3) [rad or m]. The values of these
+            joints follow the values of the tree's joints.
+        is_continuous: Whether each of the k joints is continuous, shape (k,).
+        kinds: Compared quantity of m pose constraints, shape (m,).
+        frames: Tree joints that move the link and the reference frame, -1 for none, shape (m, 2).
+        placements: Link and reference frame in the frames of these joints, shape (m, 2, 3, 4). The target rotation is
+            included in the reference frame for EULER_ANGLES; its inverse is included in the link for ROTATION_VECTOR.
+        signs: 1 for a joint that moves only the link, -1 for only the reference, otherwise 0, shape (m, n).
+        tolerances: Tolerances of the angles, shape (m, 3) [rad].
+        regions: First and last (exclusive) region of a POINT, shape (m, 2).
+        shapes: Shape of each region, shape (r,).
+        sizes: Edges, radius, or height and radius of each region, shape (r, 3) [m].
+        poses: Region poses in the reference frame, shape (r, 3, 4).
+        face_ranges: First and last (exclusive) face of a HULL, shape (r, 2).
+        faces: Outward normal and offset of each face, shape (f, 4); normal . p + offset <= 0 for a point p inside.
     """
 
     tree: Tree
     ranges: Array
-    turns: NDArray[np.bool_]
+    is_continuous: NDArray[np.bool_]
     kinds: NDArray[np.int64]
     frames: NDArray[np.int64]
     placements: Array
@@ -73,8 +74,8 @@ class Conditions(NamedTuple):
     faces: Array
 
 
-class Drive(NamedTuple):
-    """How a state moves the n + k joints of conditions: offset + gain * state[driver], no driver where that is -1."""
+class JointMapping(NamedTuple):
+    """Mapping of a state to the n + k constrained joints: offset + gain * state[driver], or offset if driver is -1."""
 
     drivers: NDArray[np.int64]
     gains: Array
@@ -82,13 +83,16 @@ class Drive(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Working memory for one state.
+    """Working memory for a state.
 
     Attributes:
-        values: of the joints, shape (n + k,); placements: of the tree's joints, shape (n, 3, 4).
-        pose: of the link in the reference frame; reference: its pose in the planning frame; both of shape (3, 4).
-        deviation: three angles, or the point in a region's frame; shape (3,).
-        directions: of linearised conditions in the reference frame, aims: wanted change; shapes (rows, 3), (rows,).
+        values: Joint values, shape (n + k,).
+        placements: Placements of the tree's joints, shape (n, 3, 4).
+        pose: Link pose in the reference frame, shape (3, 4).
+        reference: Pose of the reference frame in the planning frame, shape (3, 4).
+        deviation: Three angles, or the point in a region's frame, shape (3,).
+        directions: Directions of linearised constraints in the reference frame, shape (rows, 3).
+        changes: Required changes of linearised constraints, shape (rows,).
     """
 
     values: Array
@@ -97,45 +101,45 @@ class Workspace(NamedTuple):
     reference: Array
     deviation: Array
     directions: Array
-    aims: Array
+    changes: Array
 
 
 @njit(cache=True, nogil=True)
-def _new_workspace(conditions):  # type: ignore[no-untyped-def]
-    joints, rows = len(conditions.tree.parents), 3 + len(conditions.faces)
-    values, placements = np.empty(joints + len(conditions.ranges)), np.empty((joints, 3, 4))
+def _new_workspace(constraints):  # type: ignore[no-untyped-def]
+    joints, rows = len(constraints.tree.parents), 3 + len(constraints.faces)
+    values, placements = np.empty(joints + len(constraints.ranges)), np.empty((joints, 3, 4))
     pose, reference, deviation = np.empty((3, 4)), np.empty((3, 4)), np.empty(3)
     return Workspace(values, placements, pose, reference, deviation, np.empty((rows, 3)), np.empty(rows))
 
 
 @njit(cache=True, nogil=True)
-def _place(conditions, drive, state, workspace):  # type: ignore[no-untyped-def]
-    """Places the joints of the tree."""
-    drivers, gains, offsets = drive
+def _place_joints(constraints, mapping, state, workspace):  # type: ignore[no-untyped-def]
+    """Computes the placements of the tree's joints."""
+    drivers, gains, offsets = mapping
     values = workspace.values
-    for number in range(len(values)):
-        values[number] = offsets[number]
-        if drivers[number] >= 0:
-            values[number] += gains[number] * state[drivers[number]]
-    joint_placements(conditions.tree, values, workspace.placements)
+    for index in range(len(values)):
+        values[index] = offsets[index]
+        if drivers[index] >= 0:
+            values[index] += gains[index] * state[drivers[index]]
+    joint_placements(constraints.tree, values, workspace.placements)
 
 
 @njit(cache=True, nogil=True)
-def _joint_excess(conditions, values):  # type: ignore[no-untyped-def]
-    """Returns how far the joint farthest out of its range is out of it."""
-    ranges, worst = conditions.ranges, -np.inf
+def _joint_excess(constraints, values):  # type: ignore[no-untyped-def]
+    """Returns the maximum violation of the joint constraints."""
+    ranges, max_excess = constraints.ranges, -np.inf
     first = len(values) - len(ranges)
-    for number in range(len(ranges)):
-        gap = values[first + number] - ranges[number, 0]
-        if conditions.turns[number]:
+    for index in range(len(ranges)):
+        gap = values[first + index] - ranges[index, 0]
+        if constraints.is_continuous[index]:
             gap = np.arctan2(np.sin(gap), np.cos(gap))
-        worst = max(worst, gap - ranges[number, 2], -gap - ranges[number, 1])
-    return worst
+        max_excess = max(max_excess, gap - ranges[index, 2], -gap - ranges[index, 1])
+    return max_excess
 
 
 @njit(cache=True, nogil=True)
 def _write_frame(placements, joint, placement, out):  # type: ignore[no-untyped-def]
-    """Writes the pose in the planning frame of what a joint moves."""
+    """Writes the pose in the planning frame of a frame that a joint moves."""
     if joint < 0:
         out[:] = placement
         return
@@ -149,7 +153,7 @@ def _write_frame(placements, joint, placement, out):  # type: ignore[no-untyped-
 
 @njit(cache=True, nogil=True)
 def _write_relative(reference, pose):  # type: ignore[no-untyped-def]
-    """Turns a pose in the planning frame into one in the reference frame, in place."""
+    """Converts a pose from the planning frame to the reference frame, in place."""
     for column in range(4):
         x, y, z = pose[0, column], pose[1, column], pose[2, column]
         if column == 3:
@@ -159,156 +163,168 @@ def _write_relative(reference, pose):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _write_euler(turn, tolerance, out):  # type: ignore[no-untyped-def]
-    """Writes intrinsic XYZ Euler angles of a rotation.
+def _write_euler(rotation, tolerance, out):  # type: ignore[no-untyped-def]
+    """Writes the intrinsic XYZ Euler angles of a rotation.
 
-    Where roll and yaw turn about one axis, the turn counts as roll, and as yaw where the tolerance of roll is less.
+    In gimbal lock the rotation counts as roll, or as yaw if it exceeds the roll tolerance.
     """
-    sine = min(max(turn[0, 2], -1.0), 1.0)
+    sine = min(max(rotation[0, 2], -1.0), 1.0)
     out[1] = np.arcsin(sine)
     if abs(sine) > 1.0 - 1.0e-12:
-        out[0], out[2] = np.arctan2(turn[2, 1], turn[1, 1]), 0.0
+        out[0], out[2] = np.arctan2(rotation[2, 1], rotation[1, 1]), 0.0
         if abs(out[0]) > tolerance:
             out[0], out[2] = 0.0, out[0]
     else:
-        out[0], out[2] = np.arctan2(-turn[1, 2], turn[2, 2]), np.arctan2(-turn[0, 1], turn[0, 0])
+        out[0], out[2] = np.arctan2(-rotation[1, 2], rotation[2, 2]), np.arctan2(-rotation[0, 1], rotation[0, 0])
 
 
 @njit(cache=True, nogil=True)
 def _cone_gap(height, radius, distance, z):  # type: ignore[no-untyped-def]
-    """Returns how far a point (distance from the axis, z) is from a cone, and the nearest point of it, likewise."""
+    """Returns the distance of a point (distance from the axis, z) from a cone, and the nearest point of the cone."""
     half = 0.5 * height
     if -half <= z <= half and distance * height <= radius * (half - z):
         return 0.0, distance, z
     length = radius * radius + height * height
-    share = ((radius - distance) * radius + (z + half) * height) / length if length > 0.0 else 0.0
-    share = min(max(share, 0.0), 1.0)
-    side, up, flat = radius * (1.0 - share), share * height - half, min(distance, radius)
-    on_side, on_base = np.hypot(side - distance, up - z), np.hypot(flat - distance, half + z)
-    return (on_base, flat, -half) if on_base < on_side else (on_side, side, up)
+    fraction = ((radius - distance) * radius + (z + half) * height) / length if length > 0.0 else 0.0
+    fraction = min(max(fraction, 0.0), 1.0)
+    side, up, base_distance = radius * (1.0 - fraction), fraction * height - half, min(distance, radius)
+    on_side, on_base = np.hypot(side - distance, up - z), np.hypot(base_distance - distance, half + z)
+    return (on_base, base_distance, -half) if on_base < on_side else (on_side, side, up)
 
 
 @njit(cache=True, nogil=True)
 def _region_gap(shape, size, faces, point):  # type: ignore[no-untyped-def]
-    """Returns how far a point is out of a region; of a hull, out of the face it is farthest beyond."""
+    """Returns the distance of a point from a region; for a hull, the distance beyond the most violated face."""
     x, y, z = point[0], point[1], point[2]
     if shape == BOX:
         x, y, z = abs(x) - 0.5 * size[0], abs(y) - 0.5 * size[1], abs(z) - 0.5 * size[2]
         return np.sqrt(max(x, 0.0) ** 2 + max(y, 0.0) ** 2 + max(z, 0.0) ** 2)
-    if shape == BALL:
+    if shape == SPHERE:
         return max(np.sqrt(x * x + y * y + z * z) - size[0], 0.0)
     if shape == CYLINDER:
         return np.hypot(max(np.hypot(x, y) - size[1], 0.0), max(abs(z) - 0.5 * size[0], 0.0))
     if shape == CONE:
         return _cone_gap(size[0], size[1], np.hypot(x, y), z)[0]
-    worst = 0.0
+    max_excess = 0.0
     for face in range(len(faces)):
-        worst = max(worst, faces[face, 0] * x + faces[face, 1] * y + faces[face, 2] * z + faces[face, 3])
-    return worst
+        max_excess = max(max_excess, faces[face, 0] * x + faces[face, 1] * y + faces[face, 2] * z + faces[face, 3])
+    return max_excess
 
 
 @njit(cache=True, nogil=True)
 def _write_point(pose, point, out):  # type: ignore[no-untyped-def]
-    """Writes a point of the reference frame in the frame of a region."""
+    """Writes a point of the reference frame in region coordinates."""
     x, y, z = point[0, 3] - pose[0, 3], point[1, 3] - pose[1, 3], point[2, 3] - pose[2, 3]
     for row in range(3):
         out[row] = pose[0, row] * x + pose[1, row] * y + pose[2, row] * z
 
 
 @njit(cache=True, nogil=True)
-def _pose_excess(conditions, item, workspace):  # type: ignore[no-untyped-def]
-    """Compares one pair of poses, of placed joints.
+def _pose_excess(constraints, item, workspace):  # type: ignore[no-untyped-def]
+    """Writes the deviation of a pose constraint, for the current placements.
 
     Returns:
-        How far the deviation, which is written, is out of its tolerance; the nearest region, -1 for a rotation.
+        The violation of the tolerance or region, and the nearest region (-1 for a rotation).
     """
-    placements, frames, pose = conditions.placements[item], conditions.frames[item], workspace.pose
+    placements, frames, pose = constraints.placements[item], constraints.frames[item], workspace.pose
     _write_frame(workspace.placements, frames[1], placements[1], workspace.reference)
     _write_frame(workspace.placements, frames[0], placements[0], pose)
     _write_relative(workspace.reference, pose)
-    kind, deviation, tolerances = conditions.kinds[item], workspace.deviation, conditions.tolerances[item]
+    kind, deviation, tolerances = constraints.kinds[item], workspace.deviation, constraints.tolerances[item]
     if kind != POINT:
         if kind == EULER_ANGLES:
             _write_euler(pose, tolerances[0], deviation)
         else:
             rotation_vector(IDENTITY, pose, deviation)
-        worst = -np.inf
+        max_excess = -np.inf
         for axis in range(3):
-            worst = max(worst, abs(deviation[axis]) - tolerances[axis])
-        return worst, -1
+            max_excess = max(max_excess, abs(deviation[axis]) - tolerances[axis])
+        return max_excess, -1
     best, nearest = np.inf, -1
-    for region in range(conditions.regions[item, 0], conditions.regions[item, 1]):
-        _write_point(conditions.poses[region], pose, deviation)
-        begin, end = conditions.face_ranges[region, 0], conditions.face_ranges[region, 1]
-        gap = _region_gap(conditions.shapes[region], conditions.sizes[region], conditions.faces[begin:end], deviation)
+    for region in range(constraints.regions[item, 0], constraints.regions[item, 1]):
+        _write_point(constraints.poses[region], pose, deviation)
+        first_face, end = constraints.face_ranges[region, 0], constraints.face_ranges[region, 1]
+        gap = _region_gap(
+            constraints.shapes[region], constraints.sizes[region], constraints.faces[first_face:end], deviation
+        )
         if gap < best:
             best, nearest = gap, region
-    _write_point(conditions.poses[nearest], pose, deviation)
+    _write_point(constraints.poses[nearest], pose, deviation)
     return best, nearest
 
 
 @njit(cache=True, nogil=True)
-def _excess(conditions, drive, state, workspace):  # type: ignore[no-untyped-def]
-    """Returns by how much the condition that is violated most is violated; nothing above 0 where all hold."""
-    _place(conditions, drive, state, workspace)
-    worst = _joint_excess(conditions, workspace.values)
-    for item in range(len(conditions.kinds)):
-        worst = max(worst, _pose_excess(conditions, item, workspace)[0])
-    return worst
+def _excess(constraints, mapping, state, workspace):  # type: ignore[no-untyped-def]
+    """Returns the maximum violation of the constraints, at most 0 if all are satisfied."""
+    _place_joints(constraints, mapping, state, workspace)
+    max_excess = _joint_excess(constraints, workspace.values)
+    for item in range(len(constraints.kinds)):
+        max_excess = max(max_excess, _pose_excess(constraints, item, workspace)[0])
+    return max_excess
 
 
 @njit(cache=True, nogil=True)
-def first_violated(conditions, drive, states):  # type: ignore[no-untyped-def]
-    """Returns the number of the first of some states (s, joints) that violates a condition; -1 where none does."""
-    workspace = _new_workspace(conditions)
-    for number in range(len(states)):
-        if _excess(conditions, drive, states[number], workspace) > SLACK:
-            return number
+def first_violated(constraints, mapping, states):  # type: ignore[no-untyped-def]
+    """Returns the index of the first state of (s, joints) that violates a constraint, or -1.
+
+    Args:
+        constraints: Constraints as arrays.
+        mapping: Mapping of the states to the joints of the constraints.
+        states: States, shape (s, joints).
+    """
+    workspace = _new_workspace(constraints)
+    for index in range(len(states)):
+        if _excess(constraints, mapping, states[index], workspace) > TOLERANCE:
+            return index
     return -1
 
 
 @njit(cache=True, nogil=True)
-def _edge_holds(conditions, drive, start, end, step, state, workspace):  # type: ignore[no-untyped-def]
-    """Whether the conditions hold along an edge, behind its start; its middle is checked first."""
-    widest = 0.0
+def _edge_satisfied(constraints, mapping, start, end, step, state, workspace):  # type: ignore[no-untyped-def]
+    """Checks the constraints along an edge except at its start, beginning with its end and its middle."""
+    max_change = 0.0
     for joint in range(len(start)):
-        widest = max(widest, abs(end[joint] - start[joint]))
-    if _excess(conditions, drive, end, workspace) > SLACK:
+        max_change = max(max_change, abs(end[joint] - start[joint]))
+    if _excess(constraints, mapping, end, workspace) > TOLERANCE:
         return False
-    count, stride = max(1, int(np.ceil(widest / step))), 1
+    count, stride = max(1, int(np.ceil(max_change / step))), 1
     while stride < count:
         stride *= 2
     while stride > 1:
-        for number in range(stride // 2, count, stride):
-            share = number / count
+        for index in range(stride // 2, count, stride):
+            fraction = index / count
             for joint in range(len(start)):
-                state[joint] = start[joint] + share * (end[joint] - start[joint])
-            if _excess(conditions, drive, state, workspace) > SLACK:
+                state[joint] = start[joint] + fraction * (end[joint] - start[joint])
+            if _excess(constraints, mapping, state, workspace) > TOLERANCE:
                 return False
         stride //= 2
     return True
 
 
 @njit(cache=True, nogil=True)
-def edges_hold(conditions, drive, vertices, step):  # type: ignore[no-untyped-def]
-    """Whether the conditions hold on the straight pieces between states (s, joints), behind the first of them.
+def edges_satisfied(constraints, mapping, vertices, step):  # type: ignore[no-untyped-def]
+    """Checks the constraints along a polyline except at its start.
 
-    They are looked at at samples at most `step` apart in every joint.
+    Args:
+        constraints: Constraints as arrays.
+        mapping: Mapping of the states to the joints of the constraints.
+        vertices: States of the polyline, shape (s, joints).
+        step: Maximum joint displacement between checked states [rad or m].
     """
-    workspace, state = _new_workspace(conditions), np.empty(vertices.shape[1])
-    for number in range(1, len(vertices)):
-        if not _edge_holds(conditions, drive, vertices[number - 1], vertices[number], step, state, workspace):
+    workspace, state = _new_workspace(constraints), np.empty(vertices.shape[1])
+    for index in range(1, len(vertices)):
+        if not _edge_satisfied(constraints, mapping, vertices[index - 1], vertices[index], step, state, workspace):
             return False
     return True
 
 
 @njit(cache=True, nogil=True)
-def _angle_rows(kind, deviation, tolerances, violated, directions, aims):  # type: ignore[no-untyped-def]
-    """Writes how a turn of the link changes the angles that have to change, and by how much they have to."""
+def _angle_rows(kind, deviation, tolerances, violated, directions, changes):  # type: ignore[no-untyped-def]
+    """Writes the gradients of the angles to change over a rotation of the link, and the required changes."""
     x, y, z = deviation[0], deviation[1], deviation[2]
     count = 0
     for axis in range(3):
-        limit = 0.0 if tolerances[axis] <= TIGHT else INNER_SHARE * tolerances[axis]
+        limit = 0.0 if tolerances[axis] <= TIGHT_TOLERANCE else INNER_FRACTION * tolerances[axis]
         if not (limit == 0.0 or (violated and abs(deviation[axis]) > limit)):
             continue
         row = directions[count]
@@ -322,94 +338,96 @@ def _angle_rows(kind, deviation, tolerances, violated, directions, aims):  # typ
                 row[0], row[1], row[2] = 0.0, cosine, sine
             else:
                 row[0], row[1], row[2] = 0.0, -sine / rise, cosine / rise
-        else:  # of the inverse left Jacobian of the rotations: 1 - [v] / 2 + s [v]^2, [v]^2 = v v^T - |v|^2
-            square = x * x + y * y + z * z
-            angle = np.sqrt(square)
-            bend = 1.0 / 12.0
+        else:  # row of the inverse left Jacobian of SO(3): 1 - [v] / 2 + s [v]^2, with [v]^2 = v v^T - |v|^2
+            squared_angle = x * x + y * y + z * z
+            angle = np.sqrt(squared_angle)
+            factor = 1.0 / 12.0
             if angle > 1.0e-3:
-                bend = (1.0 - 0.5 * angle * np.cos(0.5 * angle) / np.sin(0.5 * angle)) / square
+                factor = (1.0 - 0.5 * angle * np.cos(0.5 * angle) / np.sin(0.5 * angle)) / squared_angle
             for column in range(3):
-                row[column] = bend * deviation[axis] * deviation[column]
-            row[axis] += 1.0 - bend * square
-            following, last = (axis + 1) % 3, (axis + 2) % 3
-            row[following] += 0.5 * deviation[last]
-            row[last] -= 0.5 * deviation[following]
-        aims[count] = min(max(deviation[axis], -limit), limit) - deviation[axis]
+                row[column] = factor * deviation[axis] * deviation[column]
+            row[axis] += 1.0 - factor * squared_angle
+            next_axis, last_axis = (axis + 1) % 3, (axis + 2) % 3
+            row[next_axis] += 0.5 * deviation[last_axis]
+            row[last_axis] -= 0.5 * deviation[next_axis]
+        changes[count] = min(max(deviation[axis], -limit), limit) - deviation[axis]
         count += 1
     return count
 
 
 @njit(cache=True, nogil=True)
-def _inner(length):  # type: ignore[no-untyped-def]
-    """Returns the half length of a region that projections aim at."""
-    return 0.0 if length <= TIGHT else length - min((1.0 - INNER_SHARE) * length, TIGHT)
+def _inner_limit(length):  # type: ignore[no-untyped-def]
+    """Returns the half length within a region that projections aim at."""
+    return 0.0 if length <= TIGHT_TOLERANCE else length - min((1.0 - INNER_FRACTION) * length, TIGHT_TOLERANCE)
 
 
 @njit(cache=True, nogil=True)
-def _add_row(x, y, z, aim, count, directions, aims):  # type: ignore[no-untyped-def]
-    directions[count, 0], directions[count, 1], directions[count, 2], aims[count] = x, y, z, aim
+def _add_row(x, y, z, change, count, directions, changes):  # type: ignore[no-untyped-def]
+    directions[count, 0], directions[count, 1], directions[count, 2], changes[count] = x, y, z, change
     return count + 1
 
 
 @njit(cache=True, nogil=True)
-def _axis_row(axis, half, point, violated, count, directions, aims):  # type: ignore[no-untyped-def]
-    """Adds the condition that keeps a coordinate within half a length of 0; returns how many there are then."""
-    limit, value = _inner(half), point[axis]
+def _axis_row(axis, half, point, violated, count, directions, changes):  # type: ignore[no-untyped-def]
+    """Adds the row that keeps a coordinate between -half and half; returns the new number of rows."""
+    limit, value = _inner_limit(half), point[axis]
     if limit > 0.0 and (not violated or abs(value) <= limit):
         return count
-    aim = min(max(value, -limit), limit) - value
-    return _add_row(1.0 * (axis == 0), 1.0 * (axis == 1), 1.0 * (axis == 2), aim, count, directions, aims)
+    change = min(max(value, -limit), limit) - value
+    return _add_row(1.0 * (axis == 0), 1.0 * (axis == 1), 1.0 * (axis == 2), change, count, directions, changes)
 
 
 @njit(cache=True, nogil=True)
-def _region_rows(shape, size, faces, point, violated, directions, aims):  # type: ignore[no-untyped-def]
-    """Writes the directions, in the frame of a region, in which a point has to move, and how far."""
+def _region_rows(shape, size, faces, point, violated, directions, changes):  # type: ignore[no-untyped-def]
+    """Writes the directions in the frame of a region in which a point must move, and the distances."""
     x, y, z = point[0], point[1], point[2]
     if shape == BOX:
         count = 0
         for axis in range(3):
-            count = _axis_row(axis, 0.5 * size[axis], point, violated, count, directions, aims)
+            count = _axis_row(axis, 0.5 * size[axis], point, violated, count, directions, changes)
         return count
     if shape == HULL:
         count = 0
         for face in range(len(faces)):
             a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-            gap = a * x + b * y + c * z + faces[face, 3] + INSIDE
+            gap = a * x + b * y + c * z + faces[face, 3] + HULL_MARGIN
             if violated and gap > 0.0:
-                count = _add_row(a, b, c, -gap, count, directions, aims)
+                count = _add_row(a, b, c, -gap, count, directions, changes)
         return count
     if shape == CONE:
         if not violated:
             return 0
         distance = max(np.hypot(x, y), 1.0e-12)
         _, inside, up = _cone_gap(size[0], size[1], distance, z)
-        share = INNER_SHARE * inside / distance
-        count = _add_row(1.0, 0.0, 0.0, share * x - x, 0, directions, aims)
-        count = _add_row(0.0, 1.0, 0.0, share * y - y, count, directions, aims)
-        return _add_row(0.0, 0.0, 1.0, INNER_SHARE * up - z, count, directions, aims)
-    flat = shape == CYLINDER
-    count = _axis_row(2, 0.5 * size[0], point, violated, 0, directions, aims) if flat else 0
-    radius, height = size[1] if flat else size[0], 0.0 if flat else z
-    limit, distance = _inner(radius), np.sqrt(x * x + y * y + height * height)
+        fraction = INNER_FRACTION * inside / distance
+        count = _add_row(1.0, 0.0, 0.0, fraction * x - x, 0, directions, changes)
+        count = _add_row(0.0, 1.0, 0.0, fraction * y - y, count, directions, changes)
+        return _add_row(0.0, 0.0, 1.0, INNER_FRACTION * up - z, count, directions, changes)
+    is_cylinder = shape == CYLINDER
+    count = _axis_row(2, 0.5 * size[0], point, violated, 0, directions, changes) if is_cylinder else 0
+    radius, height = size[1] if is_cylinder else size[0], 0.0 if is_cylinder else z
+    limit, distance = _inner_limit(radius), np.sqrt(x * x + y * y + height * height)
     if limit == 0.0:
-        for axis in range(2 if flat else 3):
-            count = _axis_row(axis, 0.0, point, violated, count, directions, aims)
+        for axis in range(2 if is_cylinder else 3):
+            count = _axis_row(axis, 0.0, point, violated, count, directions, changes)
     elif violated and distance > limit:
-        count = _add_row(x / distance, y / distance, height / distance, limit - distance, count, directions, aims)
+        count = _add_row(x / distance, y / distance, height / distance, limit - distance, count, directions, changes)
     return count
 
 
 @njit(cache=True, nogil=True)
-def _pose_rows(conditions, item, region, violated, workspace):  # type: ignore[no-untyped-def]
-    """Writes the linearised conditions on one pair of poses, in the reference frame; returns their number."""
-    directions, aims = workspace.directions, workspace.aims
+def _pose_rows(constraints, item, region, violated, workspace):  # type: ignore[no-untyped-def]
+    """Writes the linearised rows of a pose constraint in the reference frame; returns the number of rows."""
+    directions, changes = workspace.directions, workspace.changes
     if region < 0:
         return _angle_rows(
-            conditions.kinds[item], workspace.deviation, conditions.tolerances[item], violated, directions, aims
+            constraints.kinds[item], workspace.deviation, constraints.tolerances[item], violated, directions, changes
         )
-    begin, end = conditions.face_ranges[region, 0], conditions.face_ranges[region, 1]
-    shape, size, pose = conditions.shapes[region], conditions.sizes[region], conditions.poses[region]
-    count = _region_rows(shape, size, conditions.faces[begin:end], workspace.deviation, violated, directions, aims)
+    first_face, end = constraints.face_ranges[region, 0], constraints.face_ranges[region, 1]
+    shape, size, pose = constraints.shapes[region], constraints.sizes[region], constraints.poses[region]
+    count = _region_rows(
+        shape, size, constraints.faces[first_face:end], workspace.deviation, violated, directions, changes
+    )
     for row in range(count):
         x, y, z = directions[row, 0], directions[row, 1], directions[row, 2]
         for axis in range(3):
@@ -418,78 +436,86 @@ def _pose_rows(conditions, item, region, violated, workspace):  # type: ignore[n
 
 
 @njit(cache=True, nogil=True)
-def _add_gradients(conditions, drive, item, count, first, workspace, rates, wanted):  # type: ignore[no-untyped-def]
-    """Writes how the state changes what the conditions on one pair of poses are about."""
-    tree, signs, reference, pose = conditions.tree, conditions.signs[item], workspace.reference, workspace.pose
-    turns = conditions.kinds[item] != POINT
+def _add_gradients(constraints, mapping, item, count, first, workspace, jacobian, targets):  # type: ignore[no-untyped-def]
+    """Writes the Jacobian rows and the target changes of a pose constraint."""
+    tree, signs, reference, pose = constraints.tree, constraints.signs[item], workspace.reference, workspace.pose
+    is_rotation = constraints.kinds[item] != POINT
     px, py, pz = reference[0, 3], reference[1, 3], reference[2, 3]  # the point in the planning frame
     for column in range(3):
         px += reference[0, column] * pose[column, 3]
         py += reference[1, column] * pose[column, 3]
         pz += reference[2, column] * pose[column, 3]
-    rates[first : first + count] = 0.0
+    jacobian[first : first + count] = 0.0
     for row in range(count):
-        wanted[first + row] = workspace.aims[row]
+        targets[first + row] = workspace.changes[row]
     for joint in range(len(signs)):
-        driver = drive.drivers[joint]
-        if signs[joint] == 0.0 or driver < 0 or (turns and tree.prismatic[joint]):
+        driver = mapping.drivers[joint]
+        if signs[joint] == 0.0 or driver < 0 or (is_rotation and tree.prismatic[joint]):
             continue
         frame, axis = workspace.placements[joint], tree.axes[joint]
         x = frame[0, 0] * axis[0] + frame[0, 1] * axis[1] + frame[0, 2] * axis[2]
         y = frame[1, 0] * axis[0] + frame[1, 1] * axis[1] + frame[1, 2] * axis[2]
         z = frame[2, 0] * axis[0] + frame[2, 1] * axis[1] + frame[2, 2] * axis[2]
-        if not turns and not tree.prismatic[joint]:
+        if not is_rotation and not tree.prismatic[joint]:
             a, b, c = px - frame[0, 3], py - frame[1, 3], pz - frame[2, 3]
             x, y, z = y * c - z * b, z * a - x * c, x * b - y * a
         u = reference[0, 0] * x + reference[1, 0] * y + reference[2, 0] * z
         v = reference[0, 1] * x + reference[1, 1] * y + reference[2, 1] * z
         w = reference[0, 2] * x + reference[1, 2] * y + reference[2, 2] * z
-        scale = signs[joint] * drive.gains[joint]
+        scale = signs[joint] * mapping.gains[joint]
         for row in range(count):
             direction = workspace.directions[row]
-            rates[first + row, driver] += scale * (direction[0] * u + direction[1] * v + direction[2] * w)
+            jacobian[first + row, driver] += scale * (direction[0] * u + direction[1] * v + direction[2] * w)
 
 
 @njit(cache=True, nogil=True)
-def _write_step(rates, wanted, count, free, square, solved, step):  # type: ignore[no-untyped-def]
-    """Writes the least-squares step of the free joints, in which none goes farther than WIDEST_STEP."""
-    damped_step(rates, wanted, count, DAMPING, free, step, square, solved)
-    widest = 1.0e-12
+def _write_step(jacobian, targets, count, free, gram, solution, step):  # type: ignore[no-untyped-def]
+    """Writes the least-squares step of the free joints, scaled to at most MAX_STEP per joint."""
+    damped_step(jacobian, targets, count, DAMPING, free, step, gram, solution)
+    max_change = 1.0e-12
     for joint in range(len(step)):
-        widest = max(widest, abs(step[joint]))
-    share = min(1.0, WIDEST_STEP / widest)
+        max_change = max(max_change, abs(step[joint]))
+    fraction = min(1.0, MAX_STEP / max_change)
     for joint in range(len(step)):
-        step[joint] *= share
+        step[joint] *= fraction
 
 
 @njit(cache=True, nogil=True)
-def project(conditions, drive, state, lower, upper, steps):  # type: ignore[no-untyped-def]
-    """Moves a state (joints,), in place, by least-squares steps within bounds until every condition holds.
+def project(constraints, mapping, state, lower, upper, steps):  # type: ignore[no-untyped-def]
+    """Moves a state by least-squares steps within bounds until all constraints hold.
 
-    Joints that a step would push over a bound stay, and the others take over.
+    Joints at a bound stay fixed if the step would violate the bound; the step is then computed for the other joints.
+
+    Args:
+        constraints: Constraints as arrays.
+        mapping: Mapping of the state to the joints of the constraints.
+        state: Joint vector, shape (joints,); changed in place.
+        lower: Lower bounds, shape (joints,).
+        upper: Upper bounds, shape (joints,).
+        steps: Maximum number of steps.
 
     Returns:
-        Whether all conditions hold after at most that many steps.
+        Whether all constraints hold.
     """
-    width, most = len(state), 3 * len(conditions.kinds) + len(conditions.faces)
-    workspace = _new_workspace(conditions)
-    rates, wanted, square = np.empty((most, width)), np.empty(most), np.empty((most, most))
-    solved, step, free = np.empty(most), np.empty(width), np.empty(width, dtype=np.bool_)
+    width, max_rows = len(state), 3 * len(constraints.kinds) + len(constraints.faces)
+    workspace = _new_workspace(constraints)
+    jacobian, targets, gram = np.empty((max_rows, width)), np.empty(max_rows), np.empty((max_rows, max_rows))
+    solution, step, free = np.empty(max_rows), np.empty(width), np.empty(width, dtype=np.bool_)
     for joint in range(width):
         state[joint] = min(max(state[joint], lower[joint]), upper[joint])
     for _ in range(steps):
-        _place(conditions, drive, state, workspace)
+        _place_joints(constraints, mapping, state, workspace)
         count, is_violated = 0, False
-        for item in range(len(conditions.kinds)):
-            excess, region = _pose_excess(conditions, item, workspace)
-            rows = _pose_rows(conditions, item, region, excess > SLACK, workspace)
-            _add_gradients(conditions, drive, item, rows, count, workspace, rates, wanted)
-            count, is_violated = count + rows, is_violated or excess > SLACK
+        for item in range(len(constraints.kinds)):
+            excess, region = _pose_excess(constraints, item, workspace)
+            rows = _pose_rows(constraints, item, region, excess > TOLERANCE, workspace)
+            _add_gradients(constraints, mapping, item, rows, count, workspace, jacobian, targets)
+            count, is_violated = count + rows, is_violated or excess > TOLERANCE
         if not is_violated:
-            return _joint_excess(conditions, workspace.values) <= SLACK
+            return _joint_excess(constraints, workspace.values) <= TOLERANCE
         free[:] = True
         for _attempt in range(3):
-            _write_step(rates, wanted, count, free, square, solved, step)
+            _write_step(jacobian, targets, count, free, gram, solution, step)
             blocked = False
             for joint in range(width):
                 at_end = (state[joint] <= lower[joint] and step[joint] < 0.0) or (
@@ -505,73 +531,73 @@ def project(conditions, drive, state, lower, upper, steps):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
-def _distance(one, other):  # type: ignore[no-untyped-def]
-    square = 0.0
-    for joint in range(len(one)):
-        square += (other[joint] - one[joint]) * (other[joint] - one[joint])
-    return np.sqrt(square)
+def _distance(first, second):  # type: ignore[no-untyped-def]
+    squared_distance = 0.0
+    for joint in range(len(first)):
+        squared_distance += (second[joint] - first[joint]) * (second[joint] - first[joint])
+    return np.sqrt(squared_distance)
 
 
 @njit(cache=True, nogil=True)
 def nearest_state(states, target):  # type: ignore[no-untyped-def]
-    """Returns the number of the state, of some (n, joints), that is nearest to another one."""
-    best, found = np.inf, 0
-    for number in range(len(states)):
-        square = 0.0
+    """Returns the index of the state in (n, joints) nearest to a target state."""
+    best, nearest = np.inf, 0
+    for index in range(len(states)):
+        squared_distance = 0.0
         for joint in range(len(target)):
-            square += (states[number, joint] - target[joint]) ** 2
-        if square < best:
-            best, found = square, number
-    return found
+            squared_distance += (states[index, joint] - target[joint]) ** 2
+        if squared_distance < best:
+            best, nearest = squared_distance, index
+    return nearest
 
 
 @njit(cache=True, nogil=True)
-def walk(conditions, drive, start, target, lower, upper, longest, shortest, step, out):  # type: ignore[no-untyped-def]
-    """Goes from a state towards another one along the conditions: a straight step, its projection, and so on.
+def walk(constraints, mapping, start, target, lower, upper, max_step, min_step, step, out):  # type: ignore[no-untyped-def]
+    """Walks from a state towards a target along the constraints, by straight steps and projections.
 
-    A step is halved where the conditions do not hold between its ends, and doubled again where they do.
+    A step is halved if the constraints are violated along it, and doubled after a successful step.
 
     Args:
-        conditions: hold at the start.
-        drive: of the states.
-        start: shape (joints,).
-        target: shape (joints,).
-        lower: bounds of projected states, shape (joints,).
-        upper: likewise.
-        longest: most that a step is long, before projection.
-        shortest: least.
-        step: distance of samples along a step, of any joint.
-        out: filled with the states that were reached, shape (most, joints).
+        constraints: Constraints as arrays, satisfied at the start.
+        mapping: Mapping of the states to the joints of the constraints.
+        start: Start state, shape (joints,).
+        target: Target state, shape (joints,).
+        lower: Lower bounds of projected states, shape (joints,).
+        upper: Upper bounds of projected states, shape (joints,).
+        max_step: Maximum length of a step before projection.
+        min_step: Minimum length of a step.
+        step: Maximum joint displacement between checked states.
+        out: Output states, shape (capacity, joints).
 
     Returns:
-        How many there are; fewer than there is room for where the walk has arrived at the target, exactly, or where
-        no step leads nearer to it.
+        Number of output states. The walk ends exactly at the target, or if no step leads closer to the target, or if
+        the output is full.
     """
-    workspace, state, sampled = _new_workspace(conditions), np.empty(len(start)), np.empty(len(start))
-    here, size, count = start.copy(), longest, 0
+    workspace, state, sampled = _new_workspace(constraints), np.empty(len(start)), np.empty(len(start))
+    current, size, count = start.copy(), max_step, 0
     while count < len(out):
-        distance = _distance(here, target)
-        if distance < SAME:
+        distance = _distance(current, target)
+        if distance < SAME_STATE_DISTANCE:
             break
         length = min(size, distance)
         for joint in range(len(state)):
             state[joint] = target[joint]
             if length < distance:
-                state[joint] = here[joint] + length / distance * (target[joint] - here[joint])
-        is_nearer = _excess(conditions, drive, state, workspace) <= SLACK or project(
-            conditions, drive, state, lower, upper, CLOSE_STEPS
+                state[joint] = current[joint] + length / distance * (target[joint] - current[joint])
+        is_nearer = _excess(constraints, mapping, state, workspace) <= TOLERANCE or project(
+            constraints, mapping, state, lower, upper, MAX_PROJECTION_STEPS
         )
         is_nearer = (
             is_nearer
-            and _distance(state, target) <= distance - LEAST_PROGRESS * length
-            and _distance(here, state) <= 2.0 * length
+            and _distance(state, target) <= distance - MIN_PROGRESS * length
+            and _distance(current, state) <= 2.0 * length
         )
-        if is_nearer and _edge_holds(conditions, drive, here, state, step, sampled, workspace):
-            here[:] = state
+        if is_nearer and _edge_satisfied(constraints, mapping, current, state, step, sampled, workspace):
+            current[:] = state
             out[count] = state
-            count, size = count + 1, min(longest, 2.0 * size)
+            count, size = count + 1, min(max_step, 2.0 * size)
             continue
         size = 0.5 * length
-        if size < (shortest if is_nearer else max(shortest, 0.25 * longest)):
+        if size < (min_step if is_nearer else max(min_step, 0.25 * max_step)):
             break
     return count

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Kinematic constraints on a state: joint, position and orientation constraints.
+"""Joint, position and orientation constraints, with the meaning of MoveIt's kinematic constraints.
 
-The meaning is that of MoveIt's kinematic constraints: a joint within its tolerances, a point of a link within one of
-several regions, the rotation of a link within a tolerance about each axis.
+A joint stays within its tolerances, a point of a link within one of several regions, and the rotation of a link within
+a tolerance about each axis.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from modular_framework_planning.constraints.compiled_constraints import SLACK
+from modular_framework_planning.constraints.compiled_constraints import TOLERANCE
 from modular_framework_planning.geometry.regions import Solid
 from modular_framework_planning.geometry.spatial import Array, Transform
 
 
 class Parameterization(Enum):
-    """Parameterization of the tolerances of an orientation; numbers as in moveit_msgs/OrientationConstraint."""
+    """Parameterization of orientation tolerances, with the values of moveit_msgs/OrientationConstraint."""
 
     XYZ_EULER_ANGLES = 0
     ROTATION_VECTOR = 1
@@ -28,13 +28,14 @@ class Parameterization(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ConstraintResult:
-    """The result of one constraint for a state.
+    """Evaluation of a constraint for a state.
 
     Attributes:
         kind: "joint", "position" or "orientation".
-        name: the joint or the link.
-        distance: weighted deviation from the middle of what is allowed, as MoveIt reports it.
-        text: what deviates by how much, for people.
+        name: Name of the joint or link.
+        satisfied: Whether the state satisfies the constraint.
+        distance: Weighted deviation from the centre of the allowed range, as in MoveIt.
+        text: Description of the deviation.
     """
 
     kind: str
@@ -46,28 +47,28 @@ class ConstraintResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameOnRobot:
-    """A frame that moves with a joint of the robot; joint 0 is the planning frame, which does not move."""
+    """A frame that moves with a joint of the robot; joint 0 is the fixed planning frame."""
 
     name: str
     joint: int
     placement: Transform
 
     def pose(self, data: Any) -> Transform:
-        """Returns the pose in the planning frame; `data` holds the joint placements of the state."""
+        """Returns the pose in the planning frame for the joint placements in `data`."""
         return data.oMi[self.joint] * self.placement if self.joint else self.placement
 
 
 @dataclass(frozen=True, slots=True)
 class JointConstraint:
-    """A joint that stays within [target - below, target + above].
+    """Keeps a joint within [target - below, target + above].
 
     Attributes:
-        name: of the joint.
-        index: of the joint in a position vector of the whole robot.
-        target: position [rad or m].
-        below, above: tolerance on each side [rad or m].
-        is_continuous: whether a whole turn makes no difference.
-        weight: of the constraint among others [1].
+        name: Joint name.
+        index: Index of the joint in a position vector of the whole robot.
+        target: Target position [rad or m].
+        below, above: Lower and upper tolerance [rad or m].
+        is_continuous: Whether the joint is continuous.
+        weight: Weight of the constraint [1].
     """
 
     name: str
@@ -79,29 +80,31 @@ class JointConstraint:
     weight: float = 1.0
 
     def deviation(self, positions: Array) -> float:
-        """Returns how far the joint is from its target; the short way round for a joint without ends."""
+        """Returns the deviation from the target, by the shorter rotation for a continuous joint."""
         value = float(positions[self.index]) - self.target
         return float(np.arctan2(np.sin(value), np.cos(value))) if self.is_continuous else value
 
     def evaluate(self, _: Any, positions: Array) -> ConstraintResult:
-        """Evaluates a state."""
+        """Returns the evaluation of a state."""
         value = self.deviation(positions)
-        kept = -self.below - SLACK <= value <= self.above + SLACK
+        is_satisfied = -self.below - TOLERANCE <= value <= self.above + TOLERANCE
         text = (
-            f"joint '{self.name}' is {value:+.4f} from {self.target:.4f}; allowed is -{self.below:.4f} to "
+            f"joint '{self.name}' is {value:+.4f} from {self.target:.4f}; allowed: -{self.below:.4f} to "
             f"+{self.above:.4f}"
         )
-        return ConstraintResult("joint", self.name, kept, self.weight * abs(value), text)
+        return ConstraintResult("joint", self.name, is_satisfied, self.weight * abs(value), text)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionConstraint:
-    """A point of a link that stays in one of several regions.
+    """Keeps a point of a link in one of several regions.
 
     Attributes:
-        link: frame of the link; offset: the point in it [m].
-        reference: frame the regions' poses are given in; it may move.
-        regions: solids and their poses.
+        link: Link frame.
+        offset: Point in the link frame, shape (3,) [m].
+        reference: Reference frame of the regions, which may move.
+        regions: Solids and their poses in the reference frame.
+        weight: Weight of the constraint [1].
     """
 
     link: FrameOnRobot
@@ -110,34 +113,38 @@ class PositionConstraint:
     regions: tuple[tuple[Solid, Transform], ...]
     weight: float = 1.0
 
-    def _gap(self, data: Any) -> tuple[float, Array]:
-        """Returns the distance to the closest region, and the point in the frame of that one."""
+    def _region_distance(self, data: Any) -> tuple[float, Array]:
+        """Returns the distance to the nearest region, and the point in the frame of this region."""
         point = self.link.pose(data).act(self.offset)
         reference = self.reference.pose(data)
-        inside = [(reference * pose).actInv(point) for _, pose in self.regions]
-        gaps = [
-            float(np.linalg.norm(solid.nearest(at) - at)) for (solid, _), at in zip(self.regions, inside, strict=True)
+        points = [(reference * pose).actInv(point) for _, pose in self.regions]
+        distances = [
+            float(np.linalg.norm(solid.nearest(at) - at)) for (solid, _), at in zip(self.regions, points, strict=True)
         ]
-        closest = int(np.argmin(gaps))
-        return gaps[closest], inside[closest]
+        nearest = int(np.argmin(distances))
+        return distances[nearest], points[nearest]
 
     def evaluate(self, data: Any, _: Array) -> ConstraintResult:
-        """Evaluates the state whose joint placements `data` holds."""
-        distance, inside = self._gap(data)
+        """Returns the evaluation of a state with the joint placements in `data`."""
+        distance, point = self._region_distance(data)
         text = f"link '{self.link.name}' is {distance:.4f} m outside its region"
         return ConstraintResult(
-            "position", self.link.name, distance <= SLACK, self.weight * float(np.linalg.norm(inside)), text
+            "position", self.link.name, distance <= TOLERANCE, self.weight * float(np.linalg.norm(point)), text
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OrientationConstraint:
-    """A link whose rotation stays near a given one.
+    """Keeps the orientation of a link near a target.
 
     Attributes:
-        target: the rotation in the reference frame, shape (3, 3).
-        tolerances: about x, y and z [rad]. Of intrinsic XYZ Euler angles of the deviation, or of its rotation vector
-            along the axes of the reference frame.
+        link: Link frame.
+        reference: Reference frame, which may move.
+        target: Target rotation in the reference frame, shape (3, 3).
+        tolerances: Tolerances about x, y and z, shape (3,) [rad].
+        parameterization: Whether the tolerances limit the intrinsic XYZ Euler angles of the deviation, or its rotation
+            vector along the axes of the reference frame.
+        weight: Weight of the constraint [1].
     """
 
     link: FrameOnRobot
@@ -148,25 +155,27 @@ class OrientationConstraint:
     weight: float = 1.0
 
     def deviation(self, data: Any) -> tuple[Array, Array]:
-        """Returns the three deviations [rad] and the deviating rotation."""
+        """Returns the deviation about the three axes [rad], and the deviation as a rotation matrix."""
         current = self.reference.pose(data).rotation.T @ self.link.pose(data).rotation
-        turned = self.target.T @ current
+        deviation_rotation = self.target.T @ current
         if self.parameterization is Parameterization.ROTATION_VECTOR:
-            return self.target @ pin.log3(turned), turned
-        angles, regular = euler_xyz(turned)
+            return self.target @ pin.log3(deviation_rotation), deviation_rotation
+        angles, regular = euler_xyz(deviation_rotation)
         if not regular and abs(angles[0]) > self.tolerances[0]:
-            angles = np.array([0.0, angles[1], angles[0]])  # roll and yaw turn about one axis: either may take it
-        return angles, turned
+            angles = np.array([0.0, angles[1], angles[0]])  # in gimbal lock, roll and yaw are interchangeable
+        return angles, deviation_rotation
 
     def evaluate(self, data: Any, _: Array) -> ConstraintResult:
-        """Evaluates the state whose joint placements `data` holds."""
+        """Returns the evaluation of a state with the joint placements in `data`."""
         angles = np.abs(self.deviation(data)[0])
         excess = float((angles - self.tolerances).max())
         text = (
-            f"link '{self.link.name}' is turned {np.array2string(angles, precision=4)} rad about x, y, z; allowed "
-            f"is {np.array2string(self.tolerances, precision=4)}"
+            f"link '{self.link.name}' is rotated by {np.array2string(angles, precision=4)} rad about x, y, z; allowed: "
+            f"{np.array2string(self.tolerances, precision=4)}"
         )
-        return ConstraintResult("orientation", self.link.name, excess <= SLACK, self.weight * float(angles.sum()), text)
+        return ConstraintResult(
+            "orientation", self.link.name, excess <= TOLERANCE, self.weight * float(angles.sum()), text
+        )
 
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random rotation within the tolerances, in the reference frame, shape (3, 3)."""
@@ -187,7 +196,7 @@ def _rotation_x(angle: float) -> Array:
 
 
 def euler_xyz(rotation: Array) -> tuple[Array, bool]:
-    """Returns intrinsic XYZ Euler angles [rad] of a rotation, and False where only roll plus or minus yaw is known."""
+    """Returns the intrinsic XYZ Euler angles of a rotation [rad], and False in gimbal lock."""
     sine = min(max(float(rotation[0, 2]), -1.0), 1.0)
     pitch = float(np.arcsin(sine))
     if abs(sine) > 1.0 - 1.0e-12:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks states against a set of constraints, projects states onto it, and samples states from it."""
+"""Sets of kinematic constraints: checks, projection and sampling of states."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from modular_framework_planning.constraints.compiled_constraints import (
-    Conditions,
-    Drive,
-    edges_hold,
+    ConstraintArrays,
+    JointMapping,
+    edges_satisfied,
     first_violated,
     project,
 )
-from modular_framework_planning.constraints.condition_arrays import arrays_of, drive_of, whole_drive
+from modular_framework_planning.constraints.constraint_arrays import (
+    constraint_arrays,
+    full_joint_mapping,
+    joint_mapping,
+)
 from modular_framework_planning.constraints.constraint_kinds import (
     Constraint,
     ConstraintResult,
@@ -28,15 +32,15 @@ from modular_framework_planning.constraints.constraint_kinds import (
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-LOOSE = 0.02  # [m] or [rad]; tolerances above this are worth sampling in
+LOOSE_TOLERANCE = 0.02  # larger tolerances are worth sampling [m or rad]
 Index = Sequence[int] | NDArray[np.int64]
 
 
 class KinematicConstraints:
-    """Constraints that must all hold at once.
+    """A set of constraints that must all be satisfied.
 
-    Not for use from two threads at a time: it holds the working memory of forward kinematics.
-    Positions are those of the whole robot [rad or m].
+    Positions are positions of the whole robot [rad or m]. Not thread-safe, because instances hold the working memory of
+    forward kinematics.
     """
 
     def __init__(
@@ -55,47 +59,49 @@ class KinematicConstraints:
 
     @property
     def is_empty(self) -> bool:
-        """Whether every state satisfies."""
+        """Whether the set has no constraint."""
         return not self._all
 
     @cached_property
-    def arrays(self) -> tuple[Conditions, NDArray[np.int64]]:
-        """The constraints as compiled loops take them, and the indices in a position vector of their joints."""
-        return arrays_of(self.model, self.joints, self.positions, self.orientations)
+    def arrays(self) -> tuple[ConstraintArrays, NDArray[np.int64]]:
+        """Constraints as arrays, and the indices in a position vector of the constrained joints."""
+        return constraint_arrays(self.model, self.joints, self.positions, self.orientations)
 
     @cached_property
-    def _whole(self) -> Drive:
-        return whole_drive(self.arrays[1])
+    def _full_mapping(self) -> JointMapping:
+        return full_joint_mapping(self.arrays[1])
 
     def evaluate(self, positions: Array) -> list[ConstraintResult]:
-        """Returns one result a constraint: joints first, then positions, then orientations."""
+        """Returns the result of each constraint, in the order joints, positions, orientations."""
         pin.forwardKinematics(self.model.pin_model, self._data, positions)
         return [item.evaluate(self._data, positions) for item in self._all]
 
     def satisfied(self, positions: Array) -> bool:
-        """Whether a state keeps every constraint."""
+        """Checks that a state satisfies all constraints."""
         return self.first_violated(np.asarray(positions, dtype=float)[None]) < 0
 
     def first_violated(self, states: Array) -> int:
-        """Returns the number of the first of some states (n, joints) that violates a constraint; -1 for none."""
-        return int(first_violated(self.arrays[0], self._whole, np.ascontiguousarray(states, dtype=float)))
+        """Returns the index of the first state in (n, joints) that violates a constraint, or -1."""
+        return int(first_violated(self.arrays[0], self._full_mapping, np.ascontiguousarray(states, dtype=float)))
 
-    def edges_hold(self, vertices: Array, step: float) -> bool:
-        """Whether straight motions keep every constraint, their start left out.
+    def edges_satisfied(self, vertices: Array, step: float) -> bool:
+        """Checks that a polyline satisfies all constraints; its start is not checked.
 
         Args:
-            vertices: positions of the whole robot, shape (n, joints).
-            step: most distance of the samples that are looked at, in any joint [rad or m].
+            vertices: Positions of the whole robot, shape (n, joints).
+            step: Maximum joint displacement between checked states [rad or m].
         """
-        return bool(edges_hold(self.arrays[0], self._whole, np.ascontiguousarray(vertices, dtype=float), step))
+        return bool(
+            edges_satisfied(self.arrays[0], self._full_mapping, np.ascontiguousarray(vertices, dtype=float), step)
+        )
 
     def describe(self, positions: Array) -> str:
-        """Says which constraints a state violates and by how much; empty where it keeps all."""
+        """Returns a description of the violated constraints, empty if there are none."""
         return "; ".join(item.text for item in self.evaluate(positions) if not item.satisfied)
 
     @property
     def pose_link(self) -> str:
-        """The link whose pose the constraints are about: one position and one orientation of it; else empty."""
+        """Name of the link that is constrained by exactly one position and one orientation, otherwise empty."""
         if self.joints or len(self.positions) != 1 or len(self.orientations) != 1:
             return ""
         name = self.positions[0].link.name
@@ -103,84 +109,81 @@ class KinematicConstraints:
 
     @property
     def is_loose(self) -> bool:
-        """Whether quite different states satisfy, so that sampling around the middle of the tolerances pays."""
-        return any(solid.extent > LOOSE for item in self.positions for solid, _ in item.regions) or any(
-            float(item.tolerances.max()) > LOOSE for item in self.orientations
+        """Whether the tolerances are large enough to sample in."""
+        return any(solid.extent > LOOSE_TOLERANCE for item in self.positions for solid, _ in item.regions) or any(
+            float(item.tolerances.max()) > LOOSE_TOLERANCE for item in self.orientations
         )
 
     def pose_target(self, positions: Array, rng: np.random.Generator | None = None) -> Transform:
-        """Returns a pose of `pose_link` in the planning frame that satisfies.
+        """Returns a pose of `pose_link` in the planning frame that satisfies the constraints.
 
         Args:
-            positions: state that says where moving frames are.
-            rng: draws a random one; without it, it is the middle of the first region, turned as asked.
+            positions: State, for the poses of moving reference frames.
+            rng: Random generator for a random pose; None for the centre of the first region and the target rotation.
         """
         pin.forwardKinematics(self.model.pin_model, self._data, positions)
-        point, turn = self.positions[0], self.orientations[0]
-        number = 0 if rng is None else int(rng.integers(len(point.regions)))
-        solid, pose = point.regions[number]
-        at = (point.reference.pose(self._data) * pose).act(np.zeros(3) if rng is None else solid.sample(rng))
-        inner = turn.target if rng is None else turn.sample(rng)
-        rotation = turn.reference.pose(self._data).rotation @ inner
-        return pin.SE3(rotation, at - rotation @ point.offset)
+        position, orientation = self.positions[0], self.orientations[0]
+        index = 0 if rng is None else int(rng.integers(len(position.regions)))
+        solid, pose = position.regions[index]
+        origin = (position.reference.pose(self._data) * pose).act(np.zeros(3) if rng is None else solid.sample(rng))
+        relative = orientation.target if rng is None else orientation.sample(rng)
+        rotation = orientation.reference.pose(self._data).rotation @ relative
+        return pin.SE3(rotation, origin - rotation @ position.offset)
 
     def bounds(self, indices: Index, positions: Array) -> tuple[Array, Array]:
-        """Returns the lower and upper values of the given joints that bounds and joint constraints leave.
+        """Returns the lower and upper values of the given joints within joint bounds and joint constraints.
 
-        For a joint without ends it is the turn nearest to `positions`. Lower is above upper where nothing is left.
+        A continuous joint gets the range nearest to `positions`. If the ranges do not overlap, lower exceeds upper.
         """
         lower, upper = self.model.lower.copy(), self.model.upper.copy()
         for item in self.joints:
             target = float(positions[item.index]) - item.deviation(positions)
             lower[item.index] = max(lower[item.index], target - item.below)
             upper[item.index] = min(upper[item.index], target + item.above)
-        chosen = np.asarray(indices, dtype=np.int64)
-        return lower[chosen], upper[chosen]
+        moving = np.asarray(indices, dtype=np.int64)
+        return lower[moving], upper[moving]
 
     def project(self, positions: Array, indices: Index, steps: int = 60) -> Array | None:
-        """Moves joints by least-squares steps until every constraint holds.
+        """Returns positions within bounds that satisfy all constraints, found by least-squares steps, or None.
 
         Args:
-            positions: where to begin.
-            indices: the joints that may move, as indices in a position vector; mimic joints follow theirs.
-            steps: how many steps to try.
-
-        Returns:
-            Positions within the joints' bounds that satisfy, or None where the steps did not get there.
+            positions: Initial positions.
+            indices: Indices of the moving joints in a position vector; mimic joints follow.
+            steps: Maximum number of steps.
         """
-        chosen = np.asarray(indices, dtype=np.int64)
-        lower, upper = self.bounds(chosen, positions)
+        moving = np.asarray(indices, dtype=np.int64)
+        lower, upper = self.bounds(moving, positions)
         if (lower > upper).any():
             return None
-        members = {int(number) for number in chosen}
+        leaders = {int(index) for index in moving}
         current = np.array(positions, dtype=float)
-        values = np.clip(current[chosen], lower, upper)
+        values = np.clip(current[moving], lower, upper)
         if not project(
-            self.arrays[0], drive_of(self.model, self.arrays[1], chosen, current), values, lower, upper, steps
+            self.arrays[0], joint_mapping(self.model, self.arrays[1], moving, current), values, lower, upper, steps
         ):
             return None
-        current[chosen] = values
-        return self.model.with_mimics(current, members)
+        current[moving] = values
+        return self.model.with_mimics(current, leaders)
 
     def sample(self, rng: np.random.Generator, positions: Array, indices: Index, attempts: int = 20) -> Array | None:
-        """Returns a random state that satisfies: random joint values, then `project`; None after the attempts.
+        """Returns the projection of a random state onto the constraints, or None.
 
         Args:
-            rng: source of random numbers.
-            positions: where the joints that do not move are.
-            indices: the joints that may move.
-            attempts: how many random states to try.
+            rng: Random generator.
+            positions: Positions of the fixed joints.
+            indices: Indices of the moving joints.
+            attempts: Maximum number of random states.
         """
-        chosen = np.asarray(indices, dtype=np.int64)
-        lower, upper = self.bounds(chosen, positions)
+        moving = np.asarray(indices, dtype=np.int64)
+        lower, upper = self.bounds(moving, positions)
         if (lower > upper).any():
             return None
-        middle = np.clip(positions[chosen], lower, upper)
-        low, high = np.maximum(lower, middle - 2.0 * np.pi), np.minimum(upper, middle + 2.0 * np.pi)
+        centre = np.clip(positions[moving], lower, upper)
+        low, high = np.maximum(lower, centre - 2.0 * np.pi), np.minimum(upper, centre + 2.0 * np.pi)
         for _ in range(attempts):
             state = np.array(positions, dtype=float)
-            state[chosen] = rng.uniform(low, high)
-            found = self.project(state, chosen)
-            if found is not None:
-                return found
+            state[moving] = rng.uniform(low, high)
+            state_found = self.project(state, moving)
+            if state_found is not None:
+                return state_found
         return None

@@ -213,7 +213,7 @@ class PlanningProblem:
             polyline: Joint vectors, shape (n, joints).
             step: Joint displacement between checked states [rad or m], at least that of the final validation.
         """
-        return self.constraints is None or self.constraints.edges_hold(
+        return self.constraints is None or self.constraints.edges_satisfied(
             self.motion.full_path(polyline), max(step, self.settings.motion_step)
         )
 

@@ -115,4 +115,4 @@ def _cut_along_constraints(problem: PlanningProblem, path: Array, deadline: floa
             problem.motion.edge_is_free(first, second, step) for first, second in pairwise(polyline)
         )
 
-    return cut_along(path, problem.constrained_motion(problem.step).way, is_valid, deadline, problem.rng)
+    return cut_along(path, problem.constrained_motion(problem.step).connect, is_valid, deadline, problem.rng)

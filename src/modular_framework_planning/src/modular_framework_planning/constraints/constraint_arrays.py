@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts constraints into the plain arrays that their compiled loops work on."""
+"""Conversion of constraints to the arrays of the compiled constraint checks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.constraints.compiled_constraints import (
-    BALL,
     BOX,
     CONE,
     CYLINDER,
@@ -17,8 +16,9 @@ from modular_framework_planning.constraints.compiled_constraints import (
     HULL,
     POINT,
     ROTATION_VECTOR,
-    Conditions,
-    Drive,
+    SPHERE,
+    ConstraintArrays,
+    JointMapping,
 )
 from modular_framework_planning.constraints.constraint_kinds import (
     FrameOnRobot,
@@ -40,33 +40,40 @@ from modular_framework_planning.kinematics.chain_model import tree_of
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 
-def arrays_of(
+def constraint_arrays(
     model: RobotModel,
     joints: Sequence[JointConstraint],
     positions: Sequence[PositionConstraint],
     orientations: Sequence[OrientationConstraint],
-) -> tuple[Conditions, NDArray[np.int64]]:
-    """Returns constraints as arrays, and the indices in a position vector of the joints they are about."""
+) -> tuple[ConstraintArrays, NDArray[np.int64]]:
+    """Returns constraints as arrays, and the indices in a position vector of the constrained joints.
+
+    Args:
+        model: Robot model.
+        joints: Joint constraints.
+        positions: Position constraints.
+        orientations: Orientation constraints.
+    """
     pairs = [(item.link, item.reference) for item in positions] + [(item.link, item.reference) for item in orientations]
     supports = [[_supports(model, frame) for frame in pair] for pair in pairs]
-    numbers = sorted(set[int]().union(*(frame for pair in supports for frame in pair)))
-    place = {0: -1, **{number: row for row, number in enumerate(numbers)}}
-    tree = tree_of(model, numbers)._replace(
-        parents=np.array([place[model.pin_model.parents[number]] for number in numbers], dtype=np.int64)
+    joint_ids = sorted(set[int]().union(*(frame for pair in supports for frame in pair)))
+    rows_by_joint = {0: -1, **{joint_id: row for row, joint_id in enumerate(joint_ids)}}
+    tree = tree_of(model, joint_ids)._replace(
+        parents=np.array([rows_by_joint[model.pin_model.parents[joint_id]] for joint_id in joint_ids], dtype=np.int64)
     )
     solids = [region for item in positions for region in item.regions]
     ends = np.cumsum([0, *(len(item.regions) for item in positions)])
     faces = [solid.faces if isinstance(solid, HullSolid) else np.empty((0, 4)) for solid, _ in solids]
     face_ends = np.cumsum([0, *(len(item) for item in faces)])
     no_region = np.zeros((len(orientations), 2))
-    conditions = Conditions(
+    constraints = ConstraintArrays(
         tree,
         _matrix([(item.target, item.below, item.above) for item in joints], 3),
         np.array([item.is_continuous for item in joints], dtype=bool),
         np.array([POINT] * len(positions) + [_kind(item) for item in orientations], dtype=np.int64),
-        np.array([[place[frame.joint] for frame in pair] for pair in pairs], dtype=np.int64).reshape(-1, 2),
-        np.array([*map(_point_placements, positions), *map(_turn_placements, orientations)]).reshape(-1, 2, 3, 4),
-        _matrix([[(n in link) - (n in other) for n in numbers] for link, other in supports], len(numbers)),
+        np.array([[rows_by_joint[frame.joint] for frame in pair] for pair in pairs], dtype=np.int64).reshape(-1, 2),
+        np.array([*map(_point_placements, positions), *map(_rotation_placements, orientations)]).reshape(-1, 2, 3, 4),
+        _matrix([[(n in link) - (n in other) for n in joint_ids] for link, other in supports], len(joint_ids)),
         _matrix([*([(0.0,) * 3] * len(positions)), *(item.tolerances for item in orientations)], 3),
         np.vstack([np.column_stack([ends[:-1], ends[1:]]), no_region]).astype(np.int64),
         np.array([_shape(solid)[0] for solid, _ in solids], dtype=np.int64),
@@ -75,39 +82,45 @@ def arrays_of(
         np.column_stack([face_ends[:-1], face_ends[1:]]).astype(np.int64),
         np.ascontiguousarray(np.vstack([np.empty((0, 4)), *faces])),
     )
-    return conditions, np.array([*(number - 1 for number in numbers), *(item.index for item in joints)], dtype=np.int64)
+    return constraints, np.array(
+        [*(joint_id - 1 for joint_id in joint_ids), *(item.index for item in joints)], dtype=np.int64
+    )
 
 
-def drive_of(model: RobotModel, columns: NDArray[np.int64], indices: NDArray[np.int64], positions: Array) -> Drive:
-    """Returns how joint vectors move the joints that conditions are about.
+def joint_mapping(
+    model: RobotModel, columns: NDArray[np.int64], indices: NDArray[np.int64], positions: Array
+) -> JointMapping:
+    """Returns the mapping of joint vectors to constrained joints, including mimic joints.
 
     Args:
-        model: the robot; its mimic joints follow.
-        columns: indices in a position vector of the joints that the conditions are about.
-        indices: the same of the joint vectors' joints.
-        positions: of the whole robot, for all other joints [rad or m].
+        model: Robot model.
+        columns: Indices of the constrained joints in a position vector.
+        indices: Indices of the joint vectors' joints in a position vector.
+        positions: Positions of the whole robot, for all other joints [rad or m].
     """
-    place = {int(number): column for column, number in enumerate(indices)}
+    rows_by_joint = {int(joint_id): column for column, joint_id in enumerate(indices)}
     followers = {follower: (leader, gain, offset) for follower, leader, gain, offset in model.mimics}
-    rows = []
+    mappings = []
     for index in columns.tolist():
         leader, gain, offset = followers.get(index, (index, 1.0, 0.0))
-        rows.append((place[leader], gain, offset) if leader in place else (-1, 1.0, float(positions[index])))
-    drivers, gains, offsets = zip(*rows, strict=True) if rows else ((), (), ())
-    return Drive(np.array(drivers, dtype=np.int64), np.array(gains, dtype=float), np.array(offsets, dtype=float))
+        mappings.append(
+            (rows_by_joint[leader], gain, offset) if leader in rows_by_joint else (-1, 1.0, float(positions[index]))
+        )
+    drivers, gains, offsets = zip(*mappings, strict=True) if mappings else ((), (), ())
+    return JointMapping(np.array(drivers, dtype=np.int64), np.array(gains, dtype=float), np.array(offsets, dtype=float))
 
 
-def whole_drive(columns: NDArray[np.int64]) -> Drive:
-    """Returns how positions of the whole robot, mimic joints included, move the joints that conditions are about."""
-    return Drive(columns, np.ones(len(columns)), np.zeros(len(columns)))
+def full_joint_mapping(columns: NDArray[np.int64]) -> JointMapping:
+    """Returns the mapping of positions of the whole robot, including mimic joints, to constrained joints."""
+    return JointMapping(columns, np.ones(len(columns)), np.zeros(len(columns)))
 
 
-def _matrix(rows: Sequence[Sequence[float] | Array], columns: int) -> Array:
-    return np.array(rows, dtype=float).reshape(len(rows), columns)
+def _matrix(mappings: Sequence[Sequence[float] | Array], columns: int) -> Array:
+    return np.array(mappings, dtype=float).reshape(len(mappings), columns)
 
 
 def _supports(model: RobotModel, frame: FrameOnRobot) -> set[int]:
-    return {int(number) for number in model.pin_model.supports[frame.joint] if number > 0}
+    return {int(joint_id) for joint_id in model.pin_model.supports[frame.joint] if joint_id > 0}
 
 
 def _kind(item: OrientationConstraint) -> int:
@@ -120,7 +133,7 @@ def _point_placements(item: PositionConstraint) -> list[Array]:
     return [link, reference]
 
 
-def _turn_placements(item: OrientationConstraint) -> list[Array]:
+def _rotation_placements(item: OrientationConstraint) -> list[Array]:
     link, reference = (frame.placement.homogeneous[:3].copy() for frame in (item.link, item.reference))
     if _kind(item) == EULER_ANGLES:
         reference[:, :3] = reference[:, :3] @ item.target
@@ -134,11 +147,11 @@ def _shape(solid: Solid) -> tuple[int, tuple[float, float, float]]:
         case BoxSolid():
             return BOX, (solid.x, solid.y, solid.z)
         case SphereSolid():
-            return BALL, (solid.radius, 0.0, 0.0)
+            return SPHERE, (solid.radius, 0.0, 0.0)
         case CylinderSolid():
             return CYLINDER, (solid.height, solid.radius, 0.0)
         case ConeSolid():
             return CONE, (solid.height, solid.radius, 0.0)
         case HullSolid():
             return HULL, (0.0, 0.0, 0.0)
-    raise TypeError(f"{type(solid).__name__} is no region; allowed are boxes, spheres, cylinders, cones and hulls")
+    raise TypeError(f"{type(solid).__name__} is not a region; allowed: boxes, spheres, cylinders, cones and hulls")
