@@ -266,13 +266,13 @@ def test_refusals_have_a_code_and_a_reason(
     cases = [
         (dataclasses.replace(line, start_velocities={"elbow_joint": 0.2}), ErrorCode.INVALID_ROBOT_STATE, "elbow"),
         (dataclasses.replace(line, cancelled=lambda: True), ErrorCode.PREEMPTED, "cancelled"),
-        (dataclasses.replace(line, goals=line.goals * 2), ErrorCode.INVALID_GOAL_CONSTRAINTS, "2 alternatives"),
+        (dataclasses.replace(line, goals=line.goals * 2), ErrorCode.INVALID_GOAL_CONSTRAINTS, "2 goals"),
         (dataclasses.replace(line, planner_id="RRT"), ErrorCode.PLANNING_FAILED, "PTP, LIN, CIRC"),
         (dataclasses.replace(line, velocity_scaling=1.5), ErrorCode.INVALID_MOTION_PLAN, "1.5"),
         (dataclasses.replace(line, velocity_scaling=1e-6), ErrorCode.INVALID_MOTION_PLAN, "larger scaling factors"),
         (dataclasses.replace(line, planner_id="PTP", velocity_scaling=1e-7), ErrorCode.INVALID_MOTION_PLAN, "points"),
         (lin(scene, moved(home, (0, 2.0, 0))), ErrorCode.NO_IK_SOLUTION, "out of reach"),
-        (circle, ErrorCode.INVALID_MOTION_PLAN, "neither 'center' nor 'interim'"),
+        (circle, ErrorCode.INVALID_MOTION_PLAN, "'center' or 'interim'"),
         (dataclasses.replace(circle, auxiliary_point=half), ErrorCode.INVALID_MOTION_PLAN, "half"),
         (dataclasses.replace(circle, auxiliary_point=flat), ErrorCode.INVALID_MOTION_PLAN, "one line"),
     ]

@@ -130,8 +130,8 @@ def test_a_centre_that_is_a_little_off_still_leads_exactly_to_the_goal() -> None
 @pytest.mark.parametrize(
     ("build", "goal", "point", "text"),
     [
-        (arc_around_centre, (-1, 0, 0), (0, 0, 0), "half or a full circle"),
-        (arc_around_centre, (1, 0, 0), (0, 0, 0), "half or a full circle"),
+        (arc_around_centre, (-1, 0, 0), (0, 0, 0), "for a half circle"),
+        (arc_around_centre, (1, 0, 0), (0, 0, 0), "for a half circle"),
         (arc_around_centre, (0, 1.02, 0), (0, 0, 0), "1.0000 m from the centre and goal 1.0200 m"),
         (arc_around_centre, (0, 1, 0), (1, 0, 0), "0.000000 m from start or goal"),
         (arc_through_interim, (1, 0, 0), (0, 1, 0), "two arcs"),
@@ -155,7 +155,7 @@ def test_limits_that_cannot_be_are_all_named() -> None:
     for text in (
         "max_trans_vel is 0.0",
         "max_trans_acc is nan",
-        "max_trans_dec is 5.0; a number below 0",
+        "max_trans_dec is 5.0; it must be a number below 0",
         "max_rot_vel is missing",
     ):
         assert text in caught.value.reason
