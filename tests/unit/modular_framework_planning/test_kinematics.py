@@ -18,7 +18,7 @@ from pose_difference import pose_difference
 
 from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.kinematics import compiled_kinematics
-from modular_framework_planning.kinematics.chain_model import tree_of
+from modular_framework_planning.kinematics.chain_model import joint_tree
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements, rotation_vector
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
 from modular_framework_planning.kinematics.kinematics_settings import NUMERIC, KinematicsSettings, settings_from
@@ -140,7 +140,7 @@ def test_stretched_and_aligned_postures_are_solved_too(
 
 def test_compiled_forward_kinematics_equals_the_library(model: RobotModel) -> None:
     rng = np.random.default_rng(7)
-    tree, out = tree_of(model), np.empty((len(model.joint_names), 3, 4))
+    tree, out = joint_tree(model), np.empty((len(model.joint_names), 3, 4))
     data = model.pin_model.createData()
     for _ in range(50):
         positions = rng.uniform(-3.0, 3.0, len(model.joint_names))
@@ -298,7 +298,7 @@ def test_warming_up_compiles_every_loop_for_the_types_it_is_used_with(model: Rob
     compiled_kinematics.warm_up()
     loops = [
         getattr(compiled_kinematics, name)
-        for name in ("polish", "search", "approach_seed", "unique_rows", "whole_turns", "joint_placements")
+        for name in ("polish", "search", "approach_seed", "unique_rows", "full_rotations", "joint_placements")
     ]
     before = [len(loop.signatures) for loop in loops]
     for robot, group in ((model, "arm"), (seven, "arm")):

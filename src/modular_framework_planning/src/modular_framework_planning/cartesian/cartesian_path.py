@@ -219,7 +219,7 @@ class _Line:
         stop, code = "", ErrorCode.SUCCESS
         for number in range(1, self.count + 1):
             try:
-                values = self._follower.step(rows[-1] + change, self._pose(number))
+                values = self._follower.solve(rows[-1] + change, self._pose(number))
             except PlanningError as error:
                 stop, code = error.reason, error.code
                 break

@@ -36,7 +36,7 @@ from modular_framework_planning.geometry.regions import (
     SphereSolid,
 )
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.kinematics.chain_model import tree_of
+from modular_framework_planning.kinematics.chain_model import joint_tree
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 
@@ -58,7 +58,7 @@ def constraint_arrays(
     supports = [[_supports(model, frame) for frame in pair] for pair in pairs]
     joint_ids = sorted(set[int]().union(*(frame for pair in supports for frame in pair)))
     rows_by_joint = {0: -1, **{joint_id: row for row, joint_id in enumerate(joint_ids)}}
-    tree = tree_of(model, joint_ids)._replace(
+    tree = joint_tree(model, joint_ids)._replace(
         parents=np.array([rows_by_joint[model.pin_model.parents[joint_id]] for joint_id in joint_ids], dtype=np.int64)
     )
     solids = [region for item in positions for region in item.regions]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Forward and inverse kinematics of groups and links."""
+"""Forward and inverse kinematics."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Closed-form inverse kinematics of six revolute joints, or of seven with one of them held at chosen values (EAIK)."""
+"""Closed-form inverse kinematics (EAIK) of six revolute joints, or of seven with one joint locked."""
 
 from __future__ import annotations
 
@@ -13,68 +13,74 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-PROBE = 0.37  # [rad]; a generic value, at which no two axes line up by chance
-MAX_KEPT = 4096  # solvers kept, one for each value of the held joint
+PROBE_ANGLE = 0.37  # generic angle at which no two axes align by chance [rad]
+MAX_CACHED_SOLVERS = 4096  # one solver per value of the locked joint
 
 
 class ClosedForm:
-    """Solves a chain whose joints are the group's joints and no other."""
+    """Solves a chain that consists of the group's joints only."""
 
     def __init__(self, model: RobotModel, group: JointGroup, base_link: str, last_link: str) -> None:
         """Reads axes and offsets of the chain from the model with all joints at zero.
 
+        Args:
+            model: Robot model.
+            group: Joints of the chain.
+            base_link: Link at the start of the chain.
+            last_link: Link at the end of the chain.
+
         Raises:
-            PlanningError: the chain has no known decomposition.
+            PlanningError: The chain has no known decomposition.
         """
         kinds = {model.document.joint_kinds[name] for name in group.joints}
         if len(group.joints) not in (6, 7) or not kinds <= {"revolute", "continuous"}:
             raise PlanningError(
                 ErrorCode.NO_IK_SOLUTION,
                 f"group '{group.name}': {len(group.joints)} joints of kind "
-                f"{', '.join(sorted(kinds))}; a closed form needs 6 or 7 revolute ones",
+                f"{', '.join(sorted(kinds))}; a closed form needs 6 or 7 revolute joints",
             )
         self._axes, self._offsets, self._rotation = _axes_and_offsets(model, group, base_link, last_link)
-        self.locked = self._choose_locked(group.name)
-        self._robots: dict[float, Any] = {}
+        self.locked_joint = self._choose_locked_joint(group.name)
+        self._solvers: dict[float, Any] = {}
 
-    def _choose_locked(self, name: str) -> int | None:
-        """Returns the joint to hold, the last one that leaves a solvable chain; None where none need be held."""
+    def _choose_locked_joint(self, name: str) -> int | None:
+        """Returns the last joint that can be locked to get a solvable chain; None if no joint needs to be locked."""
         choices = [None] if len(self._axes) == 6 else list(range(6, -1, -1))
-        for number in choices:
-            held = [] if number is None else [(number, PROBE)]
-            if HPRobot(self._axes, self._offsets, held).hasKnownDecomposition():
-                return number
+        for joint in choices:
+            locked_value = [] if joint is None else [(joint, PROBE_ANGLE)]
+            if HPRobot(self._axes, self._offsets, locked_value).hasKnownDecomposition():
+                return joint
         raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"group '{name}': no closed-form solution is known")
 
-    def solve(self, last_in_base: Transform, held: float = 0.0) -> Array:
-        """Returns candidate joint vectors, shape (k, joints); some are approximate: the caller refines and checks them.
+    def solve(self, last_in_base: Transform, locked_value: float = 0.0) -> Array:
+        """Returns candidate joint vectors, shape (k, joints), some of them approximate; the caller must refine them.
 
         Args:
-            last_in_base: pose of the chain's last link in the frame of its base link.
-            held: value of the held joint of a seven-joint chain [rad].
+            last_in_base: Pose of the last link in the frame of the base link.
+            locked_value: Value of the locked joint of a seven-joint chain [rad].
         """
         target = last_in_base.homogeneous.copy()
         target[:3, :3] = last_in_base.rotation @ self._rotation
-        found = np.asarray(self._robot(held).IK(target).Q, dtype=float).reshape(-1, len(self._axes))
-        return np.ascontiguousarray(found[np.isfinite(found).all(axis=1)])
+        solutions = np.asarray(self._solver(locked_value).IK(target).Q, dtype=float).reshape(-1, len(self._axes))
+        return np.ascontiguousarray(solutions[np.isfinite(solutions).all(axis=1)])
 
-    def _robot(self, held: float) -> Any:
-        key = 0.0 if self.locked is None else round(held, 9)
-        robot = self._robots.get(key)
-        if robot is None:
-            if len(self._robots) >= MAX_KEPT:
-                self._robots.clear()
-            robot = HPRobot(self._axes, self._offsets, [] if self.locked is None else [(self.locked, key)])
-            self._robots[key] = robot
-        return robot
+    def _solver(self, locked_value: float) -> Any:
+        key = 0.0 if self.locked_joint is None else round(locked_value, 9)
+        solver = self._solvers.get(key)
+        if solver is None:
+            if len(self._solvers) >= MAX_CACHED_SOLVERS:
+                self._solvers.clear()
+            solver = HPRobot(self._axes, self._offsets, [] if self.locked_joint is None else [(self.locked_joint, key)])
+            self._solvers[key] = solver
+        return solver
 
 
 def _axes_and_offsets(
     model: RobotModel, group: JointGroup, base_link: str, last_link: str
 ) -> tuple[Array, Array, Array]:
-    """Returns axes (n, 3) and steps between their points (n + 1, 3) in the base's frame, and the last link's rotation.
+    """Returns the axes (n, 3), the offsets between their points (n + 1, 3) and a rotation (3, 3), in the base frame.
 
-    The rotation, transposed, is what turns a pose of the last link into one of a tip that is not turned at zero.
+    The rotation converts a rotation of the last link to one of a tip that is aligned with the base at zero.
     """
     data = model.pin_model.createData()
     pin.computeJointJacobians(model.pin_model, data, model.with_mimics(np.zeros(len(model.joint_names))))
@@ -83,8 +89,8 @@ def _axes_and_offsets(
     tip = base * data.oMf[model.frame_ids[last_link]]
     axes, points = [], [np.zeros(3)]
     for name in group.joints:
-        number = model.pin_model.getJointId(name)
-        axes.append(base.rotation @ data.J[3:, model.pin_model.joints[number].idx_v])
-        points.append(base.act(data.oMi[number].translation))
+        joint = model.pin_model.getJointId(name)
+        axes.append(base.rotation @ data.J[3:, model.pin_model.joints[joint].idx_v])
+        points.append(base.act(data.oMi[joint].translation))
     points.append(tip.translation)
     return np.array(axes), np.diff(np.vstack(points), axis=0), tip.rotation.T.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Forward kinematics and least-squares inverse kinematics as compiled loops: a microsecond a state."""
+"""Compiled forward kinematics and least-squares inverse kinematics, about one microsecond per state."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from modular_framework_planning.geometry.spatial import Array
 
 POSE_SIZE = 6
 SMALL_ANGLE = 1.0e-8
-WIDEST_STEP = 0.5  # [rad or m]; of any joint in one step of the search
+MAX_STEP = 0.5  # maximum joint displacement in a step of the search [rad or m]
 
 
 class Tree(NamedTuple):
-    """Joints of one degree of freedom, parents before children.
+    """Joints with one degree of freedom, parents before children.
 
     Attributes:
-        parents: number of the joint each one hangs on, -1 for the planning frame; shape (n,).
-        placements: pose of the joint at zero in its parent's frame, rotation beside translation; shape (n, 3, 4).
-        axes: unit axis in the joint's own frame; shape (n, 3).
-        prismatic: whether it slides along the axis instead of turning about it; shape (n,).
+        parents: Index of the parent joint, -1 for the planning frame, shape (n,).
+        placements: Pose of each joint at zero in the parent's frame, shape (n, 3, 4).
+        axes: Unit axis in the joint frame, shape (n, 3).
+        prismatic: Whether the joint is prismatic instead of revolute, shape (n,).
     """
 
     parents: NDArray[np.int64]
@@ -33,13 +33,14 @@ class Tree(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """The way from the planning frame to a tip, driven by the joint values of a group.
+    """A kinematic chain from the planning frame to a tip, driven by the joint values of a group.
 
     Attributes:
-        tree: the joints on the way, each hanging on the one before.
-        tip: pose of the tip in the last joint's frame; shape (3, 4).
-        drivers: which group value moves each joint, -1 for none; gains: by how much; shape (n,).
-        offsets: value of each joint where all group values are 0; shape (n,).
+        tree: Joints of the chain, each the parent of the next.
+        tip: Pose of the tip in the last joint's frame, shape (3, 4).
+        drivers: Index of the group value that drives each joint, -1 for none, shape (n,).
+        gains: Gain of the group value, shape (n,).
+        offsets: Value of each joint if all group values are 0, shape (n,).
     """
 
     tree: Tree
@@ -50,8 +51,10 @@ class Chain(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _place(frames: Array, parent: int, a: float, b: float, c: float, column: int, out: Array, number: int) -> None:
-    """Writes the vector (a, b, c), given in a parent's frame, as a column of out[number]; column 3 is a point."""
+def _write_column(
+    frames: Array, parent: int, a: float, b: float, c: float, column: int, out: Array, index: int
+) -> None:
+    """Writes the vector (a, b, c) of a parent's frame as a column of out[index]; column 3 is a point."""
     for row in range(3):
         if parent < 0:
             value = a if row == 0 else (b if row == 1 else c)
@@ -59,7 +62,7 @@ def _place(frames: Array, parent: int, a: float, b: float, c: float, column: int
             value = frames[parent, row, 0] * a + frames[parent, row, 1] * b + frames[parent, row, 2] * c
             if column == 3:
                 value += frames[parent, row, 3]
-        out[number, row, column] = value
+        out[index, row, column] = value
 
 
 @njit(cache=True, nogil=True)
@@ -67,38 +70,56 @@ def joint_placements(tree: Tree, positions: Array, out: Array) -> None:
     """Computes the pose of every joint in the planning frame.
 
     Args:
-        tree: the joints.
-        positions: one value a joint [rad or m], mimic joints included.
-        out: filled; shape (n, 3, 4), rotation beside translation.
+        tree: Joints.
+        positions: Joint values, including mimic joints, shape (n,) [rad or m].
+        out: Output poses, shape (n, 3, 4).
     """
-    at, axes = tree.placements, tree.axes
-    for number in range(len(tree.parents)):
-        parent, value = tree.parents[number], positions[number]
-        x, y, z = axes[number, 0], axes[number, 1], axes[number, 2]
+    placements, axes = tree.placements, tree.axes
+    for index in range(len(tree.parents)):
+        parent, value = tree.parents[index], positions[index]
+        x, y, z = axes[index, 0], axes[index, 1], axes[index, 2]
         slide, sine, cosine = value, 0.0, 1.0
-        if not tree.prismatic[number]:
+        if not tree.prismatic[index]:
             slide, sine, cosine = 0.0, np.sin(value), np.cos(value)
-        rest = 1.0 - cosine
-        for column in range(4):  # columns of the joint's own turn (Rodrigues) or slide, carried into its parent's frame
+        one_minus_cosine = 1.0 - cosine
+        for column in range(4):  # rotation (Rodrigues) or translation of the joint, transformed to the parent's frame
             if column == 0:
-                a, b, c = cosine + x * x * rest, y * x * rest + z * sine, z * x * rest - y * sine
+                a, b, c = (
+                    cosine + x * x * one_minus_cosine,
+                    y * x * one_minus_cosine + z * sine,
+                    z * x * one_minus_cosine - y * sine,
+                )
             elif column == 1:
-                a, b, c = x * y * rest - z * sine, cosine + y * y * rest, z * y * rest + x * sine
+                a, b, c = (
+                    x * y * one_minus_cosine - z * sine,
+                    cosine + y * y * one_minus_cosine,
+                    z * y * one_minus_cosine + x * sine,
+                )
             elif column == 2:
-                a, b, c = x * z * rest + y * sine, y * z * rest - x * sine, cosine + z * z * rest
+                a, b, c = (
+                    x * z * one_minus_cosine + y * sine,
+                    y * z * one_minus_cosine - x * sine,
+                    cosine + z * z * one_minus_cosine,
+                )
             else:
                 a, b, c = slide * x, slide * y, slide * z
-            d = at[number, 0, 0] * a + at[number, 0, 1] * b + at[number, 0, 2] * c
-            e = at[number, 1, 0] * a + at[number, 1, 1] * b + at[number, 1, 2] * c
-            f = at[number, 2, 0] * a + at[number, 2, 1] * b + at[number, 2, 2] * c
+            d = placements[index, 0, 0] * a + placements[index, 0, 1] * b + placements[index, 0, 2] * c
+            e = placements[index, 1, 0] * a + placements[index, 1, 1] * b + placements[index, 1, 2] * c
+            f = placements[index, 2, 0] * a + placements[index, 2, 1] * b + placements[index, 2, 2] * c
             if column == 3:
-                d, e, f = d + at[number, 0, 3], e + at[number, 1, 3], f + at[number, 2, 3]
-            _place(out, parent, d, e, f, column, out, number)
+                d, e, f = d + placements[index, 0, 3], e + placements[index, 1, 3], f + placements[index, 2, 3]
+            _write_column(out, parent, d, e, f, column, out, index)
 
 
 @njit(cache=True, nogil=True)
 def rotation_vector(first: Array, second: Array, out: Array) -> None:
-    """Writes the rotation from `first` to `second` (leading 3 x 3 blocks) as a vector in the common frame [rad]."""
+    """Writes the rotation vector from `first` to `second` in their common frame [rad].
+
+    Args:
+        first: Pose or rotation, whose leading 3 x 3 block is used.
+        second: Pose or rotation, whose leading 3 x 3 block is used.
+        out: Output rotation vector, shape (3,).
+    """
     xx = second[0, 0] * first[0, 0] + second[0, 1] * first[0, 1] + second[0, 2] * first[0, 2]
     xy = second[0, 0] * first[1, 0] + second[0, 1] * first[1, 1] + second[0, 2] * first[1, 2]
     xz = second[0, 0] * first[2, 0] + second[0, 1] * first[2, 1] + second[0, 2] * first[2, 2]
@@ -117,7 +138,7 @@ def rotation_vector(first: Array, second: Array, out: Array) -> None:
         out[0], out[1], out[2] = scale * x, scale * y, scale * z
     elif cosine > 0.0:
         out[0], out[1], out[2] = 0.5 * x, 0.5 * y, 0.5 * z
-    else:  # half a turn: the axis is the longest column of turn + identity
+    else:  # rotation by pi, whose axis is the longest column of rotation + identity
         if xx >= yy and xx >= zz:
             out[0], out[1], out[2] = xx + 1.0, yx, zx
         elif yy >= zz:
@@ -133,51 +154,48 @@ def rotation_vector(first: Array, second: Array, out: Array) -> None:
 def pose_error(
     chain: Chain, values: Array, target: Array, jacobian: Array, error: Array, positions: Array, poses: Array
 ) -> float:
-    """Compares the tip with a target.
+    """Computes the pose error of the tip and the Jacobian; returns the norm of the error.
 
     Args:
-        chain: the joints from the planning frame to the tip.
-        values: the group's joint values [rad or m].
-        target: pose of the tip in the planning frame, shape (3, 4).
-        jacobian: filled; how the values move the tip, linear above angular, shape (6, group).
-        error: filled; what is missing to the target, linear [m] above angular [rad], shape (6,).
-        positions: working memory, shape (joints,).
-        poses: working memory, shape (joints + 1, 3, 4); the last one is the tip's pose.
-
-    Returns:
-        The length of the error.
+        chain: Joints from the planning frame to the tip.
+        values: Joint values of the group [rad or m].
+        target: Target pose of the tip in the planning frame, shape (3, 4).
+        jacobian: Output Jacobian, linear above angular, shape (6, group).
+        error: Output difference from tip to target, linear [m] above angular [rad], shape (6,).
+        positions: Working memory, shape (joints,).
+        poses: Working memory, shape (joints + 1, 3, 4); the last pose is the pose of the tip.
     """
     count = len(chain.drivers)
-    for number in range(count):
-        driver = chain.drivers[number]
-        positions[number] = chain.offsets[number]
+    for index in range(count):
+        driver = chain.drivers[index]
+        positions[index] = chain.offsets[index]
         if driver >= 0:
-            positions[number] += chain.gains[number] * values[driver]
+            positions[index] += chain.gains[index] * values[driver]
     joint_placements(chain.tree, positions, poses)
     end = chain.tip
     for column in range(4):
-        _place(poses, count - 1, end[0, column], end[1, column], end[2, column], column, poses, count)
+        _write_column(poses, count - 1, end[0, column], end[1, column], end[2, column], column, poses, count)
     tip = poses[count]
     for row in range(3):
         error[row] = target[row, 3] - tip[row, 3]
     rotation_vector(tip, target, error[3:])
     jacobian[:] = 0.0
-    for number in range(count):
-        driver, gain = chain.drivers[number], chain.gains[number]
+    for index in range(count):
+        driver, gain = chain.drivers[index], chain.gains[index]
         if driver < 0:
             continue
-        u, v, w = chain.tree.axes[number, 0], chain.tree.axes[number, 1], chain.tree.axes[number, 2]
-        x = poses[number, 0, 0] * u + poses[number, 0, 1] * v + poses[number, 0, 2] * w
-        y = poses[number, 1, 0] * u + poses[number, 1, 1] * v + poses[number, 1, 2] * w
-        z = poses[number, 2, 0] * u + poses[number, 2, 1] * v + poses[number, 2, 2] * w
-        if chain.tree.prismatic[number]:
+        u, v, w = chain.tree.axes[index, 0], chain.tree.axes[index, 1], chain.tree.axes[index, 2]
+        x = poses[index, 0, 0] * u + poses[index, 0, 1] * v + poses[index, 0, 2] * w
+        y = poses[index, 1, 0] * u + poses[index, 1, 1] * v + poses[index, 1, 2] * w
+        z = poses[index, 2, 0] * u + poses[index, 2, 1] * v + poses[index, 2, 2] * w
+        if chain.tree.prismatic[index]:
             jacobian[0, driver] += gain * x
             jacobian[1, driver] += gain * y
             jacobian[2, driver] += gain * z
         else:
-            a = poses[count, 0, 3] - poses[number, 0, 3]
-            b = poses[count, 1, 3] - poses[number, 1, 3]
-            c = poses[count, 2, 3] - poses[number, 2, 3]
+            a = poses[count, 0, 3] - poses[index, 0, 3]
+            b = poses[count, 1, 3] - poses[index, 1, 3]
+            c = poses[count, 2, 3] - poses[index, 2, 3]
             jacobian[0, driver] += gain * (y * c - z * b)
             jacobian[1, driver] += gain * (z * a - x * c)
             jacobian[2, driver] += gain * (x * b - y * a)
@@ -198,20 +216,20 @@ def damped_step(
     damping: float,
     free: NDArray[np.bool_],
     step: Array,
-    square: Array,
-    solved: Array,
+    factor: Array,
+    solution: Array,
 ) -> None:
     """Solves min |J step - error|^2 + damping |step|^2 over the free joints by a Cholesky factor of J J^T + damping.
 
     Args:
-        jacobian: J, shape (rows or more, joints).
-        error: shape (rows or more,).
-        rows: how many of them count.
-        damping: see above.
-        free: which joints may move, shape (joints,); the others get a step of 0.
-        step: filled, shape (joints,).
-        square: working memory, shape (rows or more, rows or more).
-        solved: working memory, shape (rows or more,).
+        jacobian: J, shape (>= rows, joints).
+        error: Error, shape (>= rows,).
+        rows: Number of rows to use.
+        damping: Damping factor.
+        free: Whether each joint may move, shape (joints,); fixed joints get a step of 0.
+        step: Output step, shape (joints,).
+        factor: Working memory, shape (>= rows, >= rows).
+        solution: Working memory, shape (>= rows,).
     """
     width = jacobian.shape[1]
     for row in range(rows):
@@ -220,45 +238,45 @@ def damped_step(
             for joint in range(width):
                 if free[joint]:
                     value += jacobian[row, joint] * jacobian[column, joint]
-            for inner in range(column):
-                value -= square[row, inner] * square[column, inner]
-            square[row, column] = np.sqrt(max(value, 1e-30)) if row == column else value / square[column, column]
+            for other in range(column):
+                value -= factor[row, other] * factor[column, other]
+            factor[row, column] = np.sqrt(max(value, 1e-30)) if row == column else value / factor[column, column]
     for row in range(rows):
         value = error[row]
-        for inner in range(row):
-            value -= square[row, inner] * solved[inner]
-        solved[row] = value / square[row, row]
+        for other in range(row):
+            value -= factor[row, other] * solution[other]
+        solution[row] = value / factor[row, row]
     for row in range(rows - 1, -1, -1):
-        value = solved[row]
-        for inner in range(row + 1, rows):
-            value -= square[inner, row] * solved[inner]
-        solved[row] = value / square[row, row]
+        value = solution[row]
+        for other in range(row + 1, rows):
+            value -= factor[other, row] * solution[other]
+        solution[row] = value / factor[row, row]
     for joint in range(width):
         step[joint] = 0.0
         if free[joint]:
             for row in range(rows):
-                step[joint] += jacobian[row, joint] * solved[row]
+                step[joint] += jacobian[row, joint] * solution[row]
 
 
 @njit(cache=True, nogil=True)
 def converge(
     chain: Chain, values: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int
 ) -> bool:
-    """Moves joint values, within bounds, until the tip is at the target; changes `values` in place.
+    """Moves joint values within bounds until the tip is at the target; returns whether it arrived.
 
     Args:
-        chain: the joints from the planning frame to the tip.
-        values: the group's joint values [rad or m].
-        target: pose of the tip in the planning frame, shape (3, 4).
-        lower: least values of the group's joints, shape (group,).
-        upper: largest values, shape (group,).
-        tolerance: length of the pose error to get below.
-        steps: how many steps to try.
+        chain: Joints from the planning frame to the tip.
+        values: Joint values of the group, changed in place [rad or m].
+        target: Target pose of the tip in the planning frame, shape (3, 4).
+        lower: Lower bounds of the group, shape (group,).
+        upper: Upper bounds of the group, shape (group,).
+        tolerance: Tolerance of the pose error norm.
+        steps: Maximum number of steps.
     """
     width = len(values)
-    jacobian, error, square = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
+    jacobian, error, factor = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
     positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
-    step, solved, free = np.empty(width), np.empty(POSE_SIZE), np.empty(width, dtype=np.bool_)
+    step, solution, free = np.empty(width), np.empty(POSE_SIZE), np.empty(width, dtype=np.bool_)
     for _ in range(steps):
         size = pose_error(chain, values, target, jacobian, error, positions, poses)
         if size < tolerance:
@@ -266,7 +284,7 @@ def converge(
         damping = min(1.0e-3, 0.1 * size * size) + 1.0e-14
         free[:] = True
         for _attempt in range(2):
-            damped_step(jacobian, error, POSE_SIZE, damping, free, step, square, solved)
+            damped_step(jacobian, error, POSE_SIZE, damping, free, step, factor, solution)
             blocked = False
             for joint in range(width):
                 if free[joint] and (
@@ -277,14 +295,14 @@ def converge(
                     blocked = True
             if not blocked:
                 break
-        widest = 1.0e-12
+        max_change = 1.0e-12
         for joint in range(width):
             if free[joint]:
-                widest = max(widest, abs(step[joint]))
-        share = min(1.0, WIDEST_STEP / widest)
+                max_change = max(max_change, abs(step[joint]))
+        scale = min(1.0, MAX_STEP / max_change)
         for joint in range(width):
             if free[joint]:
-                values[joint] = min(max(values[joint] + share * step[joint], lower[joint]), upper[joint])
+                values[joint] = min(max(values[joint] + scale * step[joint], lower[joint]), upper[joint])
     return bool(pose_error(chain, values, target, jacobian, error, positions, poses) < tolerance)
 
 
@@ -296,45 +314,56 @@ def polish(
     lower: Array,
     upper: Array,
     tolerance: float,
-    furthest: float,
+    max_error: float,
     steps: int,
 ) -> NDArray[np.bool_]:
-    """Drives approximate solutions to the target, in place; says which arrived.
+    """Refines approximate solutions in place; returns whether each of them arrived at the target.
 
     Args:
-        chain: the joints from the planning frame to the tip.
-        candidates: joint values, shape (k, group).
-        target: pose of the tip in the planning frame, shape (3, 4).
-        lower: least values of the group's joints, shape (group,).
-        upper: largest values, shape (group,).
-        tolerance: length of the pose error to get below.
-        furthest: pose error above which a candidate is not a solution at all.
-        steps: how many steps to try.
+        chain: Joints from the planning frame to the tip.
+        candidates: Joint values, changed in place, shape (k, group).
+        target: Target pose of the tip in the planning frame, shape (3, 4).
+        lower: Lower bounds of the group, shape (group,).
+        upper: Upper bounds of the group, shape (group,).
+        tolerance: Tolerance of the pose error norm.
+        max_error: Pose error norm above which a candidate is rejected.
+        steps: Maximum number of steps.
     """
     count, width = candidates.shape
     arrived = np.zeros(count, dtype=np.bool_)
     jacobian, error = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE)
     positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
-    for number in range(count):
-        size = pose_error(chain, candidates[number], target, jacobian, error, positions, poses)
-        if size < furthest:
-            arrived[number] = size < tolerance or converge(
-                chain, candidates[number], target, lower, upper, tolerance, steps
+    for index in range(count):
+        size = pose_error(chain, candidates[index], target, jacobian, error, positions, poses)
+        if size < max_error:
+            arrived[index] = size < tolerance or converge(
+                chain, candidates[index], target, lower, upper, tolerance, steps
             )
     return arrived
 
 
 @njit(cache=True, nogil=True)
 def search(
-    chain: Chain, starts: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int, most: int
+    chain: Chain, starts: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int, max_count: int
 ) -> NDArray[np.bool_]:
-    """Runs `converge` from each start, in place, until `most` have arrived; says which did."""
+    """Runs `converge` from each start until enough have arrived; returns whether each of them arrived.
+
+    Args:
+        chain: Joints from the planning frame to the tip.
+        starts: Initial joint values, changed in place, shape (k, group).
+        target: Target pose of the tip in the planning frame, shape (3, 4).
+        lower: Lower bounds of the group, shape (group,).
+        upper: Upper bounds of the group, shape (group,).
+        tolerance: Tolerance of the pose error norm.
+        steps: Maximum number of steps per start.
+        max_count: Number of solutions that ends the search.
+    """
     arrived = np.zeros(len(starts), dtype=np.bool_)
-    found = 0
-    for number in range(len(starts)):
-        arrived[number] = converge(chain, starts[number], target, lower, upper, tolerance, steps)
-        found += int(arrived[number])
-        if found >= most:
+    arrived_count = 0
+    for index in range(len(starts)):
+        arrived[index] = converge(chain, starts[index], target, lower, upper, tolerance, steps)
+        arrived_count += int(arrived[index])
+        if arrived_count >= max_count:
             break
     return arrived
 
@@ -343,11 +372,22 @@ def search(
 def approach_seed(
     chain: Chain, values: Array, seed: Array, target: Array, lower: Array, upper: Array, tolerance: float, steps: int
 ) -> None:
-    """Moves a solution of a redundant chain nearer to the seed while the tip stays; changes `values` in place."""
+    """Moves a solution of a redundant chain closer to the seed while the tip stays at the target.
+
+    Args:
+        chain: Joints from the planning frame to the tip.
+        values: Joint values of the group, changed in place [rad or m].
+        seed: Joint values to approach [rad or m].
+        target: Pose of the tip in the planning frame, shape (3, 4).
+        lower: Lower bounds of the group, shape (group,).
+        upper: Upper bounds of the group, shape (group,).
+        tolerance: Tolerance of the pose error norm.
+        steps: Maximum number of steps.
+    """
     width = len(values)
-    jacobian, error, square = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
+    jacobian, error, factor = np.empty((POSE_SIZE, width)), np.empty(POSE_SIZE), np.zeros((POSE_SIZE, POSE_SIZE))
     positions, poses = np.empty(len(chain.drivers)), np.empty((len(chain.drivers) + 1, 3, 4))
-    back, solved, free = np.empty(width), np.empty(POSE_SIZE), np.ones(width, dtype=np.bool_)
+    correction, solution, free = np.empty(width), np.empty(POSE_SIZE), np.ones(width, dtype=np.bool_)
     for _ in range(steps):
         pose_error(chain, values, target, jacobian, error, positions, poses)
         towards_seed = seed - values
@@ -355,16 +395,16 @@ def approach_seed(
             error[row] = 0.0
             for joint in range(width):
                 error[row] += jacobian[row, joint] * towards_seed[joint]
-        damped_step(jacobian, error, POSE_SIZE, 1.0e-9, free, back, square, solved)
+        damped_step(jacobian, error, POSE_SIZE, 1.0e-9, free, correction, factor, solution)
         trial = values.copy()
-        widest = 0.0
+        max_change = 0.0
         for joint in range(width):
-            move = towards_seed[joint] - back[joint]
-            widest = max(widest, abs(move))
+            move = towards_seed[joint] - correction[joint]
+            max_change = max(max_change, abs(move))
             trial[joint] = min(
                 max(values[joint] + move * min(1.0, 0.3 / max(abs(move), 1e-12)), lower[joint]), upper[joint]
             )
-        if widest < 1.0e-4 or not converge(chain, trial, target, lower, upper, tolerance, 8):
+        if max_change < 1.0e-4 or not converge(chain, trial, target, lower, upper, tolerance, 8):
             return
         if np.sum((trial - seed) ** 2) >= np.sum((values - seed) ** 2):
             return
@@ -372,78 +412,94 @@ def approach_seed(
 
 
 @njit(cache=True, nogil=True)
-def unique_rows(rows: Array, turning: NDArray[np.bool_], tolerance: float) -> NDArray[np.int64]:
-    """Returns the numbers of rows that differ from all earlier ones; turning joints are compared modulo a turn."""
+def unique_rows(rows: Array, is_revolute: NDArray[np.bool_], tolerance: float) -> NDArray[np.int64]:
+    """Returns the indices of the rows that differ from all previous rows.
+
+    Args:
+        rows: Joint vectors, shape (k, group).
+        is_revolute: Whether each joint is compared modulo 2 pi, shape (group,).
+        tolerance: Maximum joint difference of equal rows [rad or m].
+    """
     kept = np.empty(len(rows), dtype=np.int64)
     count = 0
-    for number in range(len(rows)):
-        fresh = True
+    for index in range(len(rows)):
+        is_new = True
         for earlier in range(count):
-            same = True
+            is_same = True
             for joint in range(rows.shape[1]):
-                gap = abs(rows[number, joint] - rows[kept[earlier], joint])
-                if turning[joint]:
-                    gap = abs(gap - 2.0 * np.pi * np.round(gap / (2.0 * np.pi)))
-                if gap > tolerance:
-                    same = False
+                difference = abs(rows[index, joint] - rows[kept[earlier], joint])
+                if is_revolute[joint]:
+                    difference = abs(difference - 2.0 * np.pi * np.round(difference / (2.0 * np.pi)))
+                if difference > tolerance:
+                    is_same = False
                     break
-            if same:
-                fresh = False
+            if is_same:
+                is_new = False
                 break
-        if fresh:
-            kept[count] = number
+        if is_new:
+            kept[count] = index
             count += 1
     return kept[:count]
 
 
 @njit(cache=True, nogil=True)
-def whole_turns(rows: Array, turning: NDArray[np.bool_], lower: Array, upper: Array, most: int) -> Array:
-    """Returns each row and what differs from it by whole turns of turning joints, within bounds; shape (n, group)."""
+def full_rotations(rows: Array, is_revolute: NDArray[np.bool_], lower: Array, upper: Array, max_count: int) -> Array:
+    """Returns all joint vectors within bounds that differ from a row by full rotations, shape (n, group).
+
+    Args:
+        rows: Joint vectors, shape (k, group).
+        is_revolute: Whether each joint is revolute, shape (group,).
+        lower: Lower bounds of the group, shape (group,).
+        upper: Upper bounds of the group, shape (group,).
+        max_count: Maximum number of returned vectors.
+    """
     width = rows.shape[1]
-    result = np.empty((most, width))
+    result = np.empty((max_count, width))
     count = 0
-    first, last, at = np.empty(width), np.empty(width), np.empty(width)
-    for number in range(len(rows)):
-        possible = True
+    first, last, current = np.empty(width), np.empty(width), np.empty(width)
+    for index in range(len(rows)):
+        is_possible = True
         for joint in range(width):
-            value = rows[number, joint]
+            value = rows[index, joint]
             first[joint] = last[joint] = value
-            if turning[joint]:
+            if is_revolute[joint]:
                 first[joint] = value + 2.0 * np.pi * np.ceil((lower[joint] - 1e-9 - value) / (2.0 * np.pi))
                 last[joint] = value + 2.0 * np.pi * np.floor((upper[joint] + 1e-9 - value) / (2.0 * np.pi))
-            possible &= lower[joint] - 1e-9 <= first[joint] <= last[joint] + 1e-9 and last[joint] <= upper[joint] + 1e-9
-        if not possible:
+            is_possible &= (
+                lower[joint] - 1e-9 <= first[joint] <= last[joint] + 1e-9 and last[joint] <= upper[joint] + 1e-9
+            )
+        if not is_possible:
             continue
-        at[:] = first
-        while count < most:
+        current[:] = first
+        while count < max_count:
             for joint in range(width):
-                result[count, joint] = min(max(at[joint], lower[joint]), upper[joint])
+                result[count, joint] = min(max(current[joint], lower[joint]), upper[joint])
             count += 1
             joint = 0
-            while joint < width and at[joint] + 2.0 * np.pi > last[joint] + 1e-6:
-                at[joint] = first[joint]
+            while joint < width and current[joint] + 2.0 * np.pi > last[joint] + 1e-6:
+                current[joint] = first[joint]
                 joint += 1
             if joint == width:
                 break
-            at[joint] += 2.0 * np.pi
+            current[joint] += 2.0 * np.pi
     return result[:count]
 
 
 def warm_up() -> None:
-    """Compiles every loop that is called from outside, or loads it from the cache."""
+    """Compiles the loops called from outside this module or loads them from the cache."""
     width = 7
-    at = np.tile(np.eye(3, 4), (width, 1, 1))
-    at[:, 2, 3] = 0.1
+    placements = np.tile(np.eye(3, 4), (width, 1, 1))
+    placements[:, 2, 3] = 0.1
     axes = np.eye(3)[np.arange(width) % 3]
-    tree = Tree(np.arange(-1, width - 1), at, axes, np.zeros(width, dtype=bool))
+    tree = Tree(np.arange(-1, width - 1), placements, axes, np.zeros(width, dtype=bool))
     chain = Chain(tree, np.eye(3, 4), np.arange(width), np.ones(width), np.zeros(width))
     values, bound, out = np.full(width, 0.2), np.full(width, 3.0), np.empty((width, 3, 4))
-    turning = np.ones(width, dtype=bool)
+    is_revolute = np.ones(width, dtype=bool)
     joint_placements(tree, values, out)
     target = out[-1].copy()
     rows = np.full((2, width), 0.21)
     polish(chain, rows, target, -bound, bound, 1.0e-8, 0.5, 2)
     search(chain, rows, target, -bound, bound, 1.0e-8, 2, 1)
     approach_seed(chain, values, rows[0], target, -bound, bound, 1.0e-8, 1)
-    unique_rows(rows, turning, 1.0e-5)
-    whole_turns(rows, turning, -bound, bound, 4)
+    unique_rows(rows, is_revolute, 1.0e-5)
+    full_rotations(rows, is_revolute, -bound, bound, 4)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics of a link: all closed-form solutions where there is a closed form, else a numeric search."""
+"""Inverse kinematics of a link: all solutions if a closed form exists, otherwise a numeric search."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from modular_framework_planning.kinematics.closed_form import ClosedForm
 from modular_framework_planning.kinematics.compiled_kinematics import (
     Chain,
     approach_seed,
+    full_rotations,
     polish,
     search,
     unique_rows,
-    whole_turns,
 )
 from modular_framework_planning.kinematics.kinematics_settings import (
     CLOSED_FORM,
@@ -33,22 +33,22 @@ from modular_framework_planning.kinematics.kinematics_settings import (
 from modular_framework_planning.robot_model.multi_dof_joint import UNBOUNDED_M
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-ACCURACY = 1.0e-8  # what the compiled steps are asked for
+ACCURACY = 1.0e-8  # tolerance of the pose error norm
 SAME_SOLUTION = 1.0e-5  # [rad or m]
-BOUND_SLACK = 0.05  # [rad]; how far out of bounds a candidate may be before it is polished
-COARSEST_SWEEP = 0.4  # [rad]; first step of the held joint of a seven-joint chain, halved while nothing is found
-FURTHEST_CANDIDATE = 0.5  # pose error of a closed-form candidate above which it is no solution
-MAX_TURNS = 4096
+BOUNDS_MARGIN = 0.05  # bounds violation of a candidate that polishing can correct [rad]
+INITIAL_SWEEP_STEP = 0.4  # step of the locked joint of a seven-joint chain, halved until a solution is found [rad]
+MAX_CANDIDATE_ERROR = 0.5  # pose error norm above which a closed-form candidate is rejected
+MAX_ROTATED_SOLUTIONS = 4096
 POLISH_STEPS, SEARCH_STEPS, APPROACH_STEPS = 10, 25, 20
-STARTS_A_BATCH = 4
+STARTS_PER_BATCH = 4
 MIN_BATCHES = 8  # tried even after the timeout, so that a busy machine does not report reachable poses as unreachable
-FRUITLESS_BATCHES = 32  # the numeric search ends after so many batches without a new solution
-ENOUGH, ENOUGH_REDUNDANT = 16, 8  # solutions of the numeric search
-APPROACHED = 4  # solutions of a redundant chain that are moved nearer to the seed
+MAX_FRUITLESS_BATCHES = 32  # consecutive batches without a new solution that end the numeric search
+MAX_SOLUTIONS, MAX_REDUNDANT_SOLUTIONS = 16, 8  # limits of the numeric search
+MAX_APPROACHED = 4  # solutions of a redundant chain that are moved closer to the seed
 
 
 class InverseKinematics:
-    """Solves for one group of the robot; safe to share between threads."""
+    """Inverse kinematics solver of a group; thread-safe."""
 
     def __init__(
         self,
@@ -63,32 +63,34 @@ class InverseKinematics:
                 "kinematics needs a chain from a base link to a tip link",
             )
         self.model, self.group, self.settings = model, group, settings
-        self._members = frozenset(int(number) for number in group.indices)
+        self._members = frozenset(int(joint_id) for joint_id in group.indices)
         self._last_link = model.document.joint_children[group.joints[-1]]
         self.base_link = model.document.joint_parents[group.joints[0]]
         self._chain = ChainModel(model, group, self._last_link)
-        self._turning = np.array([model.document.joint_kinds[name] != "prismatic" for name in group.joints])
-        self._is_continuous = np.array([model.is_continuous(int(number)) for number in group.indices])
-        self._closed = self._try_closed_form()
+        self._is_revolute = np.array([model.document.joint_kinds[name] != "prismatic" for name in group.joints])
+        self._is_continuous = np.array([model.is_continuous(int(joint_id)) for joint_id in group.indices])
+        self._closed_form = self._try_closed_form()
         self.reach = self._max_reach()
 
     @property
     def method(self) -> str:
-        """The method that solves: `NUMERIC`, `CLOSED_FORM` or `CLOSED_FORM_AND_SEARCH`."""
-        if self._closed is None:
+        """Inverse kinematics method: `NUMERIC`, `CLOSED_FORM` or `CLOSED_FORM_AND_SEARCH`."""
+        if self._closed_form is None:
             return NUMERIC
-        return CLOSED_FORM if self._closed.locked is None else CLOSED_FORM_AND_SEARCH
+        return CLOSED_FORM if self._closed_form.locked_joint is None else CLOSED_FORM_AND_SEARCH
 
     @property
-    def finds_all(self) -> bool:
-        """Whether no solution is missed: a closed form gives them all."""
-        return self._closed is not None and self._closed.locked is None and not self.settings.position_only
+    def is_complete(self) -> bool:
+        """Whether a closed form finds all solutions."""
+        return (
+            self._closed_form is not None and self._closed_form.locked_joint is None and not self.settings.position_only
+        )
 
     def _try_closed_form(self) -> ClosedForm | None:
-        between = [
+        chain_joints_between = [
             name for name in self.model.chain_joints(self.base_link, self._last_link) if name in self.model.index
         ]
-        if self.settings.solver == NUMERIC or between != list(self.group.joints):
+        if self.settings.solver == NUMERIC or chain_joints_between != list(self.group.joints):
             return None
         try:
             return ClosedForm(self.model, self.group, self.base_link, self._last_link)
@@ -96,31 +98,33 @@ class InverseKinematics:
             return None
 
     def _max_reach(self) -> float:
-        """Returns an upper bound of the distance from the first joint to the last joint's link [m]."""
+        """Returns an upper bound of the distance from the first joint to the last link [m]."""
         pin_model = self.model.pin_model
-        numbers = [pin_model.getJointId(name) for name in self.group.joints]
-        steps = sum(float(np.linalg.norm(pin_model.jointPlacements[number].translation)) for number in numbers[1:])
-        sliding = self.group.indices[~self._turning]
+        joint_ids = [pin_model.getJointId(name) for name in self.group.joints]
+        steps = sum(
+            float(np.linalg.norm(pin_model.jointPlacements[joint_id].translation)) for joint_id in joint_ids[1:]
+        )
+        sliding = self.group.indices[~self._is_revolute]
         return steps + float(np.maximum(np.abs(self.model.lower), np.abs(self.model.upper))[sliding].sum())
 
     def tip_offset(self, tip_link: str, positions: Array) -> Transform:
-        """Returns the pose of the last joint's link in the frame of a tip; only fixed and passive joints lie between.
+        """Returns the pose of the chain's last link in the frame of a tip link.
 
         Args:
-            tip_link: name of the tip.
-            positions: of the whole robot, for the passive joints, which stay there [rad or m].
+            tip_link: Tip link, connected to the last link by fixed and passive joints only.
+            positions: Positions of the whole robot, for the passive joints [rad or m].
 
         Raises:
-            UnknownNameError: no such link.
-            PlanningError: a joint that is not passive moves the link relative to the end of the chain.
+            UnknownNameError: The link does not exist.
+            PlanningError: An active joint moves the tip link relative to the last link.
         """
         if not self.model.has_link(tip_link):
             raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", tip_link, self.model.frame_ids)
         if not self.model.is_carried(tip_link, self._last_link):
             raise PlanningError(
                 ErrorCode.NO_IK_SOLUTION,
-                f"link '{tip_link}' is not rigidly fixed to "
-                f"'{self._last_link}', the end of group '{self.group.name}'; choose a link that is",
+                f"link '{tip_link}' is not rigidly fixed to '{self._last_link}', the last link of group "
+                f"'{self.group.name}'; choose a link that is rigidly fixed to it",
             )
         tip, last = (self.model.pin_model.frames[self.model.frame_ids[name]] for name in (tip_link, self._last_link))
         if tip.parentJoint == last.parentJoint:
@@ -140,35 +144,35 @@ class InverseKinematics:
         """Returns all solutions found, as positions of the whole robot, nearest to the seed first.
 
         Args:
-            tip_link: link to bring to the target; see tip_offset.
-            target: pose of the link in the planning frame.
-            seed: positions of the whole robot [rad or m]; joints outside the group stay there.
-            timeout_s: time the search may take where there is no closed form; the group's by default. With
-                math.inf only the numbers of tries bound the search.
-            rng: source of restarts of the numeric search.
-            bounds: lower and upper bounds of the group's joints [rad or m]; those of the robot by default.
+            tip_link: Link to bring to the target, see tip_offset.
+            target: Target pose of the link in the planning frame.
+            seed: Positions of the whole robot, kept by joints outside the group [rad or m].
+            timeout_s: Timeout of the numeric search [s]; None for the group's timeout, math.inf to bound the search by
+                the number of attempts only.
+            rng: Random generator of the numeric search.
+            bounds: Lower and upper bounds of the group's joints [rad or m]; None for the bounds of the robot.
         """
         problem = self._problem(target * self.tip_offset(tip_link, seed), seed, timeout_s, bounds)
-        found = self._from_closed_form(problem)
-        if not len(found):
-            found = self._from_search(problem, rng or np.random.default_rng(0))
-        return self._ranked(problem, found)
+        solutions = self._from_closed_form(problem)
+        if not len(solutions):
+            solutions = self._from_search(problem, rng or np.random.default_rng(0))
+        return self._ranked(problem, solutions)
 
     def position_solutions(
         self, tip_link: str, point: Array, position: Array, seed: Array, timeout_s: float | None = None
     ) -> list[Array]:
-        """As `solutions`, for the position of a point alone; the orientation is left open, and kept where it can be.
+        """Returns solutions that place a point of a link at a position; the seed's orientation is kept if possible.
 
         Args:
-            tip_link: link that carries the point; see tip_offset.
-            point: in the link's frame (3,) [m].
-            position: where the point shall be, in the planning frame (3,) [m].
-            seed: as for `solutions`.
-            timeout_s: as for `solutions`.
+            tip_link: Link with the point, see tip_offset.
+            point: Point in the link frame, shape (3,) [m].
+            position: Target position in the planning frame, shape (3,) [m].
+            seed: Positions of the whole robot, see `solutions`.
+            timeout_s: Timeout of the numeric search, see `solutions`.
         """
         joint = self.tip_offset(tip_link, seed).inverse() * pin.SE3(np.eye(3), np.asarray(point, dtype=float))
-        turn = self.model.link_transforms(seed)[tip_link].rotation
-        target = pin.SE3(turn, np.asarray(position, dtype=float))
+        rotation = self.model.link_transforms(seed)[tip_link].rotation
+        target = pin.SE3(rotation, np.asarray(position, dtype=float))
         problem = self._problem(target, seed, timeout_s).with_ball_joint(joint)
         return self._ranked(problem, self._from_search(problem, np.random.default_rng(0)))
 
@@ -179,109 +183,120 @@ class InverseKinematics:
         timeout_s: float | None = None,
         bounds: tuple[Array, Array] | None = None,
     ) -> _Problem:
-        allowed = self.settings.total_timeout_s if timeout_s is None else timeout_s
+        timeout = self.settings.total_timeout_s if timeout_s is None else timeout_s
         return _Problem(
-            self._chain.at(seed),
+            self._chain.with_positions(seed),
             target,
             np.asarray(seed, dtype=float),
             np.array(seed[self.group.indices], dtype=float),
             *self._bounds(target, seed, bounds),
-            self._turning,
-            time.monotonic() + allowed,
+            self._is_revolute,
+            time.monotonic() + timeout,
         )
 
     def _bounds(self, target: Transform, seed: Array, bounds: tuple[Array, Array] | None) -> tuple[Array, Array]:
-        """Returns the bounds of the group's joints; those without ends get three turns around the seed.
+        """Returns the bounds of the group's joints; continuous joints get a range of three rotations around the seed.
 
-        A base without bounds gets twice the way from where the end of the chain is to the target, and two metres.
+        An unbounded base may move by twice the distance between the end of the chain and the target, plus two metres.
         """
         values = seed[self.group.indices]
         lower, upper = bounds or (self.model.lower[self.group.indices], self.model.upper[self.group.indices])
         reach = np.where(self._is_continuous, 3.0 * np.pi, np.inf)
-        endless = ~self._is_continuous & (upper >= UNBOUNDED_M)
-        if endless.any():
+        is_unbounded = ~self._is_continuous & (upper >= UNBOUNDED_M)
+        if is_unbounded.any():
             gap = target.translation - self.model.link_transforms(seed)[self._last_link].translation
-            reach[endless] = 2.0 * float(np.linalg.norm(gap)) + 2.0
+            reach[is_unbounded] = 2.0 * float(np.linalg.norm(gap)) + 2.0
         return np.maximum(lower, values - reach), np.minimum(upper, values + reach)
 
     def _from_closed_form(self, problem: _Problem) -> Array:
-        """Returns the closed form's solutions within bounds, whole turns included, shape (k, joints)."""
-        if self._closed is None:
+        """Returns the closed-form solutions within bounds, including full rotations, shape (k, joints)."""
+        if self._closed_form is None:
             return np.empty((0, len(self.group.joints)))
         base = (
             self.model.link_transforms(problem.full_seed)[self.base_link]
-            if not self._chain.is_own
+            if not self._chain.is_independent
             else (self._fixed_base())
         )
         in_base = base.actInv(problem.target)
-        if self._closed.locked is None:
-            return self._polished(problem, self._closed.solve(in_base))
-        half = 0.5 * (time.monotonic() + problem.deadline)  # the other half of the time is for the numeric search
-        step, found = COARSEST_SWEEP, np.empty((0, len(self.group.joints)))
-        tried: Array = np.empty(0)
-        while not len(found) and step >= self.settings.search_resolution and time.monotonic() < half:
-            values = np.setdiff1d(self._held_values(problem, step), tried)
-            tried = np.concatenate([tried, values])
-            found = self._polished(problem, np.vstack([self._closed.solve(in_base, value) for value in values]))
+        if self._closed_form.locked_joint is None:
+            return self._polished(problem, self._closed_form.solve(in_base))
+        sweep_deadline = 0.5 * (
+            time.monotonic() + problem.deadline
+        )  # the second half of the time is for the numeric search
+        step, solutions = INITIAL_SWEEP_STEP, np.empty((0, len(self.group.joints)))
+        tried_values: Array = np.empty(0)
+        while not len(solutions) and step >= self.settings.search_resolution and time.monotonic() < sweep_deadline:
+            values = np.setdiff1d(self._locked_values(problem, step), tried_values)
+            tried_values = np.concatenate([tried_values, values])
+            solutions = self._polished(
+                problem, np.vstack([self._closed_form.solve(in_base, value) for value in values])
+            )
             step *= 0.5
-        return found
+        return solutions
 
     def _fixed_base(self) -> Transform:
         frame = self.model.pin_model.frames[self.model.frame_ids[self.base_link]]
         return frame.placement
 
-    def _held_values(self, problem: _Problem, step: float) -> Array:
-        """Returns values of the held joint: the seed's, and a grid over its bounds."""
-        assert self._closed is not None and self._closed.locked is not None
-        number = self._closed.locked
-        at, low, high = problem.seed[number], problem.lower[number], problem.upper[number]
-        if self._is_continuous[number]:
-            low, high = at - np.pi, at + np.pi
+    def _locked_values(self, problem: _Problem, step: float) -> Array:
+        """Returns values of the locked joint: a grid over its bounds, and the value of the seed."""
+        assert self._closed_form is not None and self._closed_form.locked_joint is not None
+        joint_id = self._closed_form.locked_joint
+        seed_value, low, high = problem.seed[joint_id], problem.lower[joint_id], problem.upper[joint_id]
+        if self._is_continuous[joint_id]:
+            low, high = seed_value - np.pi, seed_value + np.pi
         grid = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
-        return np.append(grid, np.clip(at, low, high))
+        return np.append(grid, np.clip(seed_value, low, high))
 
     def _polished(self, problem: _Problem, candidates: Array) -> Array:
-        """Returns the candidates that Newton steps bring to the target, without those that are out of bounds."""
-        excess = candidates - (problem.upper + BOUND_SLACK)
-        lowered = candidates - np.where(self._turning, 2.0 * np.pi * np.ceil(excess / (2.0 * np.pi)), 0.0)
-        candidates = candidates[(lowered >= problem.lower - BOUND_SLACK).all(axis=1)]
+        """Returns the refined candidates that are at the target and within bounds, including full rotations."""
+        excess = candidates - (problem.upper + BOUNDS_MARGIN)
+        wrapped = candidates - np.where(self._is_revolute, 2.0 * np.pi * np.ceil(excess / (2.0 * np.pi)), 0.0)
+        candidates = candidates[(wrapped >= problem.lower - BOUNDS_MARGIN).all(axis=1)]
         if not len(candidates):
             return candidates
-        endless = np.full(candidates.shape[1], np.inf)
+        is_unbounded = np.full(candidates.shape[1], np.inf)
         arrived = polish(
-            problem.chain, candidates, problem.pose, -endless, endless, ACCURACY, FURTHEST_CANDIDATE, POLISH_STEPS
+            problem.chain,
+            candidates,
+            problem.pose,
+            -is_unbounded,
+            is_unbounded,
+            ACCURACY,
+            MAX_CANDIDATE_ERROR,
+            POLISH_STEPS,
         )
         rows = candidates[arrived]
-        rows = rows[unique_rows(rows, self._turning, SAME_SOLUTION)]
-        return whole_turns(rows, self._turning, problem.lower, problem.upper, MAX_TURNS)
+        rows = rows[unique_rows(rows, self._is_revolute, SAME_SOLUTION)]
+        return full_rotations(rows, self._is_revolute, problem.lower, problem.upper, MAX_ROTATED_SOLUTIONS)
 
     def _from_search(self, problem: _Problem, rng: Generator) -> Array:
-        """Searches from the seed, then from random positions, until there are enough, no new ones, or no time left."""
-        reach = np.where(problem.turning, 2.0 * np.pi, np.inf)
+        """Returns solutions of searches from the seed and from random positions, up to a number or a timeout."""
+        reach = np.where(problem.is_revolute, 2.0 * np.pi, np.inf)
         lower, upper = np.maximum(problem.lower, problem.seed - reach), np.minimum(problem.upper, problem.seed + reach)
-        found = np.empty((0, len(lower)))
-        fruitless, batches, enough = 0, 0, ENOUGH if len(lower) <= 6 else ENOUGH_REDUNDANT
+        solutions = np.empty((0, len(lower)))
+        fruitless, batches, max_solutions = 0, 0, MAX_SOLUTIONS if len(lower) <= 6 else MAX_REDUNDANT_SOLUTIONS
         starts = np.clip(problem.seed, lower, upper)[None, :]
-        while fruitless < FRUITLESS_BATCHES and len(found) < enough:
-            arrived = search(problem.chain, starts, problem.pose, lower, upper, ACCURACY, SEARCH_STEPS, enough)
-            rows = np.vstack([found, starts[arrived]])
-            rows = rows[unique_rows(rows, problem.turning, SAME_SOLUTION)]
-            fruitless = fruitless + 1 if len(rows) == len(found) else 0
-            found, batches = rows, batches + 1
-            if time.monotonic() > problem.deadline and (len(found) or batches >= MIN_BATCHES):
+        while fruitless < MAX_FRUITLESS_BATCHES and len(solutions) < max_solutions:
+            arrived = search(problem.chain, starts, problem.pose, lower, upper, ACCURACY, SEARCH_STEPS, max_solutions)
+            rows = np.vstack([solutions, starts[arrived]])
+            rows = rows[unique_rows(rows, problem.is_revolute, SAME_SOLUTION)]
+            fruitless = fruitless + 1 if len(rows) == len(solutions) else 0
+            solutions, batches = rows, batches + 1
+            if time.monotonic() > problem.deadline and (len(solutions) or batches >= MIN_BATCHES):
                 break
-            starts = rng.uniform(lower, upper, (STARTS_A_BATCH, len(lower)))
-        return whole_turns(found, problem.turning, problem.lower, problem.upper, MAX_TURNS)
+            starts = rng.uniform(lower, upper, (STARTS_PER_BATCH, len(lower)))
+        return full_rotations(solutions, problem.is_revolute, problem.lower, problem.upper, MAX_ROTATED_SOLUTIONS)
 
-    def _ranked(self, problem: _Problem, found: Array) -> list[Array]:
-        """Puts the nearest to the seed first; returns positions of the whole robot."""
-        if not len(found):
+    def _ranked(self, problem: _Problem, solutions: Array) -> list[Array]:
+        """Returns solutions as positions of the whole robot, nearest to the seed first."""
+        if not len(solutions):
             return []
-        rows = found[np.argsort(np.linalg.norm(found - problem.seed, axis=1), kind="stable")]
+        rows = solutions[np.argsort(np.linalg.norm(solutions - problem.seed, axis=1), kind="stable")]
         if rows.shape[1] > 6:
             rows = self._approached(problem, rows)
         if rows.shape[1] > min(6, len(self.group.joints)):
-            rows = rows[:, : len(self.group.joints)]  # without those of a ball joint
+            rows = rows[:, : len(self.group.joints)]  # removes the columns of a ball joint
             distances = np.linalg.norm(rows - problem.seed[: rows.shape[1]], axis=1)
             rows = rows[np.argsort(distances, kind="stable")]
         result = np.tile(problem.full_seed, (len(rows), 1))
@@ -293,9 +308,9 @@ class InverseKinematics:
 
     @staticmethod
     def _approached(problem: _Problem, rows: Array) -> Array:
-        """Adds solutions of a redundant chain that were moved nearer to the seed."""
-        nearer = rows[:APPROACHED].copy()
-        for values in nearer:
+        """Returns the solutions of a redundant chain with copies moved closer to the seed added."""
+        approached = rows[:MAX_APPROACHED].copy()
+        for values in approached:
             approach_seed(
                 problem.chain,
                 values,
@@ -306,32 +321,38 @@ class InverseKinematics:
                 ACCURACY,
                 APPROACH_STEPS,
             )
-        rows = np.vstack([nearer, rows])
+        rows = np.vstack([approached, rows])
         rows = rows[unique_rows(rows, np.zeros(rows.shape[1], dtype=bool), SAME_SOLUTION)]
         return rows[np.argsort(np.linalg.norm(rows - problem.seed, axis=1), kind="stable")]
 
     def explain_unreachable(self, tip_link: str, target: Transform, seed: Array) -> str:
-        """Says why a pose has no solution: too far away, or only out of joint bounds."""
+        """Explains why a pose has no solution: out of reach, or impossible within joint bounds.
+
+        Args:
+            tip_link: Link to bring to the target.
+            target: Target pose of the link in the planning frame.
+            seed: Positions of the whole robot [rad or m].
+        """
         transforms = self.model.link_transforms(seed)
         last = target * self.tip_offset(tip_link, seed)
         shoulder = transforms[self.model.document.joint_children[self.group.joints[0]]]
         distance = float(np.linalg.norm(last.translation - shoulder.translation))
-        where = np.array2string(target.translation, precision=3, separator=", ")
+        position = np.array2string(target.translation, precision=3, separator=", ")
         if distance > self.reach:
             return (
-                f"no inverse kinematics for '{tip_link}' at {where} m: out of reach, '{self._last_link}' would be "
-                f"{distance:.3f} m from the shoulder and the arm reaches at most {self.reach:.3f} m"
+                f"no inverse kinematics for '{tip_link}' at {position} m: out of reach, because '{self._last_link}' "
+                f"would be {distance:.3f} m from the shoulder and the arm reaches at most {self.reach:.3f} m"
             )
         return (
-            f"no inverse kinematics for '{tip_link}' at {where} m: '{self._last_link}' would be {distance:.3f} m "
+            f"no inverse kinematics for '{tip_link}' at {position} m: '{self._last_link}' would be {distance:.3f} m "
             f"from the shoulder (at most {self.reach:.3f} m), but no joint positions within the bounds of group "
-            f"'{self.group.name}' give this orientation there"
+            f"'{self.group.name}' reach this orientation"
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Problem:
-    """One pose to solve: the last link's target, the seed of the whole robot and of the group, the group's bounds."""
+    """Target pose of the last link, seeds of the whole robot and of the group, and bounds of the group."""
 
     chain: Chain
     target: Transform
@@ -339,7 +360,7 @@ class _Problem:
     seed: Array
     lower: Array
     upper: Array
-    turning: NDArray[np.bool_]
+    is_revolute: NDArray[np.bool_]
     deadline: float
     pose: Array = field(init=False)
 
@@ -347,7 +368,7 @@ class _Problem:
         object.__setattr__(self, "pose", np.ascontiguousarray(self.target.homogeneous[:3]))
 
     def with_ball_joint(self, joint: Transform) -> _Problem:
-        """Returns the problem with a ball joint, at a pose in the last link's frame, that takes up the orientation."""
+        """Returns the problem with a ball joint, at a pose in the last link's frame, that frees the orientation."""
         reach = np.full(3, np.pi / BALL_GAIN)
         return replace(
             self,
@@ -355,19 +376,19 @@ class _Problem:
             seed=np.append(self.seed, np.zeros(3)),
             lower=np.append(self.lower, -reach),
             upper=np.append(self.upper, reach),
-            turning=np.append(self.turning, np.zeros(3, dtype=bool)),
+            is_revolute=np.append(self.is_revolute, np.zeros(3, dtype=bool)),
         )
 
 
 class KinematicsPool:
-    """Builds the solver of each group once."""
+    """Creates the kinematics solver of each group once."""
 
     def __init__(self, model: RobotModel, settings: Mapping[str, KinematicsSettings] | None = None) -> None:
-        """Stores what solvers are built from.
+        """Stores the arguments.
 
         Args:
-            model: the robot.
-            settings: by name of the group.
+            model: Robot model.
+            settings: Kinematics settings, keyed by group name.
         """
         self._model = model
         self._settings = dict(settings or {})

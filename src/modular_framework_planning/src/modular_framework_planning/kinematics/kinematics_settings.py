@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How each group's inverse kinematics is solved: the contents of kinematics.yaml."""
+"""Inverse kinematics settings of the groups, as in kinematics.yaml."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from modular_framework_planning.errors import ErrorCode, PlanningError
 
 NUMERIC, CLOSED_FORM, CLOSED_FORM_AND_SEARCH = "numeric", "closed form", "closed form and search"
-"""The methods of inverse kinematics. With the last, the value of one joint of a redundant chain is searched for."""
+"""Inverse kinematics methods. The last one searches over the value of a joint of a redundant chain."""
 PLUGINS = (
     "kdl_kinematics_plugin/KDLKinematicsPlugin",
     "lma_kinematics_plugin/LMAKinematicsPlugin",
@@ -24,7 +24,7 @@ PLUGINS = (
     "pr2_arm_kinematics/PR2ArmKinematicsPlugin",
     *(f"ur_kinematics/UR{name}KinematicsPlugin" for name in ("3", "5", "10")),
 )
-"""Public plugins of MoveIt, whose configuration files run here unchanged: the framework's own methods solve."""
+"""Public MoveIt plugins, accepted so that their configuration files run unchanged; none of them is loaded."""
 KEYS = (
     "kinematics_solver",
     "kinematics_solver_search_resolution",
@@ -36,9 +36,9 @@ _PLUGIN = re.compile(r"\w+/\w+")
 
 
 def is_known_solver(name: str) -> bool:
-    """Returns whether a name may stand in kinematics.yaml.
+    """Checks whether kinematics.yaml may contain a solver name.
 
-    A plugin that is not in `PLUGINS` may be somebody's own, unless its package or its class is one of theirs.
+    A plugin outside `PLUGINS` can be user-defined, unless its package or its class is part of `PLUGINS`.
     """
     if name in ("", NUMERIC, *PLUGINS) or name.endswith("IKFastKinematicsPlugin"):
         return True
@@ -50,7 +50,7 @@ def is_known_solver(name: str) -> bool:
 
 
 def unknown_solver_text(name: str) -> str:
-    """Returns the message about a name for which `is_known_solver` is false."""
+    """Returns the error message for a name that `is_known_solver` rejects."""
     return (
         f"there is no kinematics_solver '{name}'; allowed: {', '.join((NUMERIC, *PLUGINS))}, or PACKAGE/CLASS of "
         "another plugin"
@@ -59,15 +59,14 @@ def unknown_solver_text(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class KinematicsSettings:
-    """Kinematics settings of one group; the keys of kinematics.yaml without their prefix.
+    """Kinematics settings of a group, named as in kinematics.yaml without prefix.
 
     Attributes:
-        solver: A name of `is_known_solver`; "numeric" leaves closed forms out.
-        search_resolution: step of the held joint of a seven-joint chain [rad].
-        timeout_s: time one attempt of the numeric search may take, where a request gives none.
-        attempts: how many such times.
-        position_only: whether compute_ik and pose goals bring the link's origin to the position and leave the
-            orientation open.
+        solver: A solver name accepted by `is_known_solver`; "numeric" disables closed forms.
+        search_resolution: Step of the locked joint of a seven-joint chain [rad].
+        timeout_s: Default timeout of an attempt of the numeric search [s].
+        attempts: Number of attempts.
+        position_only: Whether compute_ik and pose goals ignore the orientation.
     """
 
     solver: str = ""
@@ -82,28 +81,28 @@ class KinematicsSettings:
                 ErrorCode.FAILURE,
                 f"kinematics.yaml: kinematics_solver_search_resolution is "
                 f"{self.search_resolution}, kinematics_solver_timeout is {self.timeout_s}, "
-                f"kinematics_solver_attempts is {self.attempts}; allowed are numbers above 0, and "
-                "whole attempts",
+                f"kinematics_solver_attempts is {self.attempts}; all must be above 0, and the attempts "
+                "a whole number",
             )
 
     @property
     def total_timeout_s(self) -> float:
-        """Time of all attempts."""
+        """Total timeout of all attempts [s]."""
         return self.timeout_s * self.attempts
 
 
 def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSettings]:
-    """Reads the contents of kinematics.yaml: a mapping from group to its keys.
+    """Returns the settings in the contents of kinematics.yaml, keyed by group.
 
     Raises:
-        PlanningError: a group's entry is not a mapping, or a value is not a number above 0.
+        PlanningError: The entry of a group is not a mapping, or a value is invalid.
     """
     result = {}
     for group, entry in parameters.items():
         if not isinstance(entry, Mapping):
             raise PlanningError(
                 ErrorCode.FAILURE,
-                f"kinematics.yaml: '{group}' is {entry!r}; a mapping with kinematics_solver and its keys is needed",
+                f"kinematics.yaml: '{group}' is {entry!r}; it must be a mapping with kinematics_solver and its keys",
             )
         solver = str(entry.get("kinematics_solver", ""))
         if not is_known_solver(solver):
@@ -120,8 +119,8 @@ def settings_from(parameters: Mapping[str, object]) -> dict[str, KinematicsSetti
         except (TypeError, ValueError) as error:
             raise PlanningError(
                 ErrorCode.FAILURE,
-                f"kinematics.yaml: '{group}': {error}; numbers above 0 are "
-                "needed, and for position_only_ik true or false",
+                f"kinematics.yaml: '{group}': {error}; position_only_ik must be true or false, all other values "
+                "numbers above 0",
             ) from error
     return result
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Follows a path of link poses with joint positions that do not jump: inverse kinematics by continuation.
+"""Inverse kinematics by continuation: follows a path of link poses without joint jumps.
 
-Each step starts from the joint positions before it and solves for the nearest solution by Newton's method, so the arm
-never changes its posture on the way. Where it cannot go on, the error says which joint would have to jump or leave its
-bounds, or that the pose is out of reach.
+Each step starts from the previous joint positions and finds the nearest solution by Newton's method, so that the arm
+keeps its posture. If the path cannot be followed, the error names the joint that would jump or leave its bounds, or
+states that the pose is out of reach.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-POSE_TOLERANCE = 1.0e-9  # [m] and [rad] together
-ACCEPTED_ERROR = 1.0e-7  # where rounding keeps Newton's method from the tolerance above
+POSE_TOLERANCE = 1.0e-9  # tolerance of the pose error norm [m and rad]
+ACCEPTED_ERROR = 1.0e-7  # accepted error if rounding keeps Newton's method from POSE_TOLERANCE
 NEWTON_STEPS = 25
-MAX_JUMP = 0.3  # [rad or m] between a step's guess and its solution
-MAX_TRAVEL = 1.5  # [rad or m] Newton's method may go before it is given up
+MAX_JUMP = 0.3  # maximum difference between a guess and its solution [rad or m]
+MAX_TRAVEL = 1.5  # maximum joint displacement before Newton's method counts as diverged [rad or m]
 BOUND_TOLERANCE = 1.0e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkMotion:
-    """Velocity and acceleration of a link in the planning frame: shape (6,), linear before angular.
+    """Velocity and acceleration of a link in the planning frame, linear before angular.
 
     Attributes:
-        velocity: [m/s, rad/s].
-        acceleration: [m/s^2, rad/s^2].
+        velocity: Spatial velocity, shape (6,) [m/s, rad/s].
+        acceleration: Spatial acceleration, shape (6,) [m/s^2, rad/s^2].
     """
 
     velocity: Array
@@ -41,18 +41,18 @@ class LinkMotion:
 
 
 class PoseFollower:
-    """Follows poses of one link with the joints of one group; not thread-safe."""
+    """Follows poses of a link with the joints of a group; not thread-safe."""
 
     def __init__(self, solver: InverseKinematics, link: str, rest: Array) -> None:
         """Prepares the working memory.
 
         Args:
-            solver: inverse kinematics of the group.
-            link: at the end of the group's chain, see InverseKinematics.tip_offset.
-            rest: positions of the whole robot; those outside the group stay.
+            solver: Kinematics solver of the group.
+            link: Link at the end of the group's chain, see InverseKinematics.tip_offset.
+            rest: Positions of the whole robot, for joints outside the group [rad or m].
 
         Raises:
-            PlanningError: the link does not exist or is not rigid to the chain's end.
+            PlanningError: The link does not exist or is not rigidly fixed to the end of the chain.
         """
         solver.tip_offset(link, rest)
         self.model: RobotModel = solver.model
@@ -60,7 +60,7 @@ class PoseFollower:
         self.link = link
         self._solver = solver
         self._rest = np.array(rest, dtype=float)
-        self._members = frozenset(int(number) for number in self.group.indices)
+        self._members = frozenset(int(index) for index in self.group.indices)
         self._followers = [
             (follower, self.group.joints.index(self.model.joint_names[leader]), multiplier)
             for follower, leader, multiplier, _ in self.model.mimics
@@ -70,51 +70,51 @@ class PoseFollower:
         self._data = self.model.pin_model.createData()
 
     def full_positions(self, values: Array) -> Array:
-        """Returns positions of the whole robot for joint values of the group."""
+        """Returns the positions of the whole robot for joint values of the group."""
         positions = self._rest.copy()
         positions[self.group.indices] = values
         return self.model.with_mimics(positions, self._members) if self._followers else positions
 
     def pose(self, values: Array) -> Transform:
-        """Returns the link's pose in the planning frame."""
+        """Returns the link pose in the planning frame."""
         pin.framesForwardKinematics(self.model.pin_model, self._data, self.full_positions(values))
         return self._data.oMf[self._frame].copy()
 
     def _jacobian(self, positions: Array, frame: Any) -> Array:
-        """Returns the link's Jacobian of the group's joints and leaves the link's placement in the data."""
+        """Returns the link's Jacobian over the group's joints, and updates the link's placement in the data."""
         pin.computeJointJacobians(self.model.pin_model, self._data, positions)
         pin.updateFramePlacement(self.model.pin_model, self._data, self._frame)
         jacobian = pin.getFrameJacobian(self.model.pin_model, self._data, self._frame, frame)
-        chosen = np.array(jacobian[:, self.group.indices])
+        columns = np.array(jacobian[:, self.group.indices])
         for follower, leader, multiplier in self._followers:
-            chosen[:, leader] += multiplier * jacobian[:, follower]
-        return chosen
+            columns[:, leader] += multiplier * jacobian[:, follower]
+        return columns
 
     @property
     def is_redundant(self) -> bool:
-        """Whether the group has more joints than a pose determines."""
+        """Whether the group has more than six joints."""
         return len(self.group.joints) > 6
 
-    def step(self, guess: Array, target: Transform, wanted: Array | None = None) -> Array:
+    def solve(self, guess: Array, target: Transform, preferred: Array | None = None) -> Array:
         """Returns joint values that bring the link to a pose.
 
         Args:
-            guess: where the joints are expected; a solution further than 0.3 rad (or m) from it is a jump.
-            target: pose in the planning frame.
-            wanted: posture a redundant arm keeps nearest to; the guess by default.
+            guess: Expected joint values; a solution farther away than MAX_JUMP is a jump.
+            target: Target pose in the planning frame.
+            preferred: Preferred posture of a redundant arm; None for the guess.
 
         Raises:
-            PlanningError: NO_IK_SOLUTION with the joint that would jump or leave its bounds, or why there is none.
+            PlanningError: NO_IK_SOLUTION, with the joint that would jump or leave its bounds, or with the reason.
         """
-        values = self._newton(wanted if wanted is not None and self.is_redundant else guess, target)
+        values = self._newton(preferred if preferred is not None and self.is_redundant else guess, target)
         if values is None:
             values = self._nearest_solution(guess, target)
         jump = np.abs(values - guess)
         if jump.max() > MAX_JUMP:
-            number = int(jump.argmax())
+            index = int(jump.argmax())
             raise self._refusal(
-                f"joint '{self.group.joints[number]}' would jump from {guess[number]:.3f} to "
-                f"{values[number]:.3f}, because the arm is near a singular posture"
+                f"joint '{self.group.joints[index]}' would jump from {guess[index]:.3f} to "
+                f"{values[index]:.3f}, because the arm is near a singular posture"
             )
         problems = self.model.bound_violations(self.full_positions(values), self.group.indices, BOUND_TOLERANCE)
         if problems:
@@ -122,10 +122,10 @@ class PoseFollower:
         return np.clip(values, self.model.lower[self.group.indices], self.model.upper[self.group.indices])
 
     def _refusal(self, reason: str) -> PlanningError:
-        return PlanningError(ErrorCode.NO_IK_SOLUTION, f"'{self.link}' cannot go on along the path: {reason}")
+        return PlanningError(ErrorCode.NO_IK_SOLUTION, f"'{self.link}' cannot follow the path: {reason}")
 
     def _newton(self, guess: Array, target: Transform) -> Array | None:
-        """Solves from the guess by damped least squares; None where it does not converge."""
+        """Returns the solution of damped least squares from a guess, or None if it does not converge."""
         values, size = guess, np.inf
         for _ in range(NEWTON_STEPS):
             jacobian = self._jacobian(self.full_positions(values), pin.ReferenceFrame.LOCAL)
@@ -147,27 +147,31 @@ class PoseFollower:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, self._solver.explain_unreachable(self.link, target, seed))
         return np.asarray(found[0][self.group.indices], dtype=float)
 
-    def rates(
-        self, values: Array, motion: LinkMotion, wanted: tuple[Array, Array] | None = None
+    def joint_rates(
+        self, values: Array, motion: LinkMotion, preferred: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
-        """Returns joint velocities and accelerations that give the link a velocity and an acceleration.
+        """Returns the joint velocities and accelerations of a link motion.
 
         Args:
-            values: joint values of the moment.
-            motion: of the link.
-            wanted: velocities and accelerations a redundant arm keeps nearest to; rest by default.
+            values: Joint values.
+            motion: Velocity and acceleration of the link.
+            preferred: Preferred joint velocities and accelerations of a redundant arm; None for zero.
         """
         model, data, positions = self.model.pin_model, self._data, self.full_positions(values)
         world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobian = self._jacobian(positions, world)
         inverse = np.linalg.pinv(jacobian)
         rest = np.zeros(len(values))
-        speeds, changes = wanted if wanted is not None and self.is_redundant else (rest, rest)
-        velocities = speeds + inverse @ (motion.velocity - jacobian @ speeds)
-        rates = np.zeros(model.nv)
-        rates[self.group.indices] = velocities
+        preferred_velocities, preferred_accelerations = (
+            preferred if preferred is not None and self.is_redundant else (rest, rest)
+        )
+        velocities = preferred_velocities + inverse @ (motion.velocity - jacobian @ preferred_velocities)
+        all_velocities = np.zeros(model.nv)
+        all_velocities[self.group.indices] = velocities
         for follower, leader, multiplier in self._followers:
-            rates[follower] = multiplier * velocities[leader]
-        pin.forwardKinematics(model, data, positions, rates, np.zeros(model.nv))
+            all_velocities[follower] = multiplier * velocities[leader]
+        pin.forwardKinematics(model, data, positions, all_velocities, np.zeros(model.nv))
         drift: Any = pin.getFrameClassicalAcceleration(model, data, self._frame, world)
-        return velocities, changes + inverse @ (motion.acceleration - drift.vector - jacobian @ changes)
+        return velocities, preferred_accelerations + inverse @ (
+            motion.acceleration - drift.vector - jacobian @ preferred_accelerations
+        )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Chooses an inverse kinematics solution: the nearest free one; of equally near ones that with the most clearance."""
+"""Choice of an inverse kinematics solution by distance from the seed and by clearance."""
 
 from __future__ import annotations
 
@@ -10,13 +10,18 @@ import numpy as np
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.inverse_kinematics import SAME_SOLUTION
 
-SIMILAR = 0.1  # [rad]; distances from the seed that differ by less are decided by clearance
+SIMILAR_DISTANCE = 0.1  # difference of seed distances below which the clearance decides [rad]
 
 
-def first_free(candidates: list[Array], is_free: Callable[[Array], bool], most: int = 1) -> list[Array]:
-    """Returns the first candidates that are free, in their order.
+def first_free(candidates: list[Array], is_free: Callable[[Array], bool], max_count: int = 1) -> list[Array]:
+    """Returns the first free candidates.
 
-    A whole turn of a joint leads to the same posture, so each posture is checked once.
+    Candidates that differ by full rotations have the same posture, which is checked once.
+
+    Args:
+        candidates: Joint vectors in order of preference.
+        is_free: Checks that a joint vector is free.
+        max_count: Maximum number of returned candidates.
     """
     verdicts: dict[bytes, bool] = {}
     free: list[Array] = []
@@ -26,18 +31,23 @@ def first_free(candidates: list[Array], is_free: Callable[[Array], bool], most: 
             verdicts[key] = is_free(values)
         if verdicts[key]:
             free.append(values)
-            if len(free) >= most:
+            if len(free) >= max_count:
                 break
     return free
 
 
 def clearest(free: list[Array], seed: Array, clearance: Callable[[Array], float]) -> Array:
-    """Returns, of free solutions ordered by distance from the seed, the nearest one.
+    """Returns the solution nearest to the seed or, among similarly near solutions, the one with the largest clearance.
 
-    Of several that are about as near as it, the one furthest from obstacles is taken.
+    Args:
+        free: Free solutions, nearest to the seed first.
+        seed: Joint vector of the seed.
+        clearance: Returns the clearance of a solution.
     """
     distances = [float(np.linalg.norm(values - seed)) for values in free]
-    similar = [values for values, distance in zip(free, distances, strict=True) if distance <= distances[0] + SIMILAR]
+    similar = [
+        values for values, distance in zip(free, distances, strict=True) if distance <= distances[0] + SIMILAR_DISTANCE
+    ]
     if len(similar) == 1 or distances[0] < SAME_SOLUTION:
         return free[0]
     return max(similar, key=clearance)

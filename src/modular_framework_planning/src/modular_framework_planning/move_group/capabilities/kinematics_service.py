@@ -99,7 +99,7 @@ class KinematicsService(MoveGroupCapability):
             free = first_free(kept, checker.is_free, MAX_COMPARED)
             if free:
                 return clearest(free, scene.positions, checker.distance)
-        if not all(solver.finds_all for solver in solvers):
+        if not all(solver.is_complete for solver in solvers):
             end_s = begun + (
                 sum(solver.settings.total_timeout_s for solver in solvers) if timeout_s is None else timeout_s
             )

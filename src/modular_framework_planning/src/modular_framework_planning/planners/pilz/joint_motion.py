@@ -165,10 +165,10 @@ def _advance(
     guess = state.positions + gap_s * (state.velocities + 0.5 * gap_s * state.accelerations)
     target = posture(time_s) if posture else None
     try:
-        values = follower.step(guess, motion.pose(time_s), target.positions if target else None)
+        values = follower.solve(guess, motion.pose(time_s), target.positions if target else None)
     except PlanningError as error:
         raise PlanningError(error.code, f"{error.reason} (after {time_s:.3f} of {motion.duration_s:.3f} s)") from error
-    velocities, accelerations = follower.rates(
+    velocities, accelerations = follower.joint_rates(
         values, link_motion(motion, time_s), (target.velocities, target.accelerations) if target else None
     )
     return JointState(values, velocities, accelerations)
