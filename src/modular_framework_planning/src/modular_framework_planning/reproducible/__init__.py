@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans that a seed repeats bit for bit."""
+"""Bitwise reproducible planning with seeds."""

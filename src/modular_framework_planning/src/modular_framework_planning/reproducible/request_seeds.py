@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names requests by what they ask, so that their seeds do not depend on the sequence in which threads send them."""
+"""Request digests, so that seeds do not depend on the order in which threads send requests."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modular_framework_planning.planning_interface.planning_request import Joint
 
 
 def request_digest(request: PlanningRequest) -> str:
-    """Returns a text that differs where group, start, goals or planner of two requests do."""
+    """Returns a digest of the group, start, goals and planner of a request."""
     digest = hashlib.sha256(np.asarray(request.scene.positions, dtype=float).tobytes())
     for text in (request.group, request.pipeline_id, request.planner_id, *map(_goal_text, request.goals)):
         digest.update(f"\0{text}".encode())
@@ -31,9 +31,9 @@ def _goal_text(goal: object) -> str:
 
 
 class RequestCounts:
-    """Counts how often the same was asked; starts again once time goes back, as with a simulation that begins again.
+    """Counts equal requests, so that a repeated request gets a different seed; thread-safe.
 
-    Threads may share it. A request that is repeated gets another number, so that it is not planned the same way again.
+    The counts are reset if time goes back, as after the restart of a simulation.
     """
 
     def __init__(self) -> None:
@@ -42,16 +42,16 @@ class RequestCounts:
         self._lock = threading.Lock()
 
     def count(self, digest: str, time_s: float) -> int:
-        """Returns how often this was asked before.
+        """Returns the number of equal requests before.
 
         Args:
-            digest: names what is asked.
-            time_s: time of the ROS clock [s].
+            digest: Digest of the request.
+            time_s: Time of the ROS clock [s].
         """
         with self._lock:
             if time_s < self._last_s:
                 self._counts.clear()
             self._last_s = time_s
-            number = self._counts[digest]
+            count = self._counts[digest]
             self._counts[digest] += 1
-            return number
+            return count

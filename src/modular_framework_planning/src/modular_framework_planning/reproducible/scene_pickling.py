@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serialises requests for a process with the same robot: without the robot model and without built geometry."""
+"""Serialisation of requests for a process with the same robot, without robot model and built geometry."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def _shape(kind: type[Shape], values: dict[str, Any]) -> Shape:
 
 
 class _Pickler(pickle.Pickler):
-    """Leaves out what the other process already has or builds itself."""
+    """Omits data that the receiving process already has or builds."""
 
     def persistent_id(self, item: Any) -> str | None:
-        """Names the robot model instead of writing it."""
+        """Replaces the robot model by an id."""
         return ROBOT if isinstance(item, RobotModel) else None
 
     def reducer_override(self, item: Any) -> Any:
@@ -39,7 +39,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Puts the robot model of this process in."""
+    """Inserts the robot model of this process."""
 
     def __init__(self, stream: io.BytesIO, model: RobotModel) -> None:
         super().__init__(stream)
@@ -48,17 +48,17 @@ class _Unpickler(pickle.Unpickler):
     def persistent_load(self, name: str) -> RobotModel:
         """Returns the robot model."""
         if name != ROBOT:
-            raise pickle.UnpicklingError(f"'{name}' is not known; only '{ROBOT}' is left out of the bytes")
+            raise pickle.UnpicklingError(f"unknown persistent id '{name}'; allowed: '{ROBOT}'")
         return self._model
 
 
 def to_bytes(item: object) -> bytes:
-    """Writes requests, scenes and answers."""
+    """Serialises a request, scene or result."""
     stream = io.BytesIO()
     _Pickler(stream, protocol=pickle.HIGHEST_PROTOCOL).dump(item)
     return stream.getvalue()
 
 
 def from_bytes(data: bytes, model: RobotModel) -> Any:
-    """Reads what `to_bytes` of a process with the same robot wrote."""
+    """Deserialises the output of `to_bytes` from a process with the same robot."""
     return _Unpickler(io.BytesIO(data), model).load()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans that a seed repeats bit for bit: each runs in a process of its own that starts from the same state."""
+"""Seeded planning: each request runs in a new process that starts from the same state."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 WORKER = "modular_framework_planning.reproducible.seeded_worker"
 POLL_S = 0.02
 START_TIMEOUT_S = 300.0
-GRACE_S = 30.0  # after the allowed time, before a child that does not answer is given up
+GRACE_S = 30.0  # time after the allowed planning time in which the child process must answer
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
 
 
@@ -36,14 +36,14 @@ def _never() -> bool:
 
 
 class SeededPlanning:
-    """Sends requests to the worker process, which is started for the first one; threads may share it."""
+    """Client of the worker process, which is started by the first request; thread-safe."""
 
     def __init__(self, model: RobotModel, specs: Sequence[PipelineSpec]) -> None:
-        """Stores what the worker will build.
+        """Stores the setup of the worker.
 
         Args:
-            model: the robot.
-            specs: of the pipelines.
+            model: Robot model.
+            specs: Specifications of the pipelines.
         """
         self._model, self._specs = model, tuple(specs)
         self._lock = threading.Lock()
@@ -52,39 +52,38 @@ class SeededPlanning:
         self._address = ""
 
     def plan(self, pipeline: PlanningPipeline, request: PlanningRequest, seed: int) -> PlanningAnswer:
-        """Plans in a fresh process.
+        """Plans in a new process; equal requests, scenes and seeds give equal trajectories.
 
         Args:
-            pipeline: one of those the specs describe; its settings and those of its planners of now are used.
-            request: what to plan.
-            seed: 0 or more; the same request, scene and seed give the same trajectory.
+            pipeline: Pipeline of a stored specification, whose current settings are used.
+            request: Planning request.
+            seed: Random seed, at least 0.
 
         Raises:
-            PlanningError: as the pipeline; or the process does not start or dies.
+            PlanningError: Planning failed, or the process did not start or crashed.
         """
         if seed < 0:
-            raise PlanningError(ErrorCode.FAILURE, f"seed is {seed}; allowed is 0 or more")
+            raise PlanningError(ErrorCode.FAILURE, f"seed is {seed}; it must be at least 0")
         connection = self._connect()
         try:
             configurations = pipeline.configurations.snapshot()
-            asked = (pipeline.name, pipeline.settings, configurations, seed, replace(request, cancelled=_never))
-            connection.send_bytes(to_bytes(asked))
+            message = (pipeline.name, pipeline.settings, configurations, seed, replace(request, cancelled=_never))
+            connection.send_bytes(to_bytes(message))
             self._wait(connection, request)
-            found = from_bytes(connection.recv_bytes(), self._model)
+            result = from_bytes(connection.recv_bytes(), self._model)
         except (EOFError, OSError) as error:
             raise PlanningError(
                 ErrorCode.CRASH,
-                f"the process of a seeded plan ended without an answer ({error}); "
-                "its output is in the log of this node",
+                f"the process of a seeded plan ended without a result ({error}); its output is in the log of this node",
             ) from error
         finally:
             connection.close()
-        if isinstance(found, PlanningError):
-            raise found
-        return found
+        if isinstance(result, PlanningError):
+            raise result
+        return result
 
     def start(self) -> None:
-        """Starts the worker process and waits until it is ready; raises PlanningError when it does not start."""
+        """Starts the worker process and waits until it is ready; raises PlanningError if it does not start."""
         with self._lock:
             if self._process is not None and self._process.poll() is None:
                 return
@@ -92,7 +91,9 @@ class SeededPlanning:
             self._folder = tempfile.TemporaryDirectory(prefix="seeded_planning_")
             self._address = str(Path(self._folder.name) / "socket")
             setup = WorkerSetup(self._model.source, self._specs, tuple(sys.path), self._address)
-            data = pickle.dumps(tuple(sys.path)) + pickle.dumps(setup)  # the classes of the setup are found by the path
+            data = pickle.dumps(tuple(sys.path)) + pickle.dumps(
+                setup
+            )  # the path is needed to load the classes of the setup
             self._process = subprocess.Popen(
                 [sys.executable, "-m", WORKER],
                 stdin=subprocess.PIPE,
@@ -107,12 +108,12 @@ class SeededPlanning:
                 self._stop()
                 raise PlanningError(
                     ErrorCode.CRASH,
-                    "the process for seeded plans did not get ready within "
+                    "the process for seeded plans was not ready within "
                     f"{START_TIMEOUT_S:.0f} s; its output is in the log of this node",
                 )
 
     def close(self) -> None:
-        """Ends the worker process; may be called twice."""
+        """Stops the worker process; may be called twice."""
         with self._lock:
             self._stop()
 
@@ -139,18 +140,18 @@ class SeededPlanning:
             raise PlanningError(ErrorCode.CRASH, f"the process for seeded plans cannot be reached: {error}") from error
 
     def _wait(self, connection: Connection, request: PlanningRequest) -> None:
-        """Returns when an answer begins to arrive; raises PlanningError when the caller gives up before."""
-        end = time.monotonic() + request.allowed_time_s + GRACE_S
-        begun = time.monotonic()
+        """Waits for a result; raises PlanningError on cancellation or timeout."""
+        end_s = time.monotonic() + request.allowed_time_s + GRACE_S
+        start_s = time.monotonic()
         while True:
             if request.cancelled():
                 raise PlanningError(
-                    ErrorCode.PREEMPTED, f"planning was cancelled after {time.monotonic() - begun:.2f} s"
+                    ErrorCode.PREEMPTED, f"planning was cancelled after {time.monotonic() - start_s:.2f} s"
                 )
-            if time.monotonic() > end:
+            if time.monotonic() > end_s:
                 raise PlanningError(
                     ErrorCode.TIMED_OUT,
-                    f"the process of a seeded plan gave no answer within {request.allowed_time_s + GRACE_S:.0f} s",
+                    f"the process of a seeded plan sent no result within {request.allowed_time_s + GRACE_S:.0f} s",
                 )
             if connection.poll(POLL_S):
                 return

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process behind seeded plans: it keeps the robot ready and forks a fresh child for every request.
+"""Worker process of seeded planning, which loads the robot once and forks a child for every request.
 
-OMPL has one random generator a process, and its seed counts only before the first use. This process never plans
-itself, so every child starts from the same state. It has one thread, and lives as long as its standard input is open.
+OMPL has one random generator per process, which can be seeded only before its first use. The worker never plans
+itself, so that all children start from the same state. It has one thread and runs until its standard input is closed.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 @dataclass(frozen=True, slots=True)
 class WorkerSetup:
-    """Set-up of the process, so that it plans as its parent does.
+    """Setup of the worker process.
 
     Attributes:
-        robot: arguments of RobotModel.
-        pipelines: how to build each pipeline.
-        search_path: sys.path of the parent, for planners of users.
-        address: path of the socket to listen on.
+        robot: Arguments of RobotModel.
+        pipelines: Specifications of the pipelines.
+        search_path: Import path of the parent process, for user-defined planners.
+        address: Path of the socket to listen on.
     """
 
     robot: tuple[Any, ...]
@@ -60,7 +60,13 @@ class WorkerSetup:
 
 
 def serve(setup: WorkerSetup, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
-    """Forks a child for every connection until standard input ends."""
+    """Forks a child for every connection until standard input is closed.
+
+    Args:
+        setup: Setup of the worker process.
+        model: Robot model.
+        pipelines: Pipelines, keyed by name.
+    """
     listener = socket.socket(socket.AF_UNIX)
     listener.bind(setup.address)
     listener.listen(64)
@@ -78,19 +84,21 @@ def serve(setup: WorkerSetup, model: RobotModel, pipelines: dict[str, PlanningPi
 
 
 def _child(connection: Connection, model: RobotModel, pipelines: dict[str, PlanningPipeline]) -> None:
-    """Plans one request and ends the process."""
+    """Answers a request and ends the process."""
     try:
         name, settings, configurations, seed, request = from_bytes(connection.recv_bytes(), model)
 
         def cancelled() -> bool:
-            return bool(select.select([connection], [], [], 0.0)[0])  # readable means closed: the parent sends no more
+            return bool(
+                select.select([connection], [], [], 0.0)[0]
+            )  # readable only if the parent closed the connection
 
         pipeline = pipelines[name]
         pipeline.settings = settings
         pipeline.configurations.restore(configurations)
         connection.send_bytes(to_bytes(_answer(pipeline, replace(request, cancelled=cancelled), seed)))
     except (EOFError, OSError):
-        os._exit(1)  # the parent gave up
+        os._exit(1)  # the parent closed the connection
     os._exit(0)
 
 
@@ -102,17 +110,17 @@ def _answer(pipeline: PlanningPipeline, request: Any, seed: int) -> PlanningAnsw
         return pipeline.plan(replace(request, seed=seed), repeatable=True)
     except PlanningError as error:
         return error
-    except Exception as error:  # noqa: BLE001 - the parent must learn whatever happened
+    except Exception as error:  # noqa: BLE001 - every failure must be reported to the parent
         traceback.print_exc()
         return PlanningError(ErrorCode.FAILURE, f"unexpected {type(error).__name__}: {error}")
 
 
 def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
-    """Does once for all children: loads loops and, with a motion of every group, meshes."""
+    """Loads compiled loops and, by planning a motion of every group, meshes, so that all children share them."""
     compile_all()
     far = Transform(np.eye(3), np.array([50.0, 0.0, 0.0]))
     scene = empty_scene(model).with_object(CollisionObject("far", far, ((Box(1.0, 1.0, 1.0), Transform.Identity()),)))
-    straight = PlanningPipeline(model, kinematics, PipelineSettings(), _Straight(), make_adapters())
+    straight = PlanningPipeline(model, kinematics, PipelineSettings(), _StraightLinePlanner(), make_adapters())
     for group in model.groups.values():
         if not group.joints:
             continue
@@ -131,23 +139,23 @@ def _warm_up(model: RobotModel, kinematics: KinematicsPool) -> None:
 
 
 def _wait_for_children(*_: object) -> None:
-    """Takes note of children that ended: of those that are ignored the processor time is lost."""
+    """Reaps ended children, because the processor time of ignored children is not counted."""
     with contextlib.suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
 
 
-class _Straight:
-    """Plans without OMPL, whose random generator must stay unused here."""
+class _StraightLinePlanner:
+    """Planner without OMPL, whose random generator must stay unused in the worker."""
 
     def plan(self, problem: PlanningProblem) -> PlannedPath:
-        """Returns the straight motion."""
+        """Returns the straight path to the nearest goal."""
         problem.edge_is_valid(problem.start_values, problem.goal_states()[0])
         return PlannedPath(np.vstack([problem.start_values, problem.goal_states()[0]]))
 
 
 def main() -> None:
-    """Reads the setup from standard input, builds the robot and serves."""
+    """Reads the setup from standard input, loads the robot and serves requests."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, _wait_for_children)
     sys.path[:] = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the parent process
