@@ -118,7 +118,7 @@ def test_entries_that_cannot_be_used_are_left_out_and_named() -> None:
     assert [fault.split(":")[0].split()[0] for fault in faults] == [f"controller_list[{n}]" for n in range(6)]
     assert "allowed: FollowJointTrajectory, GripperCommand" in faults[2]
     assert parse_controllers({"name": "a"}, ACTION_KINDS)[1] == [
-        "controller_list is a dict; needed is a list with name, joints and type"
+        "controller_list is a dict; it must be a list with name, joints and type"
     ]
 
 

@@ -37,24 +37,24 @@ def scene(model: RobotModel) -> PlanningScene:
 
 def test_a_box_on_the_way_blocks_and_is_named(scene: PlanningScene) -> None:
     watch = PathWatch(ARM, TIMES, ROWS, scene)
-    assert watch.blocked_by(scene) is None
-    hit = watch.blocked_by(with_box_at_tip(scene, END))
+    assert watch.scene_collision(scene) is None
+    hit = watch.scene_collision(with_box_at_tip(scene, END))
     assert hit is not None and "object 'box'" in hit.describe()
-    assert watch.blocked_by(with_box_at_tip(scene, END - [3.0, 0, 0, 0, 0, 0])) is None
+    assert watch.scene_collision(with_box_at_tip(scene, END - [3.0, 0, 0, 0, 0, 0])) is None
 
 
 def test_what_lies_behind_the_robot_does_not_block(scene: PlanningScene) -> None:
     watch = PathWatch(ARM, TIMES, ROWS, scene)
     behind = with_box_at_tip(scene, START)
-    assert watch.blocked_by(behind)
+    assert watch.scene_collision(behind)
     for values in ROWS[:25]:
         watch.advance(scene_at(scene.model, values).positions)
-    assert watch.blocked_by(behind.with_positions(scene_at(scene.model, ROWS[24]).positions)) is None
+    assert watch.scene_collision(behind.with_positions(scene_at(scene.model, ROWS[24]).positions)) is None
 
 
 def test_a_contact_the_planner_accepted_does_not_block(scene: PlanningScene) -> None:
     touching = with_box_at_tip(scene, START)
     watch = PathWatch(ARM, TIMES, ROWS, touching)
     far = CollisionObject("far", pin.SE3(np.eye(3), np.array([0.0, 0.0, 3.0])), ((Box(1, 1, 1), pin.SE3.Identity()),))
-    assert watch.blocked_by(touching.with_object(far)) is None
-    assert watch.blocked_by(with_box_at_tip(touching, END))
+    assert watch.scene_collision(touching.with_object(far)) is None
+    assert watch.scene_collision(with_box_at_tip(touching, END))

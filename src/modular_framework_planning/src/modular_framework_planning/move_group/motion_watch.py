@@ -18,7 +18,7 @@ from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.messages.execution_messages import check_trajectory
 from modular_framework_planning.move_group.context import MoveGroupContext
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene, SceneChange
-from modular_framework_planning.trajectory_execution.path_watch import Hit, PathWatch
+from modular_framework_planning.trajectory_execution.path_watch import PathCollision, PathWatch
 
 PERIOD_S = 0.05  # between two checks of the scene
 SLACKS_S = (-0.1, 0.0, 0.1)  # by how much a motion under way may be late or early before one beside it is begun
@@ -81,7 +81,7 @@ class WatchedMotion:
         self._watching = threading.Lock()
         self._ended = threading.Event()
         self._blocked = ""
-        self._hit: Hit | None = None
+        self._hit: PathCollision | None = None
         frequency = context.settings.plan_execution.record_trajectory_state_frequency
         self._period_s = 1.0 / frequency if frequency > 0.0 else math.inf
         self._begun = rospy.Time.now()
@@ -133,7 +133,7 @@ class WatchedMotion:
         if not others or self._watch is None:
             return
         with self._watching:
-            hit = self._watch.robot_in_the_way(self._as_planned(self._context.monitor.snapshot()), others, SLACKS_S)
+            hit = self._watch.robot_collision(self._as_planned(self._context.monitor.snapshot()), others, SLACKS_S)
         if hit is not None:
             raise PlanningError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -167,12 +167,12 @@ class WatchedMotion:
             watch.advance(scene.positions)
             if self._change is not None and scene.geometry_version != self._seen_version:
                 self._seen_version = scene.geometry_version
-                self._hit = watch.blocked_by(self._as_planned(scene))
+                self._hit = watch.scene_collision(self._as_planned(scene))
                 if self._hit is not None:
                     self._blocked = "the scene changed and the rest of the motion is blocked"
-            if self._hit is None and watch.elsewhere_moved(scene.positions):
+            if self._hit is None and watch.other_joints_moved(scene.positions):
                 others = self._context.execution.others(watch)
-                self._hit = watch.robot_in_the_way(self._as_planned(scene), others)
+                self._hit = watch.robot_collision(self._as_planned(scene), others)
                 if self._hit is not None:
                     self._blocked = "another part of the robot moved and the rest of the motion would hit it"
 

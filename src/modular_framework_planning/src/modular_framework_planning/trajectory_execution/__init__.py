@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Choice of the controllers that execute a motion, and the check of its remaining path."""
+"""Controller selection for a motion, and collision checks of its remaining path."""

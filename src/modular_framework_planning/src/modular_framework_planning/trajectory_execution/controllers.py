@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads controller_list, and chooses controllers that cover the joints of a motion."""
+"""Parsing of controller_list, and selection of controllers for the joints of a motion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FAKE_KINDS = ("interpolate", "via points", "last point")
 
 @dataclass(frozen=True, slots=True)
 class JointTolerance:
-    """Tolerances of a joint [rad or m, and their derivatives]; 0 leaves them to the controller."""
+    """Tolerances of a joint [rad or m, per s, per s^2]; 0 for the tolerance of the controller."""
 
     joint: str
     position: float = 0.0
@@ -31,16 +31,23 @@ TOLERANCE_KEYS = ("position", "velocity", "acceleration")
 
 @dataclass(frozen=True, slots=True)
 class ControllerSpec:
-    """One controller with its configuration.
+    """Configuration of a controller.
 
     Attributes:
-        kind: one of ACTION_KINDS or FAKE_KINDS.
-        is_default: preferred where several controllers move the same joints.
-        is_active: whether it would accept a goal now.
-        command_joints: joints whose positions, added up, are the goal of a gripper.
-        allow_failure: a gripper that gives up counts as done (it holds something).
-        duration_scaling, duration_margin: of the time the controller may take [-, s]; None: those of all controllers.
-        rate: cycles per second of a fake controller.
+        name: Name of the controller.
+        action_ns: Namespace of the action below the name.
+        kind: One of ACTION_KINDS or FAKE_KINDS.
+        joints: Joints that the controller moves.
+        is_default: Whether the controller is preferred among controllers of the same joints.
+        is_active: Whether the controller accepts goals now.
+        max_effort: Maximum effort of a gripper [N or Nm].
+        command_joints: Joints whose summed positions are the goal of a gripper.
+        allow_failure: Whether an aborted gripper goal counts as success, because the gripper holds an object.
+        duration_scaling, duration_margin: Factor of and addition to the allowed execution time [-, s]; None for the
+            general values.
+        path_tolerances, goal_tolerances: Joint tolerances along the path and at the goal.
+        goal_time_tolerance: Allowed delay at the goal [s].
+        rate: Frequency of a fake controller [Hz].
     """
 
     name: str
@@ -61,42 +68,39 @@ class ControllerSpec:
 
     @property
     def action(self) -> str:
-        """Name of the controller's action."""
+        """Action name of the controller."""
         return f"{self.name}/{self.action_ns}" if self.action_ns else self.name
 
 
 def parse_controllers(
     entries: Any, kinds: Sequence[str], default_kind: str = ""
 ) -> tuple[list[ControllerSpec], list[str]]:
-    """Reads controller_list.
+    """Returns the valid controllers of controller_list, and a message per invalid entry.
 
     Args:
-        entries: the parameter as it came.
-        kinds: values of `type` to accept.
-        default_kind: for entries without a type; empty: they need one.
-
-    Returns:
-        The usable controllers, and one sentence for every entry that is not.
+        entries: Value of the parameter.
+        kinds: Accepted values of `type`.
+        default_kind: Type of entries without `type`; empty to require `type`.
     """
     if not isinstance(entries, list):
-        return [], [f"controller_list is a {type(entries).__name__}; needed is a list with name, joints and type"]
+        return [], [f"controller_list is a {type(entries).__name__}; it must be a list with name, joints and type"]
     specs: list[ControllerSpec] = []
     faults: list[str] = []
-    for number, entry in enumerate(entries):
+    for index, entry in enumerate(entries):
         fault = _fault(entry, kinds, default_kind)
         if fault:
-            faults.append(f"controller_list[{number}]: {fault}")
+            faults.append(f"controller_list[{index}]: {fault}")
             continue
         try:
             specs.append(_controller(entry, default_kind))
         except (TypeError, ValueError, KeyError) as error:
-            faults.append(f"controller_list[{number}] '{entry['name']}': a value of the wrong kind ({error})")
+            faults.append(f"controller_list[{index}] '{entry['name']}': a value has the wrong type ({error})")
     return specs, faults
 
 
 def _fault(entry: Any, kinds: Sequence[str], default_kind: str) -> str:
     if not isinstance(entry, Mapping):
-        return f"is a {type(entry).__name__}; needed is a mapping with name, joints and type"
+        return f"is a {type(entry).__name__}; it must be a mapping with name, joints and type"
     missing = [key for key in ("name", "joints") if key not in entry]
     if missing:
         return f"has no {' and no '.join(missing)}; got {', '.join(entry)}"
@@ -104,9 +108,9 @@ def _fault(entry: Any, kinds: Sequence[str], default_kind: str) -> str:
     if kind not in kinds:
         return f"'{entry['name']}' has type '{kind}'; allowed: {', '.join(kinds)}"
     if not isinstance(entry["joints"], list) or not entry["joints"]:
-        return f"'{entry['name']}' has joints {entry['joints']!r}; needed is a list of joint names"
+        return f"'{entry['name']}' has joints {entry['joints']!r}; it must be a list of joint names"
     if "parallel" in entry and len(entry["joints"]) != 2:
-        return f"'{entry['name']}' is a parallel gripper with {len(entry['joints'])} joints; it needs two"
+        return f"'{entry['name']}' is a parallel gripper with {len(entry['joints'])} joints; it must have two"
     return ""
 
 
@@ -135,16 +139,16 @@ def _controller(entry: Mapping[str, Any], default_kind: str) -> ControllerSpec:
     )
 
 
-def _tolerances(given: Any, joints: tuple[str, ...]) -> tuple[JointTolerance, ...]:
-    """Reads a list of tolerances by joint name, or a mapping of values for all joints (one, or one a joint)."""
-    if not given:
+def _tolerances(entry: Any, joints: tuple[str, ...]) -> tuple[JointTolerance, ...]:
+    """Reads a list of tolerances with joint names, or a mapping with a value for all joints or a value per joint."""
+    if not entry:
         return ()
-    if isinstance(given, list):
+    if isinstance(entry, list):
         return tuple(
-            JointTolerance(str(item["name"]), *(float(item.get(key, 0.0)) for key in TOLERANCE_KEYS)) for item in given
+            JointTolerance(str(item["name"]), *(float(item.get(key, 0.0)) for key in TOLERANCE_KEYS)) for item in entry
         )
     columns = [
-        value if isinstance(value := given.get(key, 0.0), list) else [value] * len(joints) for key in TOLERANCE_KEYS
+        value if isinstance(value := entry.get(key, 0.0), list) else [value] * len(joints) for key in TOLERANCE_KEYS
     ]
     return tuple(
         JointTolerance(joint, *(float(value) for value in values))
@@ -155,62 +159,61 @@ def _tolerances(given: Any, joints: tuple[str, ...]) -> tuple[JointTolerance, ..
 def choose_controllers(
     joints: Collection[str], controllers: Iterable[ControllerSpec], may_switch: bool = False
 ) -> tuple[ControllerSpec, ...]:
-    """Returns controllers that move the joints and share none of theirs.
+    """Returns controllers with disjoint joints that together move all requested joints.
 
-    Few controllers are better than many, default ones than others, running ones than stopped ones, and those with few
-    joints of their own than those with many.
+    Preferred in this order: fewer controllers, default controllers, active controllers, controllers with fewer joints.
 
     Args:
-        joints: all that are to be moved.
-        controllers: those there are.
-        may_switch: stopped controllers may be chosen because they can be started.
+        joints: Requested joints.
+        controllers: Available controllers.
+        may_switch: Whether stopped controllers can be started.
 
     Raises:
-        PlanningError: no such set; says which joints nobody moves and what each controller covers.
+        PlanningError: No such selection exists; names the missing joints and the joints of each controller.
     """
-    wanted = set(joints)
-    known = tuple(controllers)
-    useful = [spec for spec in known if wanted & set(spec.joints) and (spec.is_active or may_switch)]
-    for count in range(1, len(useful) + 1):
-        options = [option for option in combinations(useful, count) if _covers(option, wanted)]
-        if options:
-            return min(options, key=_rank)
-    raise PlanningError(ErrorCode.CONTROL_FAILED, _reason(wanted, known, useful))
+    requested = set(joints)
+    specs = tuple(controllers)
+    candidates = [spec for spec in specs if requested & set(spec.joints) and (spec.is_active or may_switch)]
+    for count in range(1, len(candidates) + 1):
+        selections = [selection for selection in combinations(candidates, count) if _moves_all(selection, requested)]
+        if selections:
+            return min(selections, key=_cost)
+    raise PlanningError(ErrorCode.CONTROL_FAILED, _reason(requested, specs, candidates))
 
 
-def _covers(option: Sequence[ControllerSpec], wanted: set[str]) -> bool:
-    moved = [joint for spec in option for joint in spec.joints]
-    return len(moved) == len(set(moved)) and wanted <= set(moved)
+def _moves_all(selection: Sequence[ControllerSpec], requested: set[str]) -> bool:
+    moved = [joint for spec in selection for joint in spec.joints]
+    return len(moved) == len(set(moved)) and requested <= set(moved)
 
 
-def _rank(option: Sequence[ControllerSpec]) -> tuple[int, int, int]:
+def _cost(selection: Sequence[ControllerSpec]) -> tuple[int, int, int]:
     return (
-        -sum(spec.is_default for spec in option),
-        -sum(spec.is_active for spec in option),
-        sum(len(spec.joints) for spec in option),
+        -sum(spec.is_default for spec in selection),
+        -sum(spec.is_active for spec in selection),
+        sum(len(spec.joints) for spec in selection),
     )
 
 
-def _reason(wanted: set[str], known: Sequence[ControllerSpec], useful: Sequence[ControllerSpec]) -> str:
-    listed = (
+def _reason(requested: set[str], specs: Sequence[ControllerSpec], candidates: Sequence[ControllerSpec]) -> str:
+    spec_list = (
         "; ".join(
-            f"{spec.name}{'' if spec.is_active else ' (stopped)'} moves {', '.join(spec.joints)}" for spec in known
+            f"{spec.name}{'' if spec.is_active else ' (stopped)'} moves {', '.join(spec.joints)}" for spec in specs
         )
         or "none"
     )
-    unmoved = sorted(wanted - {joint for spec in known for joint in spec.joints})
-    if unmoved:
+    missing = sorted(requested - {joint for spec in specs for joint in spec.joints})
+    if missing:
         return (
-            f"no controller moves {', '.join(unmoved)}; known controllers: {listed}. Add one to the config "
-            "package's controllers file, or load one where ros_control is asked"
+            f"no controller moves {', '.join(missing)}; known controllers: {spec_list}. Add a controller to the "
+            "controllers file of the config package, or load a controller in the controller manager"
         )
-    stopped = sorted(wanted - {joint for spec in useful for joint in spec.joints})
+    stopped = sorted(requested - {joint for spec in candidates for joint in spec.joints})
     if stopped:
         return (
-            f"the controllers of {', '.join(stopped)} are stopped; known controllers: {listed}. Start one, or set "
-            "moveit_manage_controllers"
+            f"the controllers of {', '.join(stopped)} are stopped; known controllers: {spec_list}. Start a controller, "
+            "or set moveit_manage_controllers"
         )
     return (
-        f"controllers of {', '.join(sorted(wanted))} share joints, so no set of them can move all at a time; known "
-        f"controllers: {listed}"
+        f"the controllers of {', '.join(sorted(requested))} share joints and cannot be active at the same time; known "
+        f"controllers: {spec_list}"
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters of trajectory execution, under MoveIt's names."""
+"""Trajectory execution parameters, with MoveIt's names."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ class ExecutionSettings:
     """Parameters below ~trajectory_execution.
 
     Attributes:
-        execution_duration_monitoring: whether a motion that takes too long is stopped.
-        allowed_execution_duration_scaling, allowed_goal_duration_margin: too long is the planned time times the one,
-            plus the other [s]; an entry of controller_list may set its own.
-        execution_velocity_scaling: how many times as fast as planned motions are executed.
-        allowed_start_tolerance: how far a joint may be from the first point [rad or m]; 0 switches the check off.
-        joints_allowed_start_tolerance: the same for single joints.
-        wait_for_trajectory_completion: whether to wait, when the controllers are done, until the joints stand still.
-        controller_connection_timeout: how long a controller may take to answer [s].
+        execution_duration_monitoring: Whether a motion that exceeds its allowed duration is stopped.
+        allowed_execution_duration_scaling, allowed_goal_duration_margin: Factor of and addition to the planned
+            duration, which give the allowed duration [-, s]; an entry of controller_list can override both.
+        execution_velocity_scaling: Speed of the execution relative to the plan.
+        allowed_start_tolerance: Maximum distance of a joint from the first point [rad or m]; 0 for no check.
+        joints_allowed_start_tolerance: Start tolerances, keyed by joint [rad or m].
+        wait_for_trajectory_completion: Whether to wait until the joints stop after the controllers have finished.
+        controller_connection_timeout: Timeout of a connection to a controller [s].
     """
 
     execution_duration_monitoring: bool
@@ -32,5 +32,5 @@ class ExecutionSettings:
     controller_connection_timeout: float
 
     def start_tolerance(self, joint: str) -> float:
-        """Returns the tolerance of a joint; 0 or less: any distance is allowed."""
+        """Returns the start tolerance of a joint; no check if it is 0 or less."""
         return self.joints_allowed_start_tolerance.get(joint, self.allowed_start_tolerance)

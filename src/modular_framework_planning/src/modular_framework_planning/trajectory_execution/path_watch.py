@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks the remaining path of a motion in progress when the scene or another part of the robot changes."""
+"""Collision checks of the remaining path of a motion, after changes of the scene or of other joints."""
 
 from __future__ import annotations
 
@@ -15,26 +15,28 @@ from modular_framework_planning.planning_interface.collision_detectors import DE
 from modular_framework_planning.planning_interface.motion_check import MotionChecker
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-CHECK_STEP = 0.01  # [rad or m, any joint]
+CHECK_STEP = 0.01  # maximum joint displacement between checked states [rad or m]
 NAMED_CONTACTS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hit:
-    """A state on the rest of a motion in which bodies touch that may not; naming them takes longer than finding it."""
+class PathCollision:
+    """A colliding state on the remaining path; its contacts are computed on request, because this takes longer."""
 
     checker: CollisionChecker
     positions: Array
-    known: frozenset[frozenset[str]] = frozenset()
+    accepted_pairs: frozenset[frozenset[str]] = frozenset()
 
     def describe(self) -> str:
-        """Says which bodies touch; those that were known to are left out."""
+        """Returns a description of the contacts, without accepted pairs if possible."""
         found = self.checker.contacts(self.positions, False)
-        return describe_contacts([item for item in found if _pair(item) not in self.known] or found, NAMED_CONTACTS)
+        return describe_contacts(
+            [item for item in found if _pair(item) not in self.accepted_pairs] or found, NAMED_CONTACTS
+        )
 
 
 class PathWatch:
-    """Follows the robot along one motion. Not for use from two threads at a time, but for `positions_at`."""
+    """Follows the robot along a motion; not thread-safe, except for `positions_at`."""
 
     def __init__(
         self,
@@ -45,15 +47,15 @@ class PathWatch:
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
         was_planned: bool = True,
     ) -> None:
-        """Takes a motion.
+        """Stores the motion, sampled finely.
 
         Args:
-            joint_names: joints of the motion; all of them are joints of the robot.
-            times: of the points of the path, increasing, shape (n,) [s].
-            rows: positions at these points, shape (n, joints) [rad or m].
-            planned_in: the scene in which the motion was found to be acceptable, or in which it begins.
-            new_checker: makes the collision checkers.
-            was_planned: whether the path was found to be acceptable in that scene; else only its first point was.
+            joint_names: Moving joints of the robot.
+            times: Increasing times of the path points, shape (n,) [s].
+            rows: Positions at the path points, shape (n, joints) [rad or m].
+            planned_in: Scene in which the motion was planned, or starts.
+            new_checker: Factory of collision checkers.
+            was_planned: Whether the whole path was accepted in this scene, or only its first point.
         """
         self._model = planned_in.model
         self._indices = np.array([self._model.index[name] for name in joint_names], dtype=np.int64)
@@ -61,36 +63,36 @@ class PathWatch:
         self._planned_in, self._new_checker, self._was_planned = planned_in, new_checker, was_planned
         members = set(self._indices.tolist())
         followers = {follower for follower, leader, _, _ in self._model.mimics if leader in members}
-        elsewhere = [number for number in range(len(self._model.joint_names)) if number not in members | followers]
-        self._elsewhere = np.array(elsewhere, dtype=np.int64)
-        self._seen_elsewhere = planned_in.positions[self._elsewhere]
+        other_joints = [index for index in range(len(self._model.joint_names)) if index not in members | followers]
+        self._other_joints = np.array(other_joints, dtype=np.int64)
+        self._seen_other_positions = planned_in.positions[self._other_joints]
         self._reached = 0
 
     def _samples(self, times: Array, rows: Array) -> tuple[Array, Array]:
-        """Returns times and states of a polyline at most CHECK_STEP apart, its points included."""
-        steps = self._model.way(rows[:-1], rows[1:], self._indices)
-        straight = np.vstack([rows[:1], rows[0] + np.cumsum(steps, axis=0)])
+        """Returns times and states of a polyline at most CHECK_STEP apart, including its points."""
+        steps = self._model.displacement(rows[:-1], rows[1:], self._indices)
+        unwrapped_rows = np.vstack([rows[:1], rows[0] + np.cumsum(steps, axis=0)])
         counts = np.maximum(1, np.ceil(np.abs(steps).max(axis=1, initial=0.0) / CHECK_STEP)).astype(int)
-        at = np.concatenate([[0.0], *(number + np.arange(1, n + 1) / n for number, n in enumerate(counts))])
-        numbers = np.arange(len(times), dtype=float)
-        return np.interp(at, numbers, times), _rows_at(at, numbers, straight)
+        path_positions = np.concatenate([[0.0], *(index + np.arange(1, n + 1) / n for index, n in enumerate(counts))])
+        point_indices = np.arange(len(times), dtype=float)
+        return np.interp(path_positions, point_indices, times), _rows_at(path_positions, point_indices, unwrapped_rows)
 
     def advance(self, positions: Array) -> None:
-        """Updates the progress along the path from positions of the whole robot; the progress never decreases."""
-        way = self._model.way(positions[self._indices], self._rows, self._indices)
-        gaps = np.linalg.norm(way, axis=1)
-        while self._reached + 1 < len(gaps) and gaps[self._reached + 1] <= gaps[self._reached]:
+        """Advances the progress along the path to the positions of the whole robot; progress never decreases."""
+        displacement = self._model.displacement(positions[self._indices], self._rows, self._indices)
+        distances = np.linalg.norm(displacement, axis=1)
+        while self._reached + 1 < len(distances) and distances[self._reached + 1] <= distances[self._reached]:
             self._reached += 1
 
     def positions_at(self, after_s: Array) -> Array:
-        """Returns where the motion's joints will be at times from now [s], shape (times, joints) [rad or m]."""
+        """Returns the predicted positions of the moving joints at times from now [s], shape (times, joints)."""
         return _rows_at(self._times[self._reached] + after_s, self._times, self._rows)
 
-    def blocked_by(self, scene: PlanningScene) -> Hit | None:
-        """Returns where the rest of the motion collides in this scene, or None.
+    def scene_collision(self, scene: PlanningScene) -> PathCollision | None:
+        """Returns the first collision of the remaining path in a scene, or None.
 
-        States that collided already in the scene the motion was planned in do not count: the planner accepted them
-        (a start in contact, a held object on its table).
+        States that already collided in the scene of the plan are ignored, because the planner accepted them, for
+        example a start in contact or an attached object on a table.
         """
         checker, motion = self._checkers(scene)
         rest = self._rows[self._reached :]
@@ -99,71 +101,73 @@ class PathWatch:
         _, before = self._checkers(self._planned_in.with_positions(scene.positions))
         for values in rest:
             if not motion.state_is_free(values) and before.state_is_free(values):
-                return Hit(checker, motion.full_positions(values))
+                return PathCollision(checker, motion.full_positions(values))
         return None
 
-    def elsewhere_moved(self, positions: Array) -> bool:
-        """Returns whether another joint of the robot moved since the last call that returned true.
+    def other_joints_moved(self, positions: Array) -> bool:
+        """Checks whether a joint outside the motion has moved by more than CHECK_STEP since the last True.
 
         Args:
-            positions: of the whole robot; moved is by more than CHECK_STEP.
+            positions: Positions of the whole robot [rad or m].
         """
-        now = positions[self._elsewhere]
-        way = self._model.way(self._seen_elsewhere, now, self._elsewhere)
-        if np.abs(way).max(initial=0.0) <= CHECK_STEP:
+        now = positions[self._other_joints]
+        displacement = self._model.displacement(self._seen_other_positions, now, self._other_joints)
+        if np.abs(displacement).max(initial=0.0) <= CHECK_STEP:
             return False
-        self._seen_elsewhere = now
+        self._seen_other_positions = now
         return True
 
-    def robot_in_the_way(
-        self, scene: PlanningScene, others: Sequence[PathWatch] = (), slacks_s: Sequence[float] = (0.0,)
-    ) -> Hit | None:
-        """Returns where the rest of the motion hits another part of the robot, or None.
+    def robot_collision(
+        self, scene: PlanningScene, others: Sequence[PathWatch] = (), leads_s: Sequence[float] = (0.0,)
+    ) -> PathCollision | None:
+        """Returns the first self-collision on the remaining path, or None.
 
-        Objects of the world do not count. Bodies that touched already with the other joints where they were when the
-        motion was planned do not count either; where that is not known, those that touched at its first point.
+        Contacts that existed when the motion was planned are ignored; for an unplanned motion, contacts at its first
+        point are ignored.
 
         Args:
-            scene: as it is now; joints that no other motion moves stay where they are.
-            others: the other motions under way: each joint of theirs is taken to be where it will be at that time.
-            slacks_s: by how much each of them may be ahead of its time [s]; each is checked.
+            scene: Current scene, whose positions are kept by all joints without motion.
+            others: Other motions in progress, whose predicted positions are used.
+            leads_s: Times by which the other motions may be ahead of their prediction, all of which are checked [s].
         """
-        checker = self._new_checker(_robot_alone(scene), self._indices)
-        for slack_s in slacks_s:
-            together = self._together(scene, others, slack_s)
-            if checker.colliding_state(together, CHECK_STEP) is not None:
-                hit = self._new_contact(checker, together)
-                if hit is not None:
-                    return hit
+        checker = self._new_checker(_robot_only(scene), self._indices)
+        for lead_s in leads_s:
+            states = self._joint_motion_states(scene, others, lead_s)
+            if checker.colliding_state(states, CHECK_STEP) is not None:
+                collision = self._new_contact(checker, states)
+                if collision is not None:
+                    return collision
         return None
 
-    def _new_contact(self, checker: CollisionChecker, states: Array) -> Hit | None:
-        """Returns the first state with a contact that was not accepted when the motion was planned, or None."""
-        planned = _robot_alone(self._planned_in)
+    def _new_contact(self, checker: CollisionChecker, states: Array) -> PathCollision | None:
+        """Returns the first state with a contact that did not exist when the motion was planned, or None."""
+        planned = _robot_only(self._planned_in)
         before = self._new_checker(planned, self._indices)
         accepted = MotionChecker(before, self._indices, planned.positions)
         for state in states:
             if checker.is_free(state):
                 continue
-            own = state[self._indices] if self._was_planned else self._rows[0]
-            if accepted.state_is_free(own):
-                return Hit(checker, state)
-            known = frozenset(_pair(item) for item in before.contacts(accepted.full_positions(own), False))
-            if any(_pair(item) not in known for item in checker.contacts(state, False)):
-                return Hit(checker, state, known)
+            own_values = state[self._indices] if self._was_planned else self._rows[0]
+            if accepted.state_is_free(own_values):
+                return PathCollision(checker, state)
+            accepted_pairs = frozenset(
+                _pair(item) for item in before.contacts(accepted.full_positions(own_values), False)
+            )
+            if any(_pair(item) not in accepted_pairs for item in checker.contacts(state, False)):
+                return PathCollision(checker, state, accepted_pairs)
         return None
 
-    def _together(self, scene: PlanningScene, others: Sequence[PathWatch], slack_s: float) -> Array:
-        """Returns states of the whole robot from now until all motions have ended, at most CHECK_STEP apart."""
+    def _joint_motion_states(self, scene: PlanningScene, others: Sequence[PathWatch], lead_s: float) -> Array:
+        """Returns the predicted states of the whole robot until all motions have ended, at most CHECK_STEP apart."""
         watches = (self, *others)
-        after = np.unique(np.concatenate([watch._times[watch._reached :] - watch._now_s for watch in watches]))
-        result = np.tile(scene.positions, (len(after), 1))
+        times_s = np.unique(np.concatenate([watch._times[watch._reached :] - watch._now_s for watch in watches]))
+        result = np.tile(scene.positions, (len(times_s), 1))
         for watch in watches:
-            ahead_s = 0.0 if watch is self else slack_s
-            result[:, watch._indices] = watch.positions_at(np.maximum(after + ahead_s, 0.0))
-        moved = {number for watch in watches for number in watch._indices.tolist()}
+            ahead_s = 0.0 if watch is self else lead_s
+            result[:, watch._indices] = watch.positions_at(np.maximum(times_s + ahead_s, 0.0))
+        moved_joints = {index for watch in watches for index in watch._indices.tolist()}
         for follower, leader, multiplier, offset in self._model.mimics:
-            if leader in moved and follower not in moved:
+            if leader in moved_joints and follower not in moved_joints:
                 result[:, follower] = multiplier * result[:, leader] + offset
         return result
 
@@ -176,13 +180,13 @@ class PathWatch:
         return checker, MotionChecker(checker, self._indices, scene.positions)
 
 
-def _robot_alone(scene: PlanningScene) -> PlanningScene:
-    """Returns the scene without a world: the robot and what it holds."""
+def _robot_only(scene: PlanningScene) -> PlanningScene:
+    """Returns the scene with only the robot and its attached objects."""
     return scene.without_objects().with_octomap(None)
 
 
-def _rows_at(at: Array, known_at: Array, rows: Array) -> Array:
-    return np.column_stack([np.interp(at, known_at, column) for column in rows.T])
+def _rows_at(path_positions: Array, knots: Array, rows: Array) -> Array:
+    return np.column_stack([np.interp(path_positions, knots, column) for column in rows.T])
 
 
 def _pair(contact: Contact) -> frozenset[str]:
