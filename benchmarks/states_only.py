@@ -29,7 +29,7 @@ class StatesOnly(ExactCollisionChecker):
     def __init__(self, scene: PlanningScene, moving: Joints = None, tolerated: Sequence[Contact] = ()) -> None:
         super().__init__(scene, moving, tolerated)
         chosen = slice(None) if moving is None else moving
-        spans = np.where(self.model.endless, np.pi, self.model.upper - self.model.lower)
+        spans = np.where(self.model.continuous, np.pi, self.model.upper - self.model.lower)
         self._spacing = SHARE * float(spans[chosen].sum())
 
     def path_is_free(self, vertices: Array, step: float, first: int = 0) -> bool:

@@ -204,7 +204,7 @@ def test_an_orientation_that_was_not_filled_in_is_the_identity(scene: Scene, cap
     placed = [apply_collision_object(scene, item).objects["b"] for item in (given, empty)]
     for one, other in zip(*([item.pose, *(pose for _, pose in item.shapes)] for item in placed), strict=True):
         assert one.isApprox(other)
-    assert "collision object 'b': quaternion xyzw 0 0 0 0 has no length; the identity 0 0 0 1 is used" in caplog.text
+    assert "collision object 'b': quaternion xyzw 0 0 0 0 has norm 0; the identity 0 0 0 1 is used" in caplog.text
 
 
 def test_objects_of_a_whole_scene_may_be_given_in_frames_of_tf(scene: Scene) -> None:

@@ -21,7 +21,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 from modular_framework_planning.collision_detection.kernels.compiled_triangles import Surfaces
 from modular_framework_planning.contacts import LINK, WORLD, Body
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, LinkGeometry, RobotModel
+from modular_framework_planning.robot_model.robot_model import MAX_CACHED_MODELS, LinkGeometry, RobotModel
 
 KEPT_GROUPINGS, KEPT_SCENES = 16, 2
 SMALL_EXCESS = 2.0e-3  # [m]; a surface that lies no further outside of its body stands for it
@@ -135,7 +135,7 @@ def _links(model: RobotModel, pairs: WatchedPairs) -> _Links:
     return _Links(groups, robot, both, with_surface, of_link, is_inexact)
 
 
-@lru_cache(maxsize=KEPT_MODELS)
+@lru_cache(maxsize=MAX_CACHED_MODELS)
 def _link_bounding_geometries(model: RobotModel) -> tuple[BoundingGeometry, ...]:
     """Bounding geometries of all links' shapes; surfaces without a closed form are moved into their joints' frames."""
     result = []

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses, shapes and solids in space."""
+"""Poses, collision shapes and region solids."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Angles of joints that turn without end."""
+"""Angle differences of continuous joints."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from modular_framework_planning.geometry.spatial import Array
 
 
-def short_way(gaps: Array, endless: NDArray[np.bool_]) -> Array:
-    """Returns differences of joint positions [rad or m], those of joints without ends less their whole turns.
+def shortest_difference(differences: Array, continuous: NDArray[np.bool_]) -> Array:
+    """Returns joint position differences, with full rotations of continuous joints removed [rad or m].
 
     Args:
-        gaps: shape (..., joints) [rad or m].
-        endless: whether a joint turns without end, shape (joints,).
+        differences: Joint position differences, shape (..., joints) [rad or m].
+        continuous: Whether each joint is continuous, shape (joints,).
     """
-    return gaps - np.where(endless, 2.0 * np.pi * np.round(gaps / (2.0 * np.pi)), 0.0)
+    return differences - np.where(continuous, 2.0 * np.pi * np.round(differences / (2.0 * np.pi)), 0.0)

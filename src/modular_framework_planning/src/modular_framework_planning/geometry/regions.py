@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Solids a point may be required to stay in: which point of the solid is nearest, and random points in it."""
+"""Convex solids of position constraint regions: nearest points and random points."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from modular_framework_planning.geometry.spatial import Array
 
 
 class Solid(Protocol):
-    """A convex solid around its own origin; points are in its own frame [m]."""
+    """A convex solid around its origin; points are in the frame of the solid [m]."""
 
     @property
     def extent(self) -> float:
-        """Greatest distance of a point of the solid from its origin [m]."""
+        """Maximum distance of a point of the solid from its origin [m]."""
 
     def nearest(self, point: Array) -> Array:
-        """Returns the point of the solid nearest to `point`: the point itself where it is inside."""
+        """Returns the point of the solid nearest to `point`, which is `point` itself if inside."""
 
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a point uniformly distributed in the solid."""
@@ -34,7 +34,7 @@ def _require_lengths(kind: str, **lengths: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BoxSolid:
-    """A box; edge lengths [m], 0 for a flat one."""
+    """A box with edge lengths x, y, z, which may be 0 [m]."""
 
     x: float
     y: float
@@ -50,8 +50,8 @@ class BoxSolid:
 
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the box."""
-        half = (0.5 * self.x, 0.5 * self.y, 0.5 * self.z)
-        return np.array([min(max(value, -edge), edge) for value, edge in zip(point, half, strict=True)])
+        half_size = (0.5 * self.x, 0.5 * self.y, 0.5 * self.z)
+        return np.array([min(max(value, -edge), edge) for value, edge in zip(point, half_size, strict=True)])
 
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random point of the box."""
@@ -60,7 +60,7 @@ class BoxSolid:
 
 @dataclass(frozen=True, slots=True)
 class SphereSolid:
-    """A ball; radius [m]."""
+    """A solid sphere; radius [m]."""
 
     radius: float
 
@@ -73,18 +73,18 @@ class SphereSolid:
         return self.radius
 
     def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the ball."""
+        """Returns the nearest point of the sphere."""
         distance = float(np.linalg.norm(point))
         return point if distance <= self.radius else point * (self.radius / distance)
 
     def sample(self, rng: np.random.Generator) -> Array:
-        """Returns a random point of the ball."""
+        """Returns a random point of the sphere."""
         direction = rng.normal(size=3)
         return direction * (self.radius * rng.uniform() ** (1.0 / 3.0) / float(np.linalg.norm(direction)))
 
 
 def _in_slice(point: Array, radius: float, z: float) -> Array:
-    """Returns the point in the half plane of `point` about the z axis at the given radius and height."""
+    """Returns the point at a radius and height in the half plane through the z axis and `point`."""
     distance = float(np.hypot(point[0], point[1]))
     direction = point[:2] / distance if distance > 0.0 else np.array([1.0, 0.0])
     return np.array([radius * direction[0], radius * direction[1], z])
@@ -92,7 +92,7 @@ def _in_slice(point: Array, radius: float, z: float) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _RoundSolid:
-    """A solid around the z axis, the middle of its height at the origin; height and radius [m]."""
+    """A solid of revolution about the z axis, centred at half its height; height and radius [m]."""
 
     kind: ClassVar[str]
     height: float
@@ -115,8 +115,8 @@ class CylinderSolid(_RoundSolid):
     def nearest(self, point: Array) -> Array:
         """Returns the nearest point of the cylinder."""
         distance = float(np.hypot(point[0], point[1]))
-        half = 0.5 * self.height
-        return _in_slice(point, min(distance, self.radius), min(max(float(point[2]), -half), half))
+        half_size = 0.5 * self.height
+        return _in_slice(point, min(distance, self.radius), min(max(float(point[2]), -half_size), half_size))
 
     def sample(self, rng: np.random.Generator) -> Array:
         """Returns a random point of the cylinder."""
@@ -125,21 +125,23 @@ class CylinderSolid(_RoundSolid):
 
 
 class ConeSolid(_RoundSolid):
-    """A cone, tip up; the radius is that of its base."""
+    """A cone with the tip up and the base radius."""
 
     kind = "cone"
 
     def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the cone: that of the triangle whose rotation makes the cone."""
-        at = np.array([float(np.hypot(point[0], point[1])), float(point[2])])
+        """Returns the nearest point of the cone, computed in its half section."""
+        section_point = np.array([float(np.hypot(point[0], point[1])), float(point[2])])
         base, tip = np.array([self.radius, -0.5 * self.height]), np.array([0.0, 0.5 * self.height])
         side = tip - base
-        if base[1] <= at[1] <= tip[1] and at[0] * self.height <= self.radius * (tip[1] - at[1]):
+        if base[1] <= section_point[1] <= tip[1] and section_point[0] * self.height <= self.radius * (
+            tip[1] - section_point[1]
+        ):
             return point
         length = float(side @ side)
-        share = min(max(float((at - base) @ side) / length, 0.0), 1.0) if length > 0.0 else 0.0
-        on_side, on_base = base + share * side, np.array([min(at[0], self.radius), base[1]])
-        best = min((on_side, on_base), key=lambda item: float(np.linalg.norm(item - at)))
+        fraction = min(max(float((section_point - base) @ side) / length, 0.0), 1.0) if length > 0.0 else 0.0
+        on_side, on_base = base + fraction * side, np.array([min(section_point[0], self.radius), base[1]])
+        best = min((on_side, on_base), key=lambda item: float(np.linalg.norm(item - section_point)))
         return _in_slice(point, float(best[0]), float(best[1]))
 
     def sample(self, rng: np.random.Generator) -> Array:
@@ -156,12 +158,12 @@ class HullSolid:
         """Computes the hull.
 
         Args:
-            vertices: of the mesh, shape (n, 3) [m].
+            vertices: Vertices of the mesh, shape (n, 3) [m].
 
         Raises:
-            GeometryError: they are fewer than four, not finite, or in one plane.
+            GeometryError: The vertices are fewer than four, not finite or coplanar.
         """
-        from scipy.spatial import ConvexHull, QhullError  # 0.3 s of import, for meshes only
+        from scipy.spatial import ConvexHull, QhullError  # imported here, because the import takes 0.3 s
 
         points = np.asarray(vertices, dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
@@ -169,17 +171,17 @@ class HullSolid:
         try:
             hull = ConvexHull(points)
         except (QhullError, ValueError) as error:
-            raise GeometryError(f"mesh: its {len(points)} vertices enclose no volume; give a closed mesh") from error
+            raise GeometryError(f"mesh: its {len(points)} vertices enclose no volume; use a closed mesh") from error
         self._vertices = points[hull.vertices]
         self._normals, self._offsets = hull.equations[:, :3], hull.equations[:, 3]
-        self._middle = self._vertices.mean(axis=0)
-        self._corners = points[hull.simplices]
-        volumes = np.abs(np.linalg.det(self._corners - self._middle))
-        self._shares = volumes / volumes.sum()
+        self._centroid = self._vertices.mean(axis=0)
+        self._face_vertices = points[hull.simplices]
+        volumes = np.abs(np.linalg.det(self._face_vertices - self._centroid))
+        self._volume_fractions = volumes / volumes.sum()
 
     @property
     def faces(self) -> Array:
-        """Outward unit normals and offsets [m], shape (n, 4): of a point inside, normal . point + offset is below 0."""
+        """Outward unit normals and offsets [m], shape (n, 4); normal . point + offset < 0 for a point inside."""
         return np.column_stack([self._normals, self._offsets])
 
     @property
@@ -188,7 +190,7 @@ class HullSolid:
         return float(np.linalg.norm(self._vertices, axis=1).max())
 
     def nearest(self, point: Array) -> Array:
-        """Returns the nearest point of the hull: the shortest convex combination of vertices seen from the point."""
+        """Returns the nearest point of the hull, computed as a convex combination of vertices."""
         from scipy.optimize import nnls  # see above
 
         if float((self._normals @ point + self._offsets).max()) <= 0.0:
@@ -198,6 +200,6 @@ class HullSolid:
         return weights @ self._vertices / float(weights.sum())
 
     def sample(self, rng: np.random.Generator) -> Array:
-        """Returns a random point of the hull: of one of the tetrahedra between its middle and its faces."""
-        corners = self._corners[rng.choice(len(self._shares), p=self._shares)]
-        return rng.dirichlet(np.ones(4)) @ np.vstack([corners, self._middle])
+        """Returns a random point of the hull, from a random tetrahedron between its centroid and a face."""
+        face_vertices = self._face_vertices[rng.choice(len(self._volume_fractions), p=self._volume_fractions)]
+        return rng.dirichlet(np.ones(4)) @ np.vstack([face_vertices, self._centroid])

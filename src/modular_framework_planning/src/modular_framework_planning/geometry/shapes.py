@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Describes the shapes objects are made of and builds their exact collision geometry once."""
+"""Collision shapes and their exact Coal geometry."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def _require_positive(kind: str, **dimensions: float) -> None:
     for name, value in dimensions.items():
         if not 0.0 < value <= MAX_LENGTH_M:
             raise GeometryError(
-                f"{kind}: {name} is {value} m; allowed are lengths above 0 m and up to "
-                f"{MAX_LENGTH_M:g} m; use a plane for what has no end"
+                f"{kind}: {name} is {value} m; it must be above 0 m and at most "
+                f"{MAX_LENGTH_M:g} m; use a plane for an infinite surface"
             )
 
 
 class Shape:
-    """A piece of geometry in its own frame; subclasses are compared by identity and never change."""
+    """A collision shape in its own frame; instances are immutable and compared by identity."""
 
     @cached_property
     def geometry(self) -> Any:
-        """The Coal geometry of this shape, built once."""
+        """Coal geometry of the shape, built once."""
         return self._build()
 
     def _build(self) -> Any:
@@ -39,14 +39,14 @@ class Shape:
 
     @cached_property
     def bounding_sphere(self) -> tuple[Array, float]:
-        """Centre and radius [m] of a ball in the shape's frame that holds it."""
+        """Centre and radius of a bounding sphere in the frame of the shape [m]."""
         self.geometry.computeLocalAABB()
         return np.array(self.geometry.aabb_center), float(self.geometry.aabb_radius)
 
 
 @dataclass(frozen=True, eq=False)
 class Box(Shape):
-    """A box centred at the origin; edge lengths [m]."""
+    """A box centred at the origin with edge lengths x, y, z [m]."""
 
     x: float
     y: float
@@ -74,7 +74,7 @@ class Sphere(Shape):
 
 @dataclass(frozen=True, eq=False)
 class RoundShape(Shape):
-    """A shape around the z axis, the middle of its height at the origin; height and radius [m]."""
+    """A shape of revolution about the z axis, centred at half its height; height and radius [m]."""
 
     height: float
     radius: float
@@ -91,14 +91,14 @@ class Cylinder(RoundShape):
 
 
 class Capsule(RoundShape):
-    """A cylinder with half spheres on both ends, which its height leaves out."""
+    """A cylinder with half spheres at both ends, which the height does not include."""
 
     def _build(self) -> Any:
         return coal.Capsule(self.radius, self.height)
 
 
 class Cone(RoundShape):
-    """A cone, tip up."""
+    """A cone with the tip up."""
 
     def _build(self) -> Any:
         return coal.Cone(self.radius, self.height)
@@ -127,7 +127,7 @@ class Plane(Shape):
 
     @cached_property
     def bounding_sphere(self) -> tuple[Array, float]:
-        """None holds a plane."""
+        """Centre and infinite radius, because no sphere contains a plane."""
         return np.zeros(3), np.inf
 
 
@@ -146,15 +146,14 @@ class Mesh(Shape):
                 "at least 3 vertices and 1 triangle are needed"
             )
         if count > MAX_TRIANGLES:
-            raise GeometryError(f"mesh: {count} triangles; allowed are {MAX_TRIANGLES}; simplify the mesh")
+            raise GeometryError(f"mesh: {count} triangles; at most {MAX_TRIANGLES} are allowed; simplify the mesh")
         if not (np.abs(self.vertices) <= MAX_LENGTH_M).all():
             raise GeometryError(
-                "mesh: a vertex is not finite or beyond all reach; allowed are coordinates of at most "
-                f"{MAX_LENGTH_M:g} m"
+                f"mesh: a vertex is not finite or too far away; coordinates must be at most {MAX_LENGTH_M:g} m"
             )
         if int(np.min(self.triangles)) < 0 or int(np.max(self.triangles)) >= len(self.vertices):
             raise GeometryError(
-                f"mesh: a triangle names vertex {int(np.max(self.triangles))}; allowed are 0..{len(self.vertices) - 1}"
+                f"mesh: a triangle refers to vertex {int(np.max(self.triangles))}; allowed: 0..{len(self.vertices) - 1}"
             )
 
     def _build(self) -> Any:
@@ -168,7 +167,7 @@ class Mesh(Shape):
 
     @cached_property
     def bounding_sphere(self) -> tuple[Array, float]:
-        """Known without Coal's tree over the triangles, which takes a second for 100,000 of them."""
+        """Bounding sphere without building Coal's BVH, which takes a second for 100,000 triangles."""
         points = np.asarray(self.vertices, dtype=float)
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         return centre, float(np.linalg.norm(points - centre, axis=1).max())

@@ -11,10 +11,10 @@ import pinocchio as pin
 
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Chain, Tree
-from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, JointGroup, RobotModel
+from modular_framework_planning.robot_model.robot_model import MAX_CACHED_MODELS, JointGroup, RobotModel
 
 
-@lru_cache(maxsize=KEPT_MODELS)
+@lru_cache(maxsize=MAX_CACHED_MODELS)
 def whole_tree(model: RobotModel) -> Tree:
     """Returns all joints of a robot as arrays, cached per robot."""
     return joint_tree(model)

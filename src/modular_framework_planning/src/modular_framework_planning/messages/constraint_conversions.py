@@ -31,7 +31,7 @@ from modular_framework_planning.geometry.regions import (
 from modular_framework_planning.geometry.spatial import IDENTITY_XYZW, Transform, make_transform, quaternion_or_identity
 from modular_framework_planning.messages.multi_dof import with_angles
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
-from modular_framework_planning.robot_model.robot_model import BEYOND_BOUND
+from modular_framework_planning.robot_model.robot_model import GOAL_BOUNDS_TOLERANCE
 
 PRIMITIVES: dict[int, tuple[Callable[..., Solid], int]] = {
     SolidPrimitive.BOX: (BoxSolid, 3),
@@ -170,7 +170,7 @@ class _Reader:
         self._finite(where, position=message.position)
         number = model.index[message.joint_name]
         target = min(max(message.position, model.lower[number]), model.upper[number])
-        if abs(target - message.position) > BEYOND_BOUND:
+        if abs(target - message.position) > GOAL_BOUNDS_TOLERANCE:
             target = message.position  # the user of the constraint reports that it cannot be satisfied
         return JointConstraint(
             message.joint_name,

@@ -27,7 +27,7 @@ from modular_framework_planning.planning_interface.planning_request import (
     PoseGoal,
     group_bounds,
 )
-from modular_framework_planning.robot_model.robot_model import BEYOND_BOUND, JointGroup
+from modular_framework_planning.robot_model.robot_model import GOAL_BOUNDS_TOLERANCE, JointGroup
 
 MAX_GOAL_STATES = 8
 MAX_SAMPLES = 64  # states tried within the tolerances of a goal
@@ -162,11 +162,11 @@ class GoalResolver:
                 target_value += 2.0 * np.pi * np.round((values[column] - target_value) / (2.0 * np.pi))
             min_value = max(bounds[0], target_value - goal.below.get(name, 0.0))
             max_value = min(bounds[1], target_value + goal.above.get(name, 0.0))
-            if min_value > max_value + BEYOND_BOUND:
+            if min_value > max_value + GOAL_BOUNDS_TOLERANCE:
                 raise PlanningError(
                     ErrorCode.GOAL_STATE_INVALID,
                     f"goal: joint '{name}' at {target_value:.6f} is outside "
-                    f"[{bounds[0]:.6f}, {bounds[1]:.6f}]; choose a position at most {BEYOND_BOUND} beyond a bound"
+                    f"[{bounds[0]:.6f}, {bounds[1]:.6f}]; it may exceed a bound by at most {GOAL_BOUNDS_TOLERANCE}"
                     + ("; workspace_parameters bound the base" if self._is_base_variable(name) else ""),
                 )
             low[column], high[column] = np.clip((min(min_value, max_value), max(min_value, max_value)), *bounds)

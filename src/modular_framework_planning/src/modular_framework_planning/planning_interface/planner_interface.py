@@ -28,7 +28,7 @@ from modular_framework_planning.planning_interface.planning_request import (
 )
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.multi_dof_joint import UNBOUNDED_M
-from modular_framework_planning.robot_model.robot_model import BEYOND_BOUND, JointGroup, RobotModel
+from modular_framework_planning.robot_model.robot_model import GOAL_BOUNDS_TOLERANCE, JointGroup, RobotModel
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
 MAX_LONG_WAY_GOALS = 16
@@ -167,10 +167,10 @@ class PlanningProblem:
         Returns:
             At most MAX_LONG_WAY_GOALS joint vectors, shape (m, joints); none for a group without continuous joints.
         """
-        start, endless = self.start_values, self.model.endless[self.group.indices]
+        start, continuous = self.start_values, self.model.continuous[self.group.indices]
         found: list[Array] = []
-        for goal in goals if endless.any() else ():
-            offsets = np.where(endless & (np.abs(goal - start) > BEYOND_BOUND), goal - start, 0.0)
+        for goal in goals if continuous.any() else ():
+            offsets = np.where(continuous & (np.abs(goal - start) > GOAL_BOUNDS_TOLERANCE), goal - start, 0.0)
             shifts = [
                 (0.0,) if offset == 0.0 else (0.0, -float(np.copysign(2.0 * np.pi, offset))) for offset in offsets
             ]

@@ -16,7 +16,7 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.planning_scene.allowed_collisions import AllowedCollisionMatrix, matrix_from_semantics
 from modular_framework_planning.planning_scene.padding import Padding
-from modular_framework_planning.robot_model.robot_model import KEPT_MODELS, RobotModel
+from modular_framework_planning.robot_model.robot_model import MAX_CACHED_MODELS, RobotModel
 
 _versions = count(1)
 OCTOMAP_ID = "<octomap>"
@@ -308,6 +308,6 @@ def empty_scene(model: RobotModel, positions: Array | None = None) -> PlanningSc
     return PlanningScene(model=model, positions=start, acm=_matrix_of_srdf(model))
 
 
-@lru_cache(maxsize=KEPT_MODELS)
+@lru_cache(maxsize=MAX_CACHED_MODELS)
 def _matrix_of_srdf(model: RobotModel) -> AllowedCollisionMatrix:
     return matrix_from_semantics(model.semantics, model.document.links)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot: its URDF, SRDF and joint limits joined into one model."""
+"""Robot model from URDF, SRDF and joint limits."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the gripper of a planning group in the SRDF, and which links are the gripper's."""
+"""End effectors in the SRDF: selection for a planning group, and their links."""
 
 from __future__ import annotations
 
@@ -9,47 +9,48 @@ from modular_framework_urdf.srdf_reader import EndEffector
 
 
 def choose_end_effector(model: RobotModel, group: str, name: str) -> tuple[JointGroup, EndEffector]:
-    """Returns the arm's group and its end effector.
+    """Returns the group of the arm and its end effector.
+
+    An end effector belongs to its parent group, or to a group that moves its parent link.
 
     Args:
-        model: the robot.
-        group: planning group; empty: the parent group of the end effector. Of a group that is no chain, such as two
-            arms, the smallest chain in it that moves the end effector is the arm.
-        name: of the end effector; empty: the group's only one. An end effector belongs to a group that is its parent
-            group, or that moves its parent link.
+        model: Robot model.
+        group: Planning group; empty for the parent group of the end effector. In a group that is not a chain, such as
+            two arms, the arm is the smallest chain that moves the end effector.
+        name: Name of the end effector; empty for the only end effector of the group.
 
     Raises:
-        PlanningError: a name is unknown, or the choice is not clear.
+        PlanningError: A name is unknown, or the choice is ambiguous.
     """
-    known = {item.name: item for item in model.semantics.end_effectors}
-    if name and name not in known:
-        raise UnknownNameError(ErrorCode.INVALID_GROUP_NAME, "end effector", name, known)
+    effectors = {item.name: item for item in model.semantics.end_effectors}
+    if name and name not in effectors:
+        raise UnknownNameError(ErrorCode.INVALID_GROUP_NAME, "end effector", name, effectors)
     if not group:
         if not name:
             raise PlanningError(
                 ErrorCode.INVALID_GROUP_NAME,
-                f"neither group_name nor end_effector is given; name one of the groups {', '.join(model.groups)}",
+                f"neither group_name nor end_effector is set; choose one of the groups {', '.join(model.groups)}",
             )
-        group = known[name].parent_group
+        group = effectors[name].parent_group
     arm = model.group(group)
-    fitting = [item for item in known.values() if item.parent_group == group] or [
-        item for item in known.values() if _chain_to(model, arm, item.parent_link) is not None
+    matches = [item for item in effectors.values() if item.parent_group == group] or [
+        item for item in effectors.values() if _chain_to(model, arm, item.parent_link) is not None
     ]
     if name:
-        fitting = [item for item in fitting if item.name == name]
-    if len(fitting) != 1:
+        matches = [item for item in matches if item.name == name]
+    if len(matches) != 1:
         raise PlanningError(
             ErrorCode.INVALID_GROUP_NAME,
-            f"group '{group}' has {len(fitting)} end effectors "
-            f"({', '.join(item.name for item in fitting) or 'none'}"
-            f"{f' named {name}' if name else ''}); exactly one is needed: name it, or add "
+            f"group '{group}' has {len(matches)} end effectors "
+            f"({', '.join(item.name for item in matches) or 'none'}"
+            f"{f' named {name}' if name else ''}); exactly one is needed: set end_effector, or add an "
             "<end_effector> with this parent_group to the SRDF",
         )
-    return _chain_to(model, arm, fitting[0].parent_link) or arm, fitting[0]
+    return _chain_to(model, arm, matches[0].parent_link) or arm, matches[0]
 
 
 def _chain_to(model: RobotModel, group: JointGroup, link: str) -> JointGroup | None:
-    """Returns the group, or the smallest group of some of its joints, that is a chain and moves a link."""
+    """Returns the group or, if it is not a chain, the smallest chain among its subgroups that moves a link."""
     chains = [
         item
         for item in (group, *model.groups.values())
@@ -59,7 +60,7 @@ def _chain_to(model: RobotModel, group: JointGroup, link: str) -> JointGroup | N
 
 
 def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
-    """Whether a link is rigidly fixed to the end of a group's chain."""
+    """Checks that a link is rigidly fixed to the end of a group's chain."""
     if not group.is_chain or not model.has_link(link):
         return False
     frames = model.pin_model.frames
@@ -68,7 +69,7 @@ def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
 
 
 def hand_links(model: RobotModel, effector: EndEffector) -> tuple[str, ...]:
-    """Returns the links of the end effector's group and what lies between them and the link it is fixed to."""
+    """Returns the links of the end effector's group, and the links between this group and the parent link."""
     parents = {child: model.document.joint_parents[joint] for joint, child in model.document.joint_children.items()}
     links = list(model.group(effector.group).links)
     for link in tuple(links):

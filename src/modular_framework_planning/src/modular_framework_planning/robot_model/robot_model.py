@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joins URDF, SRDF and joint limits into one immutable model of the robot: joints, groups, frames, geometry."""
+"""Immutable robot model from URDF, SRDF and joint limits: joints, groups, frames and geometry."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from modular_framework_planning.errors import ErrorCode, ModelError, UnknownNameError
-from modular_framework_planning.geometry.angles import short_way
+from modular_framework_planning.geometry.angles import shortest_difference
 from modular_framework_planning.geometry.shapes import Shape
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.srdf import parse_srdf
@@ -26,13 +26,13 @@ from modular_framework_planning.robot_model.urdf_document import (
 from modular_framework_urdf.joint_limits import DEFAULT_ACCELERATION, DEFAULT_VELOCITY, JointLimits, overwritten
 from modular_framework_urdf.srdf_reader import GroupSpec, SemanticDescription
 
-BEYOND_BOUND = 1.0e-4  # [rad or m]; a goal this little beyond a joint's bound means the bound (3.1416 for pi)
-KEPT_MODELS = 4  # for how many robots what is computed once for a robot is kept
+GOAL_BOUNDS_TOLERANCE = 1.0e-4  # bounds violation of a goal that is clipped, such as 3.1416 for pi [rad or m]
+MAX_CACHED_MODELS = 4  # number of robots whose derived data are cached
 
 
 @dataclass(frozen=True, slots=True)
 class LinkGeometry:
-    """One collision element of a link: its shape and the pose in the frame of the moving joint."""
+    """Collision element of a link, placed in the frame of the joint that moves it."""
 
     link: str
     joint_id: int
@@ -42,7 +42,7 @@ class LinkGeometry:
 
     @property
     def geometry(self) -> Any:
-        """The Coal geometry of the shape."""
+        """Coal geometry of the shape."""
         return self.shape.geometry
 
 
@@ -51,10 +51,11 @@ class JointGroup:
     """A planning group.
 
     Attributes:
-        joints: joints the planner may move, in the order of the kinematic tree.
-        indices: of those joints in a position vector of the whole robot.
-        links: links whose parent joint belongs to the group.
-        base_link, tip_link: ends of the chain; empty where the group is not a chain.
+        name: Name of the group.
+        joints: Active joints, in the order of the kinematic tree.
+        indices: Indices of these joints in a position vector of the whole robot.
+        links: Links whose parent joint belongs to the group.
+        base_link, tip_link: Ends of the chain; empty if the group is not a chain.
     """
 
     name: str
@@ -66,34 +67,34 @@ class JointGroup:
 
     @property
     def is_chain(self) -> bool:
-        """Whether inverse kinematics can be asked of this group."""
+        """Whether the group is a chain with inverse kinematics."""
         return bool(self.tip_link and self.joints)
 
 
 def _entry(entries: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Returns a joint's entry in joint_limits.yaml; the parameter server splits "joint/variable" at the slash."""
+    """Returns a joint's entry in joint_limits.yaml, whose key "joint/variable" the parameter server splits."""
     joint, _, variable = name.rpartition("/")
     return entries.get(name) or (entries.get(joint) or {}).get(variable) or {}
 
 
 class RobotModel:
-    """The robot; nothing in it changes after construction, so threads may share it.
+    """Immutable and thread-safe robot model.
 
-    Position vectors hold one value per movable joint (mimic joints included) in the order of `joint_names`. A planar or
-    floating virtual joint (`base`) stands there as its variables, each a joint of its own.
+    Position vectors hold a value per movable joint, including mimic joints, in the order of `joint_names`. A planar or
+    floating virtual joint (`base`) is represented by its variables, each a joint.
     """
 
     def __init__(
         self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None, resolve: MeshResolver = package_resolver
     ) -> None:
-        self.source = (urdf, srdf, dict(limits or {}), resolve)  # makes the same robot in another process
+        self.source = (urdf, srdf, dict(limits or {}), resolve)  # to rebuild the model in a different process
         self.semantics: SemanticDescription = parse_srdf(srdf)
         self.document = load_urdf(urdf, resolve, self.semantics.virtual_joints)
         self.base = self.document.multi_dof_joint
         self.name = self.document.robot_name
         self.pin_model = pin.buildModelFromXML(self.document.xml)
         self.joint_names: tuple[str, ...] = tuple(self.pin_model.names)[1:]
-        self.index = {name: number for number, name in enumerate(self.joint_names)}
+        self.index = {name: index for index, name in enumerate(self.joint_names)}
         if self.pin_model.nq != len(self.joint_names):
             raise ModelError(
                 f"URDF: {self.pin_model.nq} position variables for {len(self.joint_names)} joints; "
@@ -104,17 +105,17 @@ class RobotModel:
         )
         self.passive_joints = frozenset(self.semantics.passive_joints) - self.document.mimics.keys()
         self.follower_joints = frozenset(self._expanded((*self.document.mimics, *self.semantics.passive_joints)))
-        # As in MoveIt: the frame in which the base moves, or the root link; the parent frame of a fixed virtual joint
-        # comes from tf, as other frames do.
+        # As in MoveIt: the parent frame of a moving base, or the root link. tf provides the parent frame of a fixed
+        # virtual joint.
         self.planning_frame = self.base.parent_frame if self.base else self.document.root_link
         self.frame_ids = {link: self.pin_model.getFrameId(link, pin.FrameType.BODY) for link in self.document.links}
         self.limits, notes = self._joint_limits(limits or {})
-        self.notes = (*self.document.notes, *notes)  # what was ignored or is looser than described, and why
+        self.notes = (*self.document.notes, *notes)  # ignored elements and limits looser than the URDF, with reasons
         self.lower, self.upper, self.max_velocity, self.max_acceleration, self.max_jerk = (
             np.array([getattr(self.limits[name], key) for name in self.joint_names])
             for key in ("lower", "upper", "velocity", "acceleration", "jerk")
         )
-        self.endless = self.upper >= CONTINUOUS_BOUND
+        self.continuous = self.upper >= CONTINUOUS_BOUND
         self.max_deceleration = np.array([self.limits[name].braking for name in self.joint_names])
         self.mimics = [
             (self.index[name], self.index[mimic.leader], mimic.multiplier, mimic.offset)
@@ -129,27 +130,27 @@ class RobotModel:
         self.groups = {name: self._build_group(spec) for name, spec in self.semantics.groups.items()}
 
     def _expanded(self, joints: Iterable[str]) -> set[str]:
-        """Returns names of joints, the planar or floating one replaced by its variables; one of these means all."""
+        """Returns joint names, with the base or any of its variables replaced by all its variables."""
         names = set(joints)
         if self.base and names & {self.base.name, *self.base.variables}:
             names = (names - {self.base.name}) | set(self.base.variables)
         return names
 
     def _joint_limits(self, entries: Mapping[str, Any]) -> tuple[dict[str, JointLimits], tuple[str, ...]]:
-        """Returns the limits of all joints, and notes on entries that are looser than the URDF, or ignored."""
+        """Returns the limits of all joints, and notes about entries that are ignored or looser than the URDF."""
         result: dict[str, JointLimits] = {}
         notes: list[str] = []
-        for number, name in enumerate(self.joint_names):
-            bounds = (self.pin_model.lowerPositionLimit[number], self.pin_model.upperPositionLimit[number])
+        for index, name in enumerate(self.joint_names):
+            bounds = (self.pin_model.lowerPositionLimit[index], self.pin_model.upperPositionLimit[index])
             limits = self.document.limits.get(name)
-            if limits is None:  # of the base
+            if limits is None:  # a variable of the base
                 limits = JointLimits(float(bounds[0]), float(bounds[1]), DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
-            is_endless = math.isinf(limits.upper)
+            is_continuous = math.isinf(limits.upper)
             try:
-                limits, found = overwritten(name, limits, _entry(entries, name), is_endless)
+                limits, found = overwritten(name, limits, _entry(entries, name), is_continuous)
             except ValueError as error:
                 raise ModelError(str(error)) from error
-            if is_endless:
+            if is_continuous:
                 limits = replace(limits, lower=-CONTINUOUS_BOUND, upper=CONTINUOUS_BOUND)
             result[name] = limits
             notes += found
@@ -166,31 +167,33 @@ class RobotModel:
         return tuple(result)
 
     def chain_joints(self, base_link: str, tip_link: str) -> list[str]:
-        """Returns the joints from base to tip, fixed ones included.
+        """Returns the joints from base to tip, including fixed joints.
 
         Raises:
-            ModelError: the tip does not hang below the base.
+            ModelError: The tip is not a descendant of the base.
         """
         joints: list[str] = []
         link = tip_link
         while link != base_link:
             if link not in self._tree:
                 raise ModelError(
-                    f"SRDF chain {base_link} -> {tip_link}: '{tip_link}' does not hang below '{base_link}' in the URDF"
+                    f"SRDF chain {base_link} -> {tip_link}: '{tip_link}' is not a descendant of '{base_link}'"
                 )
             link, joint = self._tree[link]
             joints.append(joint)
         return joints[::-1]
 
     def is_carried(self, link: str, carrier: str) -> bool:
-        """Whether only fixed and passive joints lie between a link and the one that carries it (or it is that link)."""
-        path, above = self.joints_above(link), self.joints_above(carrier)
-        return path[: len(above)] == above and self.passive_joints.issuperset(path[len(above) :])
+        """Checks that only fixed and passive joints lie between a link and its carrier."""
+        path, carrier_joints = self.joints_above(link), self.joints_above(carrier)
+        return path[: len(carrier_joints)] == carrier_joints and self.passive_joints.issuperset(
+            path[len(carrier_joints) :]
+        )
 
     def joints_above(self, link: str) -> list[str]:
-        """Returns the names of the joints that move a link, the root's first: Pinocchio's "universe" and below."""
+        """Returns the names of the joints that move a link, from the root, starting with Pinocchio's "universe"."""
         joint = self.pin_model.frames[self.frame_ids[link]].parentJoint
-        return [self.pin_model.names[number] for number in self.pin_model.supports[joint]]
+        return [self.pin_model.names[index] for index in self.pin_model.supports[joint]]
 
     def _group_joints(self, spec: GroupSpec, seen: tuple[str, ...] = ()) -> set[str]:
         if spec.name in seen:
@@ -201,7 +204,7 @@ class RobotModel:
         unknown = [name for name in spec.joints if name not in self.document.joint_kinds and name not in virtual]
         unknown += [link for link in spec.links if link not in self.document.links]
         if unknown:
-            raise ModelError(f"SRDF group '{spec.name}': {', '.join(unknown)} is not in the URDF")
+            raise ModelError(f"SRDF group '{spec.name}' names {', '.join(unknown)}, not in the URDF")
         for base, tip in spec.chains:
             joints |= set(self.chain_joints(base, tip))
         for name in spec.subgroups:
@@ -224,9 +227,9 @@ class RobotModel:
         if len(spec.chains) == 1 and not (spec.joints or spec.links or spec.subgroups):
             return spec.chains[0]
         for name in spec.subgroups:
-            inner = self.semantics.groups[name]
-            if len(inner.chains) == 1 and set(joints) <= set(self.chain_joints(*inner.chains[0])):
-                return inner.chains[0]
+            subgroup = self.semantics.groups[name]
+            if len(subgroup.chains) == 1 and set(joints) <= set(self.chain_joints(*subgroup.chains[0])):
+                return subgroup.chains[0]
         if not joints:
             return "", ""
         base = self.document.joint_parents[joints[0]]
@@ -235,43 +238,43 @@ class RobotModel:
             movable = [name for name in self.chain_joints(base, tip) if name in self.index]
         except ModelError:
             return "", ""
-        return (base, self._furthest_fixed(tip, spec)) if movable == list(joints) else ("", "")
+        return (base, self._last_fixed_link(tip, spec)) if movable == list(joints) else ("", "")
 
-    def _furthest_fixed(self, tip: str, spec: GroupSpec) -> str:
-        """Follows the fixed joints a group lists beyond its last moving joint."""
+    def _last_fixed_link(self, tip: str, spec: GroupSpec) -> str:
+        """Returns the last link behind the fixed joints of the group after its last moving joint."""
         members = self._group_joints(spec)
         for joint, child in self.document.joint_children.items():
             if joint in members and joint not in self.index and self.document.joint_parents[joint] == tip:
-                return self._furthest_fixed(child, spec)
+                return self._last_fixed_link(child, spec)
         return tip
 
     def group(self, name: str) -> JointGroup:
-        """Returns a planning group; raises UnknownNameError with the known ones."""
+        """Returns a planning group; raises UnknownNameError for an unknown name."""
         if name not in self.groups:
             raise UnknownNameError(ErrorCode.INVALID_GROUP_NAME, "planning group", name, self.groups)
         return self.groups[name]
 
     def joint_index(self, name: str) -> int:
-        """Returns the index of a joint in a position vector; raises UnknownNameError."""
+        """Returns the index of a joint in a position vector; raises UnknownNameError for an unknown name."""
         if name not in self.index:
             raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, "joint", name, self.joint_names)
         return self.index[name]
 
     def has_link(self, name: str) -> bool:
-        """Whether the URDF has a link of that name."""
+        """Checks whether the URDF has a link."""
         return name in self.frame_ids
 
     def default_positions(self) -> Array:
-        """Returns zeros, or the nearest allowed value where zero is out of bounds."""
+        """Returns zero for each joint, clipped to its bounds."""
         return self.with_mimics(np.clip(np.zeros(len(self.joint_names)), self.lower, self.upper))
 
     def with_mimics(self, positions: Array, leaders: Collection[int] | None = None) -> Array:
         """Returns a copy in which mimic joints follow their leaders.
 
         Args:
-            positions: of the whole robot [rad or m].
-            leaders: only followers of these joints are changed; all by default. A gripper whose passive joints are
-                measured keeps what was measured while the arm moves.
+            positions: Positions of the whole robot [rad or m].
+            leaders: Joints whose mimic joints are updated; None for all. The measured passive joints of a gripper then
+                keep their values while the arm moves.
         """
         result = np.array(positions, dtype=float)
         for follower, leader, multiplier, offset in self.mimics:
@@ -280,10 +283,10 @@ class RobotModel:
         return result
 
     def merge(self, base: Array, values: Mapping[str, float]) -> Array:
-        """Returns `base` with the named joints replaced; mimic joints that are not named follow.
+        """Returns a copy of positions with the values of named joints replaced; other mimic joints follow.
 
         Raises:
-            UnknownNameError: a joint does not exist.
+            UnknownNameError: A joint does not exist.
         """
         result = np.array(base, dtype=float)
         for name, value in values.items():
@@ -294,28 +297,28 @@ class RobotModel:
                 result[follower] = multiplier * result[leader] + offset
         return result
 
-    def is_continuous(self, number: int) -> bool:
-        """Whether the joint at that index of a position vector turns without end."""
-        return bool(self.endless[number])
+    def is_continuous(self, index: int) -> bool:
+        """Checks whether the joint at an index of a position vector is continuous."""
+        return bool(self.continuous[index])
 
-    def way(self, start: Array, end: Array, indices: Sequence[int] | NDArray[np.int64] | None = None) -> Array:
-        """Returns by how much joints differ [rad or m]; those that turn without end by the short way.
+    def displacement(self, start: Array, end: Array, indices: Sequence[int] | NDArray[np.int64] | None = None) -> Array:
+        """Returns joint displacements from start to end, by the shorter rotation for continuous joints [rad or m].
 
         Args:
-            start: positions of joints, shape (..., joints).
-            end: of the same joints.
-            indices: of the joints in a position vector; all joints by default.
+            start: Joint positions, shape (..., joints).
+            end: Positions of the same joints.
+            indices: Indices of the joints in a position vector; None for all joints.
         """
-        gap = np.asarray(end, dtype=float) - start
-        endless = self.endless if indices is None else self.endless[np.asarray(indices, dtype=np.int64)]
-        return short_way(gap, endless)
+        difference = np.asarray(end, dtype=float) - start
+        continuous = self.continuous if indices is None else self.continuous[np.asarray(indices, dtype=np.int64)]
+        return shortest_difference(difference, continuous)
 
     def with_base(self, positions: Array, transform: Transform) -> Array:
-        """Returns a copy with the root link elsewhere in the planning frame; angles are given near the present ones.
+        """Returns a copy with the root link at a new pose, with angles unwrapped to the current angles.
 
         Args:
-            positions: of the whole robot [rad or m].
-            transform: of the root link; the robot has a planar or floating virtual joint.
+            positions: Positions of a robot with a planar or floating virtual joint [rad or m].
+            transform: Pose of the root link in the planning frame.
         """
         assert self.base is not None
         result = np.array(positions, dtype=float)
@@ -333,24 +336,24 @@ class RobotModel:
         tolerance: float = 1e-9,
         bounds: tuple[Array, Array] | None = None,
     ) -> list[str]:
-        """Returns one sentence per joint that is out of its bounds.
+        """Returns a message per joint that is out of bounds.
 
         Args:
-            positions: of the whole robot [rad or m].
-            indices: of the joints to look at.
-            tolerance: how far beyond a bound counts as within [rad or m].
-            bounds: of these joints, where they are narrower than the robot's.
+            positions: Positions of the whole robot [rad or m].
+            indices: Indices of the joints to check.
+            tolerance: Accepted violation of a bound [rad or m].
+            bounds: Lower and upper bounds of these joints; None for the bounds of the robot.
         """
-        chosen = np.asarray(list(indices), dtype=np.int64)
-        lower, upper = (self.lower[chosen], self.upper[chosen]) if bounds is None else bounds
+        selected = np.asarray(list(indices), dtype=np.int64)
+        lower, upper = (self.lower[selected], self.upper[selected]) if bounds is None else bounds
         return [
-            f"joint {self.joint_names[number]} at {positions[number]:.4f} is outside [{low:.4f}, {high:.4f}]"
-            for number, low, high in zip(chosen, lower, upper, strict=True)
-            if not low - tolerance <= positions[number] <= high + tolerance
+            f"joint {self.joint_names[index]} at {positions[index]:.4f} is outside [{low:.4f}, {high:.4f}]"
+            for index, low, high in zip(selected, lower, upper, strict=True)
+            if not low - tolerance <= positions[index] <= high + tolerance
         ]
 
     def link_transforms(self, positions: Array) -> dict[str, Transform]:
-        """Computes the pose of every link in the planning frame."""
+        """Returns the pose of every link in the planning frame, keyed by link name."""
         data = self.pin_model.createData()
         pin.framesForwardKinematics(self.pin_model, data, positions)
         return {link: data.oMf[frame].copy() for link, frame in self.frame_ids.items()}

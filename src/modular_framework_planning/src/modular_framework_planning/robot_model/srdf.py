@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The semantic description (SRDF) of a robot, with the planner's kind of error."""
+"""Semantic robot description (SRDF), with the planner's errors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def parse_srdf(text: str) -> SemanticDescription:
     """Parses an SRDF document.
 
     Raises:
-        ModelError: the text is not XML, has a DOCTYPE, or an element lacks an attribute.
+        ModelError: The text is not XML, has a DOCTYPE, or an element lacks an attribute.
     """
     try:
         return read_srdf(text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prepares a URDF for Pinocchio: shapes are read, continuous joints become unbounded, mimics are noted."""
+"""Preparation of a URDF for Pinocchio, and the content of the URDF that Pinocchio does not keep."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from modular_framework_urdf.urdf_reader import AttributeFault, read_urdf
 MeshResolver = Callable[[str], str]
 VisualMesh = tuple[str, Transform, tuple[float, float, float]]  # URI, pose in the link, scale
 PlacedShape = tuple[Shape, Transform]  # shape, pose in the link
-CONTINUOUS_BOUND = 1.0e6  # [rad]; a continuous joint has no end
+CONTINUOUS_BOUND = 1.0e6  # bound that stands for the missing bounds of a continuous joint [rad]
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfDocument:
-    """A URDF prepared for Pinocchio, and what Pinocchio does not keep; the links' geometry is not in `xml`.
+    """A URDF prepared for Pinocchio.
 
-    The joints of `xml` and of the mappings are those of the URDF and, above the root link, the variables of a planar or
-    floating virtual joint.
+    `xml` contains no geometry. The joints of `xml` and of the mappings are the joints of the URDF and, above the root
+    link, the variables of a planar or floating virtual joint.
     """
 
     xml: str
@@ -48,13 +48,13 @@ class UrdfDocument:
     visual_meshes: Mapping[str, tuple[VisualMesh, ...]] = field(default_factory=dict)
     visual_shapes: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
     collisions: Mapping[str, tuple[PlacedShape, ...]] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()  # what was ignored, and why
-    multi_dof_joint: MultiDofJoint | None = None  # above the root link
-    limits: Mapping[str, JointLimits] = field(default_factory=dict)  # of the URDF's joints, by name
+    notes: tuple[str, ...] = ()  # ignored elements, with reasons
+    multi_dof_joint: MultiDofJoint | None = None  # planar or floating joint above the root link
+    limits: Mapping[str, JointLimits] = field(default_factory=dict)  # limits of the URDF, keyed by joint name
 
 
 def directory_resolver(root: Path) -> MeshResolver:
-    """Returns a resolver that looks every mesh up below one folder, whatever its package prefix."""
+    """Returns a resolver that finds meshes below a folder, independent of their package prefix."""
 
     def resolve(uri: str) -> str:
         relative = uri.split("://", 1)[-1]
@@ -67,7 +67,7 @@ def directory_resolver(root: Path) -> MeshResolver:
 
 
 def package_resolver(uri: str) -> str:
-    """Finds package://, file:// and absolute mesh paths; packages are looked up by rospkg."""
+    """Returns the file path of a package:// or file:// URI or an absolute path; rospkg finds packages."""
     if uri.startswith("package://"):
         import rospkg
 
@@ -89,32 +89,32 @@ def _check_kinds(robot: Robot) -> None:
     for joint in robot.joints:
         if joint.kind not in (*MOVABLE_KINDS, "fixed") or not joint.parent or not joint.child:
             raise ModelError(
-                f"URDF joint '{joint.name}': type '{joint.kind}' with parent and child; allowed types are "
-                f"{', '.join(MOVABLE_KINDS)} and fixed, and both links must be named"
+                f"URDF joint '{joint.name}' has type '{joint.kind}'; the type must be "
+                f"{', '.join(MOVABLE_KINDS)} or fixed, and both links must be named"
             )
 
 
 def _mimics(robot: Robot) -> tuple[dict[str, Mimic], tuple[str, ...]]:
-    """Returns what each mimic joint follows in the end, and notes on those that are ignored; raises ModelError."""
+    """Returns the resolved mimic joints, and notes about ignored ones; raises ModelError for an invalid mimic."""
     direct = {joint.name: joint.mimic for joint in robot.movable_joints() if joint.mimic is not None}
     try:
         mimics = resolved(direct, [joint.name for joint in robot.movable_joints()])
     except ValueError as error:
         raise ModelError(str(error)) from error
     return mimics, tuple(
-        f"URDF joint '{joint.name}': <mimic> is ignored, because the joint is fixed; remove it, or make the joint one "
-        "that moves"
+        f"URDF joint '{joint.name}': <mimic> is ignored, because the joint is fixed; remove it, or make the joint "
+        "movable"
         for joint in robot.joints
         if joint.kind == "fixed" and joint.mimic is not None
     )
 
 
 def _xml_for_pinocchio(text: str, base: Sequence[Variable]) -> str:
-    """Returns the document as Pinocchio gets it: kinematics and inertias, continuous joints bounded, no mimics.
+    """Returns the XML for Pinocchio: kinematics and inertias, with bounded continuous joints and without mimics.
 
     Args:
-        text: the URDF.
-        base: joints to put above the root link.
+        text: URDF document.
+        base: Joints to insert above the root link.
     """
     root = xml_text.parse(text, "URDF")
     for link in root.findall("link"):
@@ -142,7 +142,7 @@ def _xml_for_pinocchio(text: str, base: Sequence[Variable]) -> str:
 
 
 def _placed(items: tuple[PlacedShapes, ...]) -> Iterator[tuple[urdf.Shape, Transform]]:
-    """The shapes of a link's visuals or collisions, and their poses in the link."""
+    """Yields the shapes of visual or collision elements and their poses in the link frame."""
     for item in items:
         pose = pin.SE3(pin.rpy.rpyToMatrix(*item.origin.rpy), np.array(item.origin.xyz))
         for shape in item.shapes:
@@ -157,7 +157,9 @@ def _visual_meshes(link: Link) -> Iterator[VisualMesh]:
 
 def _visual_shapes(link: Link) -> Iterator[PlacedShape]:
     for shape, pose in _placed(link.visuals):
-        primitive = None if isinstance(shape, urdf.Capsule) else _primitive(shape)  # no marker shows a capsule
+        primitive = (
+            None if isinstance(shape, urdf.Capsule) else _primitive(shape)
+        )  # there is no marker type for a capsule
         if primitive is not None:
             yield primitive, pose
 
@@ -176,11 +178,11 @@ def _primitive(shape: urdf.Shape) -> Shape | None:
 
 
 def _collisions(link: Link, resolve: MeshResolver) -> Iterator[PlacedShape]:
-    """Shapes of a link; raises ModelError for a mesh that is not there or cannot be read, or an unknown shape."""
+    """Yields the collision shapes of a link; raises ModelError for an unreadable mesh or an unknown shape."""
     where = f"URDF link '{link.name}' collision"
     for shape, pose in _placed(link.collisions):
         if isinstance(shape, urdf.UnknownShape):
-            raise ModelError(f"{where}: <{shape.tag}>; allowed are box, capsule, cylinder, sphere and mesh")
+            raise ModelError(f"{where}: <{shape.tag}>; allowed: box, capsule, cylinder, sphere and mesh")
         try:
             if isinstance(shape, urdf.MeshFile):
                 mesh = read_mesh(resolve(shape.uri), shape.scale)
@@ -196,16 +198,16 @@ def _collisions(link: Link, resolve: MeshResolver) -> Iterator[PlacedShape]:
 def load_urdf(
     text: str, resolve: MeshResolver = package_resolver, virtual_joints: Sequence[VirtualJoint] = ()
 ) -> UrdfDocument:
-    """Parses a URDF and makes it ready for Pinocchio.
+    """Parses a URDF and prepares it for Pinocchio.
 
     Args:
-        text: the document, xacro already expanded.
-        resolve: turns a mesh URI into the path of an existing file.
-        virtual_joints: of the SRDF; one that moves the root link becomes a part of the tree.
+        text: URDF document with expanded xacro.
+        resolve: Returns the file path of a mesh URI.
+        virtual_joints: Virtual joints of the SRDF; a joint that moves the root link is added to the tree.
 
     Raises:
-        ModelError: not XML, a DOCTYPE, a wrong number, no root link, an unsupported joint type, a mesh that cannot be
-            read.
+        ModelError: Invalid XML, a DOCTYPE, an invalid number, no unique root link, an unsupported joint type or an
+            unreadable mesh.
     """
     try:
         robot = read_urdf(text, "URDF")

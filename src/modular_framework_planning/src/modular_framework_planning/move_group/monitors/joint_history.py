@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
-from modular_framework_planning.geometry.angles import short_way
+from modular_framework_planning.geometry.angles import shortest_difference
 from modular_framework_planning.geometry.spatial import Array
 
 KEPT = 2000
@@ -64,4 +64,4 @@ class JointHistory:
         first, last = self._times[after - 1], self._times[after]
         share = (stamp_s - first) / (last - first)
         begin = self._positions[after - 1]
-        return begin + share * short_way(self._positions[after] - begin, self._endless)
+        return begin + share * shortest_difference(self._positions[after] - begin, self._endless)

@@ -56,7 +56,7 @@ class SceneMonitor:
         self._lock = threading.RLock()
         self._positions = model.default_positions()
         self._base_is_seen = False  # tf has shown where a planar or floating base is
-        self._history = JointHistory(model.endless)
+        self._history = JointHistory(model.continuous)
         self._stamps: dict[int, rospy.Time] = {}
         self._arrivals = 0
         self._latest: rospy.Time | None = None
