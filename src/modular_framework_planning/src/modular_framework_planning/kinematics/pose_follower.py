@@ -142,10 +142,10 @@ class PoseFollower:
     def _nearest_solution(self, guess: Array, target: Transform) -> Array:
         indices = self.group.indices
         seed = self.full_positions(np.clip(guess, self.model.lower[indices], self.model.upper[indices]))
-        found = self._solver.solutions(self.link, target, seed)
-        if not found:
+        solutions = self._solver.solutions(self.link, target, seed)
+        if not solutions:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, self._solver.explain_unreachable(self.link, target, seed))
-        return np.asarray(found[0][self.group.indices], dtype=float)
+        return np.asarray(solutions[0][self.group.indices], dtype=float)
 
     def joint_rates(
         self, values: Array, motion: LinkMotion, preferred: tuple[Array, Array] | None = None

@@ -203,12 +203,12 @@ class GoalResolver:
             solver = self._kinematics.solver(self._group.name)
             if solver.settings.position_only:
                 return self._position(goal, solver)
-            found = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng, self._bounds)
+            solutions = solver.solutions(goal.link, goal.target, seed, math.inf, self._rng, self._bounds)
         except PlanningError:
             if allowed is None:
                 raise
             return self._region(allowed)  # least squares without a chain to the link
-        candidates = [positions[self._group.indices] for positions in found]
+        candidates = [positions[self._group.indices] for positions in solutions]
         free = first_free(candidates, self._is_valid, MAX_GOAL_STATES)
         if allowed is not None and allowed.is_loose:
             nearest = self._in_workspace(allowed).project(seed, self._group.indices)
@@ -235,9 +235,9 @@ class GoalResolver:
         if allowed is not None:
             offset, frame = allowed.positions[0].offset, allowed.pose_target(seed)
             point, position = (goal.target.inverse() * frame).act(offset), frame.act(offset)
-        found = [item[indices] for item in solver.position_solutions(goal.link, point, position, seed, math.inf)]
+        solutions = [item[indices] for item in solver.position_solutions(goal.link, point, position, seed, math.inf)]
         low, high = self._bounds
-        candidates = [values for values in found if ((low <= values) & (values <= high)).all()]
+        candidates = [values for values in solutions if ((low <= values) & (values <= high)).all()]
         free = first_free(candidates, self._is_valid, MAX_GOAL_STATES)
         if free:
             return free
@@ -255,12 +255,12 @@ class GoalResolver:
         """Returns solutions at random poses within the tolerances."""
         seed, indices = self._request.scene.positions, self._group.indices
         to_link = allowed.pose_target(seed).inverse() * goal.target
-        found: list[Array] = []
+        result: list[Array] = []
         for _ in range(MAX_POSES):
             target = allowed.pose_target(seed, self._rng) * to_link
             solutions = solver.solutions(goal.link, target, seed, math.inf, self._rng, self._bounds)
-            found += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
-        return found
+            result += [positions[indices] for positions in solutions if allowed.satisfied(positions)]
+        return result
 
     def _region(self, constraints: KinematicConstraints) -> list[Array]:
         """Returns free states that satisfy the constraints: the state nearest to the start and random states."""
@@ -269,11 +269,11 @@ class GoalResolver:
         free: list[Array] = []
         rejected: list[Array] = []
         for index in range(MAX_SAMPLES):
-            found = (
+            state = (
                 constraints.project(seed, indices) if index == 0 else (constraints.sample(self._rng, seed, indices, 1))
             )
-            if found is not None:
-                (free if self._is_valid(found[indices]) else rejected).append(found[indices])
+            if state is not None:
+                (free if self._is_valid(state[indices]) else rejected).append(state[indices])
             if len(free) >= MAX_GOAL_STATES:
                 break
         if free:

@@ -106,9 +106,9 @@ class MotionChecker:
     def colliding_state(self, polyline: Array, step: float) -> Array | None:
         """Returns a colliding state of a polyline, including its start, or None."""
         for piece in self._unchecked(polyline, step):
-            found = self._checker.colliding_state(self.full_path(piece), step)
-            if found is not None:
-                return found[self._indices]
+            state = self._checker.colliding_state(self.full_path(piece), step)
+            if state is not None:
+                return state[self._indices]
         return None
 
     def _unchecked(self, polyline: Array, step: float) -> list[Array]:

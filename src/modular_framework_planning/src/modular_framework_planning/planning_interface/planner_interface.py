@@ -126,7 +126,7 @@ class PlanningProblem:
         return world
 
     def search_bounds(self, joint_vectors: Array) -> tuple[Array, Array]:
-        """Returns the bounds, limited to one rotation beyond the range of joint vectors, but not below the workspace.
+        """Returns the bounds, limited to one rotation beyond the range of joint vectors; workspace bounds are kept.
 
         Args:
             joint_vectors: Joint vectors of the group, shape (n, joints).
@@ -168,20 +168,20 @@ class PlanningProblem:
             At most MAX_LONG_WAY_GOALS joint vectors, shape (m, joints); none for a group without continuous joints.
         """
         start, continuous = self.start_values, self.model.continuous[self.group.indices]
-        found: list[Array] = []
+        result: list[Array] = []
         for goal in goals if continuous.any() else ():
             offsets = np.where(continuous & (np.abs(goal - start) > GOAL_BOUNDS_TOLERANCE), goal - start, 0.0)
             shifts = [
                 (0.0,) if offset == 0.0 else (0.0, -float(np.copysign(2.0 * np.pi, offset))) for offset in offsets
             ]
-            found += [goal + shift for shift in islice(product(*shifts), 1, MAX_LONG_WAY_GOALS)]
-        found.sort(key=lambda values: float(np.linalg.norm(values - start)))
-        return np.array(found[:MAX_LONG_WAY_GOALS]).reshape(-1, len(start))
+            result += [goal + shift for shift in islice(product(*shifts), 1, MAX_LONG_WAY_GOALS)]
+        result.sort(key=lambda values: float(np.linalg.norm(values - start)))
+        return np.array(result[:MAX_LONG_WAY_GOALS]).reshape(-1, len(start))
 
     def _must_stop_resolving(self) -> bool:
-        """Checks whether half of the time, which is reserved for the search, begins.
+        """Checks whether the time for goals is over; the second half of the time is reserved for the search.
 
-        A repeatable plan tries all goals instead, unless it is interrupted.
+        A repeatable plan tries all goals, unless it is interrupted.
         """
         if self.repeatable and not self.interrupted():
             return False

@@ -114,20 +114,20 @@ class PlannerRegistry:
                 return ResolvedPlanner(item, spec.planner, planner_id, settings, spec.adapters)
         raise UnknownNameError("planner", name, self.names())
 
-    def faults(self, found: ResolvedPlanner, settings: Mapping[str, Any] | None = None) -> list[str]:
+    def faults(self, resolved: ResolvedPlanner, settings: Mapping[str, Any] | None = None) -> list[str]:
         """Returns a message per invalid setting of a planner.
 
         Args:
-            found: Resolved planner.
+            resolved: Resolved planner.
             settings: Settings to check; None for the settings of the planner.
         """
-        check = getattr(planner_class(found.plugin), "parameter_faults", None)
-        return list(check(found.planner, found.settings if settings is None else settings)) if check else []
+        check = getattr(planner_class(resolved.plugin), "parameter_faults", None)
+        return list(check(resolved.planner, resolved.settings if settings is None else settings)) if check else []
 
     @staticmethod
-    def constrained_planner(found: ResolvedPlanner) -> str:
+    def constrained_planner(resolved: ResolvedPlanner) -> str:
         """Returns the search used if a planner cannot satisfy the path constraints, empty if none."""
-        return str(getattr(planner_class(found.plugin), "constrained_planner", ""))
+        return str(getattr(planner_class(resolved.plugin), "constrained_planner", ""))
 
     def adapter_faults(self, pipelines: Iterable[str]) -> dict[str, str]:
         """Returns messages about invalid plugins and request adapters of pipelines, keyed by PIPELINE/PARAMETER."""

@@ -147,13 +147,13 @@ class RobotModel:
                 limits = JointLimits(float(bounds[0]), float(bounds[1]), DEFAULT_VELOCITY, DEFAULT_ACCELERATION)
             is_continuous = math.isinf(limits.upper)
             try:
-                limits, found = overwritten(name, limits, _entry(entries, name), is_continuous)
+                limits, entry_notes = overwritten(name, limits, _entry(entries, name), is_continuous)
             except ValueError as error:
                 raise ModelError(str(error)) from error
             if is_continuous:
                 limits = replace(limits, lower=-CONTINUOUS_BOUND, upper=CONTINUOUS_BOUND)
             result[name] = limits
-            notes += found
+            notes += entry_notes
         return result, tuple(notes)
 
     def _load_geometry(self) -> tuple[LinkGeometry, ...]:

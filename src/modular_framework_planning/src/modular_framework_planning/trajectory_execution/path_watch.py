@@ -29,9 +29,9 @@ class PathCollision:
 
     def describe(self) -> str:
         """Returns a description of the contacts, without accepted pairs if possible."""
-        found = self.checker.contacts(self.positions, False)
+        contacts = self.checker.contacts(self.positions, False)
         return describe_contacts(
-            [item for item in found if _pair(item) not in self.accepted_pairs] or found, NAMED_CONTACTS
+            [item for item in contacts if _pair(item) not in self.accepted_pairs] or contacts, NAMED_CONTACTS
         )
 
 

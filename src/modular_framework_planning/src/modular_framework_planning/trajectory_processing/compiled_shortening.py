@@ -35,7 +35,7 @@ MIN_PULL_GAIN = 0.003  # gain of a pulled vertex, as a fraction of the path leng
 MAX_PULL_ROUNDS = 2
 MAX_FAILURES = 20  # consecutive failures that end the shortcutting stage
 VERTEX_TOLERANCE = 1e-9  # minimum length of an edge [rad or m], and minimum change of the unit direction at a vertex
-EDGES_PER_CALL = 100  # edge checks between two looks at the clock
+EDGES_PER_CALL = 100  # edge checks after which the caller checks the clock
 
 # Stages
 DROPS, SHORTCUTS, PULLS, DONE = range(4)
@@ -268,7 +268,7 @@ def shorten_in(shortening, edges, memory, verdict, *world):  # type: ignore[no-u
         world: Result of `arguments`.
 
     Returns:
-        FINISHED. UNDECIDED: the proposed edge needs an exact check. PAUSED: the caller looks at the clock and calls
+        FINISHED. UNDECIDED: the proposed edge needs an exact check. PAUSED: the caller checks the clock and calls
         again.
     """
     bodies = world_of(world)

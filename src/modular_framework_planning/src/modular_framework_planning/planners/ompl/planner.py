@@ -224,14 +224,14 @@ def edge_step(problem: PlanningProblem) -> float:
 
 
 class _EdgeValidator(ob.MotionValidator):
-    """OMPL's motion validator, for whole edges; `release` drops the reference to the collision world afterwards."""
+    """OMPL motion validator that checks whole edges."""
 
     def __init__(self, information: Any, search: _Search) -> None:
         super().__init__(information)
         self._search: _Search | None = search
 
     def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802 - OMPL calls it by this name
-        """Whether the straight motion is free."""
+        """Checks that the straight motion is free."""
         return self._search is not None and self._search.edge_is_valid(first, second)
 
     def release(self) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Auxiliary point of a CIRC motion, which Pilz's planner passes in the path_constraints of a request."""
+"""Auxiliary point of a CIRC motion, which clients of Pilz's planner pass in the path_constraints of a request."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ from modular_framework_planning.geometry.spatial import Array
 FOUND, NEEDS_SAMPLES, NEEDS_CAPACITY, UNDECIDED, PAUSED, LIMIT_REACHED = range(6)
 EXTEND, CONNECT = 0, 1
 NEAREST_UNKNOWN = -1  # the nearest state to a new target has not been searched yet
-EDGES_PER_CALL = 200  # edge checks between two looks at the clock and at cancellation
+EDGES_PER_CALL = 200  # edge checks after which the caller checks the clock and cancellation
 
 
 class Trees(NamedTuple):
@@ -87,10 +87,10 @@ class Space(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _squared_distance(one, other, weights):  # type: ignore[no-untyped-def]
+def _squared_distance(first, second, weights):  # type: ignore[no-untyped-def]
     length = 0.0
-    for joint in range(len(one)):
-        gap = weights[joint] * (other[joint] - one[joint])
+    for joint in range(len(first)):
+        gap = weights[joint] * (second[joint] - first[joint])
         length += gap * gap
     return length
 
@@ -173,7 +173,7 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
     Returns:
         FOUND: the last states of both trees are equal. NEEDS_SAMPLES: all samples are used. NEEDS_CAPACITY: a tree is
         full. LIMIT_REACHED: the extension limit is used up. UNDECIDED: the next extension towards `target` needs an
-        exact check. PAUSED: the caller looks at the clock and calls again.
+        exact check. PAUSED: the caller checks the clock and calls again.
     """
     bodies = world_of(world)
     workspace, edge = new_workspace(bodies), new_edge(space.edges)
