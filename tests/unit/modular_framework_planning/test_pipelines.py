@@ -325,7 +325,7 @@ def test_seeded_plans_fail_with_a_reason_and_can_be_cancelled(
     cases = [
         (wall_request(model, planner_id="PRM"), 1, ErrorCode.PLANNING_FAILED, "threads"),
         (wall_request(model, cancelled=lambda: True), 1, ErrorCode.PREEMPTED, "cancelled"),
-        (wall_request(model), -1, ErrorCode.FAILURE, "0 or more"),
+        (wall_request(model), -1, ErrorCode.FAILURE, "at least 0"),
     ]
     for request, seed, code, text in cases:
         with pytest.raises(PlanningError, match=text) as caught:

@@ -178,7 +178,7 @@ def test_a_matrix_that_is_not_square_is_refused() -> None:
         (lambda: Plane(0, 0, 0, 1), "no normal"),
         (lambda: Mesh(np.zeros((3, 3)), np.array([[0, 1, 7]])), "refers to vertex 7"),
         (lambda: Mesh(np.zeros((0, 3)), np.zeros((0, 3))), "0 vertices"),
-        (lambda: Box(1.0, 1.0e30, 1.0), r"y is 1e\+30 m; .* up to 10000 m"),
+        (lambda: Box(1.0, 1.0e30, 1.0), r"y is 1e\+30 m; .* at most 10000 m"),
         (lambda: Mesh(np.eye(3) * 1.0e30, np.array([[0, 1, 2]])), "too far away; .* 10000 m"),
         (lambda: make_transform((0, 0, 0), (0, 0, 0, 0)), "norm 0"),
         (lambda: make_transform((0, float("nan"), 0), (0, 0, 0, 1)), "not finite"),

@@ -265,8 +265,8 @@ def test_the_twists_of_a_trajectory_are_the_rates_of_its_poses() -> None:
     ("joint", "words"),
     [
         ('type="ball" parent_frame="odom" child_link="cart"', "fixed, planar and floating"),
-        ('type="planar" parent_frame="tool" child_link="cart"', "'tool'.*must not be one of the robot's links"),
-        ('type="floating" parent_frame="" child_link="cart"', "must be named"),
+        ('type="planar" parent_frame="tool" child_link="cart"', "'tool'.*must not be empty or a link of the robot"),
+        ('type="floating" parent_frame="" child_link="cart"', "must not be empty"),
     ],
 )
 def test_a_virtual_joint_that_cannot_be_used_is_refused(joint: str, words: str) -> None:
