@@ -4,20 +4,26 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 import rospy
+import serial
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros_session import until
 
+from modular_framework_drivers.emulators.dynamixel_finger import Finger, FingerModel
+from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
+from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
+from modular_framework_drivers.ezgripper import mx64
 
 NODE = """
   <node name="{name}" pkg="modular_framework_control" type="robot_hw" output="screen">
     <rosparam>{{type: modular_framework_drivers/{type}, topic_to_wait_for: {name}_ready, ready_timeout: 20,
-                robot_ip_address: {address}, port_name: /nowhere/gripper}}</rosparam>
+                robot_ip_address: {address}, port_name: {port}, baudrate: {baudrate}}}</rosparam>
   </node>"""
 SPAWNER = """
   <rosparam>
@@ -38,6 +44,21 @@ CASES: dict[str, tuple[str, dict[str, object], str]] = {
     "old_software": ("refuse", {"what": "version"}, "has software 3.3.0; at least 3.4 is needed"),
     "slow_link": ("delay", {"seconds": 0.5}, "s late, longer than link_timeout"),
 }
+
+
+GRIPPER_CASES: dict[str, tuple[Callable[[DynamixelLine], object], int, str]] = {
+    "no_cable": (DynamixelLine.unplug, 57600, "cannot be opened: No such file or directory; check the cable"),
+    "no_gripper_power": (DynamixelLine.power_off, 57600, "at 57600 baud does not answer"),
+    "another_baud_rate": (lambda line: None, 115200, "at 115200 baud does not answer"),
+    "another_id": (lambda line: line.change_id(7), 57600, "servo 1 on"),
+    "another_model": (
+        lambda line: line.fingers[0].servo.set(mx64.MODEL_NUMBER, 12),
+        57600,
+        "servo 1 is model 12; expected 310 (MX-64)",
+    ),
+    "port_in_use": (lambda line: None, 57600, "cannot be opened: another program has it"),
+}
+"""What is wrong with a gripper at the start, the baud rate of its driver, and the text that says so."""
 
 
 class Drivers:
@@ -62,28 +83,39 @@ class Drivers:
 
 
 @pytest.fixture(scope="module")
-def drivers(ros_session: Any, ros_launch: Callable[..., Any]) -> Iterator[Drivers]:
+def drivers(
+    ros_session: Any, ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Drivers]:
     made, arms = Drivers(ros_session), [EmulatedArm() for _ in CASES]
-    nodes = [NODE.format(name="no_gripper", type="EzGripperRobotHW", address="nowhere")]
+    lines, nodes, taken = {}, [], contextlib.ExitStack()
+    for name, (spoil, baudrate, _) in GRIPPER_CASES.items():
+        port = tmp_path_factory.mktemp(name) / "gripper"
+        lines[name] = DynamixelLine([Finger(DynamixelServo(), FingerModel())], port)
+        lines[name].connect()
+        spoil(lines[name])
+        if name == "port_in_use":
+            taken.enter_context(serial.Serial(str(port), exclusive=True))
+        nodes.append(NODE.format(name=name, type="EzGripperRobotHW", address="nowhere", port=port, baudrate=baudrate))
     for (name, (command, arguments, _)), arm in zip(CASES.items(), arms, strict=True):
         arm.command(command, **arguments)
-        nodes.append(NODE.format(name=name, type="UrArmRobotHW", address=arm.address))
+        nodes.append(NODE.format(name=name, type="UrArmRobotHW", address=arm.address, port="none", baudrate=57600))
     ros_launch(f"<launch>{''.join(nodes)}{SPAWNER}</launch>")
     yield made
-    for arm in arms:
-        arm.close()
+    taken.close()
+    for device in (*arms, *lines.values()):
+        device.close()
 
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    [*((name, case[2]) for name, case in CASES.items()), ("no_gripper", "port /nowhere/gripper cannot")],
+    [(name, case[2]) for name, case in (CASES | GRIPPER_CASES).items()],
 )
 def test_a_fault_at_the_start_is_in_the_diagnostics_and_ends_the_wait_of_the_node(
     drivers: Drivers, name: str, text: str
 ) -> None:
     until(lambda: any(text in fault for fault in drivers.faults[name]), f"{text!r} of {name}", timeout_s=60.0)
     assert DiagnosticStatus.ERROR in drivers.levels[name]
-    waited = f"waited 20 s in vain for {'the hardware' if name == 'no_gripper' else f'True on topic /{name}_ready'}"
+    waited = f"waited 20 s in vain for {'the hardware' if name in GRIPPER_CASES else f'True on topic /{name}_ready'}"
 
     def ended() -> bool:
         lines = [line for line in drivers.session.log().splitlines() if waited in line]
