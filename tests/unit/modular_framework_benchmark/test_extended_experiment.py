@@ -72,6 +72,17 @@ def test_a_file_that_was_edited_between_run_and_extension_is_refused_by_name(
         assert len(database.pending(1)) == len(sample_episodes(2))
 
 
+def test_a_resumed_experiment_refuses_a_file_that_was_edited_meanwhile_by_name(stack: Stack, tmp_path: Path) -> None:
+    with open_database(tmp_path / "results.db", create=True) as database:
+        number = database.add_experiment(sample_description(ran_with=stack.digests()), sample_episodes(2))
+        database.check_resumed(number, stack.digests())
+        part = {name: value for name, value in stack.digests().items() if name.startswith("file")}
+        database.check_resumed(number, part)  # the remaining episodes may need fewer files
+        stack.world.write_text("<sdf version='1.7'/>")
+        with pytest.raises(ExperimentChangedError, match="ran with another state of .*/a.world"):
+            database.check_resumed(number, stack.digests())
+
+
 def test_an_extension_with_the_same_files_is_taken_also_with_a_level_that_brings_others(
     stack: Stack, tmp_path: Path
 ) -> None:

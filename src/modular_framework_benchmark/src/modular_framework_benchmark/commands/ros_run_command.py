@@ -130,6 +130,8 @@ def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], option
 def _resume(options: argparse.Namespace) -> int:
     with RunLock(options.database) as lock, open_database(options.database) as database:
         number = _unfinished(database, options.experiment, options.database)
+        (mode,) = (each.description.mode for each in database.experiments() if each.id == number)
+        database.check_resumed(number, run_digests(mode, database.pending(number)))
         return _session(database, number, lock, _session_options(options, options.database), None).run()
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import logging
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -42,7 +42,7 @@ from modular_framework_benchmark.results.errors import (
 )
 from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES, read_record, read_spec, store_record
 from modular_framework_benchmark.results.json_records import description_from_json, record_to_json
-from modular_framework_benchmark.results.planned_episodes import store_experiment
+from modular_framework_benchmark.results.planned_episodes import check_resumed, store_experiment
 from modular_framework_benchmark.results.schema import (
     DESCRIPTIONS,
     ENUMS,
@@ -220,6 +220,19 @@ class ResultDatabase:
                 + (f"; do you mean {near[0]!r}?" if near else "")
             )
         return int(known[name])
+
+    def check_resumed(self, number: int, ran_with: Mapping[str, str]) -> None:
+        """Checks that the remaining episodes run with what an experiment ran with before.
+
+        Args:
+            number: Identifier of the experiment.
+            ran_with: Digests of what the remaining episodes will run with, see `run_digests`.
+
+        Raises:
+            ExperimentChangedError: A file, a package or a parameter is different.
+        """
+        with self._reading() as connection:
+            check_resumed(self._description(connection, number), ran_with)
 
     def pending(self, number: int) -> list[EpisodeSpec]:
         """Returns the episodes of an experiment that are not finished, in the order of the run."""

@@ -85,17 +85,36 @@ def _by_key(description: ExperimentDescription, episodes: Sequence[EpisodeSpec])
 
 def _check_ran_with(old: ExperimentDescription, new: ExperimentDescription) -> None:
     """Refuses to go on with other files, packages or parameters; further levels may bring further ones."""
-    changed = [name for name, digests in old.ran_with.items() if set(digests.split()) - _digests(new, name)]
-    if changed and new.ran_with:
+    if new.ran_with:
+        _refuse_changed(new.name, [name for name, digests in old.ran_with.items() if _beyond(digests, new, name)])
+
+
+def check_resumed(stored: ExperimentDescription, ran_with: Mapping[str, str]) -> None:
+    """Checks that the remaining episodes of an experiment run with what its first episodes ran with.
+
+    Args:
+        stored: Description of the experiment in the database.
+        ran_with: Digests of what the remaining episodes will run with, see `run_digests`.
+
+    Raises:
+        ExperimentChangedError: A file, a package or a parameter is different.
+    """
+    if stored.ran_with:
+        _refuse_changed(stored.name, [name for name, digests in ran_with.items() if _beyond(digests, stored, name)])
+
+
+def _refuse_changed(experiment: str, changed: list[str]) -> None:
+    if changed:
         names = ", ".join(sorted(changed)[:MOST_NAMED]) + (" and others" if len(changed) > MOST_NAMED else "")
         raise ExperimentChangedError(
-            f"the database has episodes of {new.name!r} that ran with another state of {names}; allowed: the same as "
-            "then; restore it, or give the experiment another name, or use another database"
+            f"the database has episodes of {experiment!r} that ran with another state of {names}; allowed: the same "
+            "as then; restore it, or give the experiment another name, or use another database"
         )
 
 
-def _digests(description: ExperimentDescription, name: str) -> set[str]:
-    return set(description.ran_with.get(name, "").split())
+def _beyond(digests: str, description: ExperimentDescription, name: str) -> set[str]:
+    """Returns the digests that a description does not have under a name."""
+    return set(digests.split()) - set(description.ran_with.get(name, "").split())
 
 
 def _new_episodes(
