@@ -6,6 +6,9 @@ The hands are made of boxes. Their true openings are Coal's distances between th
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import coal
 import numpy as np
 import pinocchio
@@ -20,52 +23,10 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
     measure_gripper,
 )
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from linkage_hands import four_bar_hand, joint, limit, link, mimic  # noqa: E402
+
 TOLERANCE_M = 1.0e-3
-
-
-def link(name: str, *box: float, z: float = 0.0) -> str:
-    size = " ".join(map(str, box))
-    shape = f'<collision><origin xyz="0 0 {z}"/><geometry><box size="{size}"/></geometry></collision>' if box else ""
-    return f'<link name="{name}">{shape}</link>'
-
-
-def joint(name: str, kind: str, parent: str, child: str, xyz: str, axis: str = "1 0 0", rest: str = "") -> str:
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{xyz}"/><axis xyz="{axis}"/>{rest}</joint>'
-    )
-
-
-def limit(upper: float) -> str:
-    return f'<limit lower="0" upper="{upper}" effort="10" velocity="1"/>'
-
-
-def mimic(of: str, multiplier: float, upper: float = 0.8) -> str:
-    tag = f'<mimic joint="{of}" multiplier="{multiplier}"/>'
-    return f'<limit lower="{-upper}" upper="{upper}" effort="10" velocity="1"/>{tag}'
-
-
-def four_bar_hand() -> str:
-    """A hand with the joints of a Robotiq 2F-85: knuckles that turn, and fingers that stay upright."""
-    parts = [link("palm", 0.08, 0.08, 0.09, z=0.045)]
-    for side, name in ((1, "left"), (-1, "right")):
-        drive = limit(0.8) if side > 0 else mimic("drive", 1.0)
-        lead = "drive" if side > 0 else "right_drive"
-        parts += [
-            link(f"{name}_knuckle", 0.02, 0.01, 0.01),
-            joint(lead, "revolute", "palm", f"{name}_knuckle", f"0 {side * 0.0306} 0.0549", f"{side} 0 0", drive),
-            link(f"{name}_finger", 0.02, 0.01, 0.04, z=0.02),
-            joint(f"{name}_f", "fixed", f"{name}_knuckle", f"{name}_finger", f"0 {side * 0.0315} -0.0041"),
-            link(f"{name}_inner_finger", 0.02, 0.01, 0.04, z=0.02),
-            joint(f"{name}_i", "revolute", f"{name}_finger", f"{name}_inner_finger", f"0 {side * 0.0061} 0.0471",
-                  f"{side} 0 0", mimic("drive", -1.0)),
-            link(f"{name}_pad", 0.022, 0.00635, 0.0375),
-            joint(f"{name}_p", "fixed", f"{name}_inner_finger", f"{name}_pad", f"0 {side * -0.0220} 0.0324"),
-            link(f"{name}_inner_knuckle", 0.02, 0.01, 0.04, z=0.02),
-            joint(f"{name}_k", "revolute", "palm", f"{name}_inner_knuckle", f"0 {side * 0.0127} 0.0614",
-                  f"{side} 0 0", mimic("drive", 1.0)),
-        ]  # fmt: skip
-    return f'<robot name="four_bar">{"".join(parts)}</robot>'
 
 
 def jaws(second: str, axis: str = "0 -1 0") -> str:

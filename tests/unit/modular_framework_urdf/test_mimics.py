@@ -38,3 +38,12 @@ def test_a_joint_that_mimics_stands_for_its_leader_unless_that_is_named() -> Non
     mimics = {"right": Mimic("left", 2.0, 0.1)}
     assert with_leaders({"right": 0.5, "arm": 1.0}, mimics) == pytest.approx({"left": 0.2, "arm": 1.0})
     assert with_leaders({"right": 0.5, "left": 0.3}, mimics) == {"left": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "offset", "range_of"), [(1.0, 0.0, (0.0, 0.8)), (-1.0, 0.0, (-0.8, 0.0)), (-0.5, 0.1, (-0.3, 0.1))]
+)
+def test_a_joint_that_mimics_ranges_as_its_leader_takes_it(
+    multiplier: float, offset: float, range_of: tuple[float, float]
+) -> None:
+    assert Mimic("left", multiplier, offset).range_of(0.0, 0.8) == pytest.approx(range_of)

@@ -20,6 +20,11 @@ class Mimic:
         """Returns the leader's position for a position of the mimic joint [rad or m]."""
         return (position - self.offset) / self.multiplier
 
+    def range_of(self, lower: float, upper: float) -> tuple[float, float]:
+        """Returns the range of the joint while its leader moves from a lower to an upper position [rad or m]."""
+        first, last = sorted(self.multiplier * position + self.offset for position in (lower, upper))
+        return first, last
+
 
 def resolved(mimics: Mapping[str, Mimic], movable: Collection[str]) -> dict[str, Mimic]:
     """Returns the relation of each mimic joint to an independent leading joint.

@@ -13,6 +13,8 @@ from pathlib import Path
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.mesh_files import ConvexParts
+from modular_framework_simulation.models.robot_joint import RobotJoint
+from modular_framework_simulation.models.robot_masses import give_masses, give_rotors
 from modular_framework_simulation.models.sdf_specs import UNLIMITED_FRICTION, Mesh
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.lengths import MAX_LENGTH_M
@@ -31,32 +33,8 @@ COMMAND_INTERFACES = {
 }
 """By ros2_control's name of what a joint is commanded: ros_control's."""
 
-
-@dataclass(frozen=True, slots=True)
-class RobotJoint:
-    """A movable joint of the robot.
-
-    Attributes:
-        name: As in the description.
-        parent_link: The link it is fastened to.
-        child_link: The link it moves.
-        lower: [rad or m]
-        upper: [rad or m]
-        effort: Largest effort of its drive [Nm or N].
-        velocity: Largest velocity [rad/s or m/s].
-        interfaces: Hardware interfaces it is commanded by; empty for a joint without a drive of its own.
-        mimic: The joint it follows, if it follows one.
-    """
-
-    name: str
-    parent_link: str
-    child_link: str
-    lower: float
-    upper: float
-    effort: float
-    velocity: float
-    interfaces: tuple[str, ...]
-    mimic: Mimic | None
+FAR = 1e6
+"""Limit of a mimic joint whose leader has none [rad or m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +88,10 @@ def read_robot(
     interfaces = _interfaces(robot) | {joint.name: _commands(joint) for joint in simulated}
     _require_ends(robot)
     joints = _with_leaders(tuple(_joint(joint, interfaces.get(joint.name, ())) for joint in robot.movable_joints()))
+    _set_limits(root, joints)
+    give_masses(root, robot, find_package)
+    give_rotors(root, joints)
     _rewrite_meshes(root, find_package, convex_parts, with_visuals)
-    _give_frames_no_weight(root)
     parents = {joint.child: joint.parent for joint in robot.joints}
     followers = {joint.name for joint in robot.joints if joint.mimic is not None}
     initial = {joint.name: joint.initial_position for joint in simulated if joint.name not in followers}
@@ -120,7 +100,11 @@ def read_robot(
 
 
 def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
-    """Lets every mimic joint follow the joint that drives its chain of mimic joints."""
+    """Lets every mimic joint follow the joint that drives its chain of mimic joints, through the whole range of that.
+
+    The limits of a mimic joint only ever widen: Gazebo's mimic plugins and MoveIt ignore them, so that public
+    descriptions have limits that forbid the relation (Robotiq 2F-85: multiplier -1, limits 0 to 0.88).
+    """
     try:
         mimics = resolved(
             {joint.name: joint.mimic for joint in joints if joint.mimic is not None}, [joint.name for joint in joints]
@@ -128,7 +112,27 @@ def _with_leaders(joints: tuple[RobotJoint, ...]) -> tuple[RobotJoint, ...]:
     except ValueError as error:
         where, _, problem = str(error).partition(": ")
         raise DescriptionError(f"robot_description: {where}", *problem.split("; ", 1)) from error
-    return tuple(replace(joint, mimic=mimics.get(joint.name)) for joint in joints)
+    by_name = {joint.name: joint for joint in joints}
+    return tuple(
+        _following(joint, mimics[joint.name], by_name[mimics[joint.name].leader]) if joint.name in mimics else joint
+        for joint in joints
+    )
+
+
+def _following(joint: RobotJoint, mimic: Mimic, leader: RobotJoint) -> RobotJoint:
+    lower, upper = mimic.range_of(leader.lower, leader.upper)
+    effort = min(joint.effort, leader.effort / abs(mimic.multiplier))  # its power comes from the leader's drive
+    return replace(joint, mimic=mimic, lower=min(joint.lower, lower), upper=max(joint.upper, upper), effort=effort)
+
+
+def _set_limits(root: Element, joints: tuple[RobotJoint, ...]) -> None:
+    """Writes the limits of the mimic joints into the URDF."""
+    mimics = {joint.name: joint for joint in joints if joint.mimic is not None}
+    for element in root.findall("joint"):
+        joint, limit = mimics.get(element.get("name", "")), element.find("limit")
+        if joint is not None and limit is not None:
+            limit.set("lower", repr(max(joint.lower, -FAR)))
+            limit.set("upper", repr(min(joint.upper, FAR)))
 
 
 def _interfaces(robot: Robot) -> dict[str, tuple[str, ...]]:
@@ -185,6 +189,7 @@ def _joint(joint: Joint, interfaces: tuple[str, ...]) -> RobotJoint:
         name=joint.name,
         parent_link=joint.parent,
         child_link=joint.child,
+        axis=joint.axis,
         lower=float("-inf") if continuous else limit.lower,
         upper=float("inf") if continuous else limit.upper,
         effort=1e3 if limit.effort is None else limit.effort,
@@ -242,16 +247,6 @@ def _require_sizes(link: str, shape: Element) -> None:
             if not largest <= MAX_LENGTH_M:
                 where = f"robot_description: <{shape.tag}> of link '{link}', <{element.tag} {key}=...>"
                 raise DescriptionError(where, f"got '{text}'", f"allowed: lengths of at most {MAX_LENGTH_M:g} m")
-
-
-def _give_frames_no_weight(root: Element) -> None:
-    """Gives links without mass a negligible one: they are only frames, but the engine would assume 1 kg."""
-    for link in root.findall("link"):
-        if link.find("inertial") is None:
-            inertial = xml_text.add_child(link, "inertial")
-            xml_text.add_child(inertial, "mass", value="1e-5")
-            moments = {"ixx": "1e-9", "ixy": "0", "ixz": "0", "iyy": "1e-9", "iyz": "0", "izz": "1e-9"}
-            xml_text.add_child(inertial, "inertia", **moments)
 
 
 def _mesh_path(link: str, uri: str, find_package: PackageFinder) -> Path:

@@ -9,24 +9,32 @@ that it gives way when an object presses against it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
 from modular_framework_simulation.errors import DescriptionError
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_simulation.models.robot_description import RobotDescription, RobotJoint
+from modular_framework_simulation.models.robot_description import RobotDescription
+from modular_framework_simulation.models.robot_joint import RobotJoint, gripper_joints
 from modular_framework_simulation.models.sdf_specs import JointDynamics
 from modular_framework_simulation.physics.joint_resistance import set_joint_resistance
 from modular_framework_simulation.physics.physics_engine import JointState, Surface
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.simulated_body import SimulatedBody
+from modular_framework_urdf.rotations import Vector3, rotate_vector
 
 _POSITION_GAIN = 0.2
 """Share of a position error that a drive corrects within one physics step; velocities are fed forward in full."""
 
 _COUPLING_FACTOR = 2.0
 """How much stronger the coupling of a second finger is than the drive of the first, so that the object is centred."""
+
+
+_ALIKE = 0.5
+"""Cosine between the axes of two chains of links above which they move the same way; of fingers around a palm, the
+nearest have an angle of at least 90 degrees between them."""
 
 
 class Role(Enum):
@@ -70,7 +78,7 @@ class Gripper:
     Attributes:
         palm_link: Link the fingers are fastened to.
         links: Palm and everything below it: the links that may touch a held object.
-        fingers: For each finger the engine's numbers of its links.
+        fingers: For each finger the engine's numbers of its links. The bars of a linkage are one finger.
     """
 
     palm_link: str
@@ -155,12 +163,6 @@ class RobotBody:
         self._set_up()
 
     @property
-    def gripper_joints(self) -> list[RobotJoint]:
-        """The joints of all grippers: those that mimic, and those they follow."""
-        leaders = {joint.mimic.leader for joint in self._joints if joint.mimic is not None}
-        return [joint for joint in self._joints if joint.mimic is not None or joint.name in leaders]
-
-    @property
     def fingers(self) -> list[tuple[int, ...]]:
         """The engine's link numbers of each finger of every gripper."""
         return [finger for gripper in self.grippers for finger in gripper.fingers]
@@ -175,30 +177,62 @@ class RobotBody:
 
     def _grippers(self) -> tuple[Gripper, ...]:
         """Sorts the joints of grippers by the link below which their leaders' fingers begin."""
-        joints = self.gripper_joints
+        joints = gripper_joints(self._joints)
         by_name = {joint.name: joint for joint in joints}
-        palms: dict[str, dict[str, list[int]]] = {}
+        palms: dict[str, dict[str, RobotJoint]] = {}
         for joint in joints:
             leader = by_name.get(joint.mimic.leader, joint) if joint.mimic is not None else joint
-            fingers = palms.setdefault(_chain_root(leader, joints).parent_link, {})
-            root = _chain_root(joint, joints).child_link
-            fingers.setdefault(root, []).append(self.body.link_indices[joint.child_link])
+            root = self._chain_root(joint, joints)
+            palms.setdefault(self._chain_root(leader, joints).parent_link, {})[root.name] = root
         return tuple(
-            Gripper(palm, self._links_below(palm), tuple(tuple(finger) for finger in fingers.values()))
-            for palm, fingers in palms.items()
+            Gripper(palm, self._links_below(palm), self._fingers(list(roots.values()))) for palm, roots in palms.items()
         )
 
-    def _links_below(self, palm: str) -> tuple[str, ...]:
+    def _chain_root(self, joint: RobotJoint, gripper: list[RobotJoint]) -> RobotJoint:
+        """Returns the first joint of the chain that a gripper joint belongs to, also above links that are fixed."""
+        by_child = {each.child_link: each for each in gripper}
+        link = joint.parent_link
+        while link:
+            joint = by_child.get(link, joint)
+            link = self.description.parents.get(link, "")
+        return joint
+
+    def _fingers(self, roots: list[RobotJoint]) -> tuple[tuple[int, ...], ...]:
+        """Returns the links of each finger, from the first joints of the chains that hang on the palm.
+
+        Chains whose first joints move the same way are one linkage (outer and inner knuckle of a four-bar finger):
+        fingers close from different sides.
+        """
+        fingers: list[tuple[Vector3, list[int]]] = []
+        for root in roots:
+            links = [self.body.link_indices[link] for link in self._links_below(root.child_link)]
+            direction = self._closing_axis(root)
+            finger = next((links for axis, links in fingers if _dot(axis, direction) > _ALIKE), None)
+            if finger is None:
+                fingers.append((direction, links))
+            else:
+                finger += links
+        return tuple(tuple(links) for _, links in fingers)
+
+    def _closing_axis(self, joint: RobotJoint) -> Vector3:
+        """Returns the axis of a joint, in the world frame, about or along which it moves while its leader goes up."""
+        frame = self.world.engine.link_motion(self.body.number, self.body.joint_indices[joint.name]).frame
+        x, y, z = rotate_vector(frame.quaternion, joint.axis)
+        length = math.copysign(math.hypot(x, y, z), joint.mimic.multiplier if joint.mimic is not None else 1.0)
+        return (x / length, y / length, z / length)
+
+    def _links_below(self, top: str) -> tuple[str, ...]:
+        """Returns a link and all links that hang on it."""
         parents = self.description.parents
 
-        def below_palm(link: str) -> bool:
+        def below(link: str) -> bool:
             while link:
-                if link == palm:
+                if link == top:
                     return True
                 link = parents.get(link, "")
             return False
 
-        return tuple(link for link in self.description.links if below_palm(link))
+        return tuple(link for link in self.description.links if below(link))
 
     def reset(self) -> None:
         """Puts the joints at their starting positions, at rest."""
@@ -274,7 +308,10 @@ class RobotBody:
         return complete
 
     def _limit_self_collisions(self) -> None:
-        """Leaves collisions between fingers only: the planner checks the rest of the robot."""
+        """Leaves collisions between fingers only: the planner checks the rest of the robot.
+
+        Links of one finger never collide: the bars of a linkage overlap at its hinges.
+        """
         fingers = self.fingers
         allowed = {
             frozenset((a, b)) for one in fingers for other in fingers if one is not other for a in one for b in other
@@ -312,9 +349,5 @@ def _role(joint: RobotJoint, description: RobotDescription) -> Role:
     return Role.DRIVEN if joint.interfaces else Role.FREE
 
 
-def _chain_root(joint: RobotJoint, gripper: list[RobotJoint]) -> RobotJoint:
-    """Returns the first joint of the finger a gripper joint belongs to."""
-    by_child = {each.child_link: each for each in gripper}
-    while joint.parent_link in by_child:
-        joint = by_child[joint.parent_link]
-    return joint
+def _dot(a: Vector3, b: Vector3) -> float:
+    return sum(x * y for x, y in zip(a, b, strict=True))
