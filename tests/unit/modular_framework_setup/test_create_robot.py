@@ -166,6 +166,23 @@ def test_a_bare_urdf_makes_packages_without_a_fault(bare: Made) -> None:
     assert len(yaml.safe_load((bare.config / "config/joint_limits.yaml").read_text())["joint_limits"]) in (7, 8)
 
 
+@pytest.mark.parametrize(("effort", "written"), [("1000", 100.0), ("60", 60.0)])
+def test_an_effort_that_would_crush_every_object_is_replaced_with_a_note(
+    package_path: Path, capsys: pytest.CaptureFixture[str], effort: str, written: float
+) -> None:
+    """The fingers of the crane slide: their effort is their force [N]."""
+    text = CRANE.replace('upper="0.04" effort="10"', f'upper="0.04" effort="{effort}"')
+    made = make("crane_1", package_path, write(package_path, text), "--samples", "100")
+    limits = [
+        item.find("limit") for item in ElementTree.fromstring(made.text()).iter("joint") if item.find("mimic") is None
+    ]
+    (slide,) = (item for item in limits if item is not None and item.get("upper") == "0.04")
+    assert float(slide.get("effort", "nan")) == pytest.approx(written)
+    assert ("has the effort 1000, with which a finger presses with 1000 N" in capsys.readouterr().out) == (
+        effort == "1000"
+    )
+
+
 def test_its_matrix_keeps_every_pair_that_can_collide(bare: Made) -> None:
     """Bodies are read by trimesh and checked by FCL, at states that the command did not see."""
     reasons = {

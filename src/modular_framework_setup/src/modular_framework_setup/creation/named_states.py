@@ -32,16 +32,26 @@ def gripper_states(sampling: CollisionSampling, gripper: Gripper) -> tuple[float
     if not pairs:
         return float(upper), float(lower)
 
-    def gap(position: float) -> float:
-        state = with_gripper(model, model.default_positions(), gripper, position)
-        return sampling.min_distance(pairs, state)
-
     positions = np.linspace(lower, upper, GRIPPER_SAMPLES)
-    gaps = np.array([gap(position) for position in positions])
+    gaps = np.array([_gap(sampling, gripper, pairs, position) for position in positions])
     if gaps[0] > gaps[-1]:
         positions, gaps = positions[::-1], gaps[::-1]
     apart = np.flatnonzero(gaps > CLOSED_GAP_M)
     return float(positions[-1]), float(positions[max(apart[0] - 1, 0)] if len(apart) else positions[0])
+
+
+def pad_travel(sampling: CollisionSampling, gripper: Gripper, opened: float, closed: float) -> float:
+    """Returns how far one finger tip moves per unit of the driver between open and closed [m/rad or m/m]."""
+    pairs = _tip_pairs(sampling, gripper, 0.5 * (opened + closed))
+    if not pairs or opened == closed:
+        return 0.0
+    wide, narrow = (_gap(sampling, gripper, pairs, position) for position in (opened, closed))
+    return max(0.0, 0.5 * (wide - narrow) / abs(opened - closed))
+
+
+def _gap(sampling: CollisionSampling, gripper: Gripper, pairs: list[Pair], position: float) -> float:
+    model = sampling.model
+    return sampling.min_distance(pairs, with_gripper(model, model.default_positions(), gripper, position))
 
 
 def _tip_pairs(sampling: CollisionSampling, gripper: Gripper, position: float) -> list[Pair]:

@@ -20,11 +20,11 @@ from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.creation.collision_sampling import CollisionSampling, Pair
 from modular_framework_setup.creation.finger_shapes import with_gripper
 from modular_framework_setup.creation.grasp_frame import approach_axis, grasp_pose
-from modular_framework_setup.creation.named_states import gripper_states, ready_state
+from modular_framework_setup.creation.named_states import gripper_states, pad_travel, ready_state
 from modular_framework_setup.creation.robot_parts import Arm, Gripper, RobotParts, find_parts
 from modular_framework_setup.creation.self_collisions import Hand, PairVerdict, Progress, find_verdicts
 from modular_framework_setup.creation.source_urdf import SourceUrdf
-from modular_framework_setup.creation.urdf_completion import add_frame, complete_urdf
+from modular_framework_setup.creation.urdf_completion import add_frame, bound_grip, complete_urdf
 from modular_framework_setup.errors import CreationError
 from modular_framework_urdf import xml_text
 from modular_framework_urdf.mesh_paths import mesh_path
@@ -135,6 +135,7 @@ def make_plan(source: SourceUrdf, choices: Choices, confirm: ConfirmParts, progr
     notes = complete_urdf(source.root, tree, parts.grippers)
     model = _model(source, choices)
     ends = _gripper_ends(model, parts)
+    notes += _bound_grips(source, model, parts, ends)
     parts = _with_grasp_frames(source, model, parts, ends)
     model = _model(source, choices)
     verdicts = find_verdicts(model, _hands(model, parts, ends), choices.samples, choices.seed, progress)
@@ -182,6 +183,13 @@ def _gripper_ends(model: RobotModel, parts: RobotParts) -> dict[str, tuple[float
     """Returns the open and closed position of each gripper's driven joint [rad or m]."""
     sampling = CollisionSampling(model)
     return {gripper.name: gripper_states(sampling, gripper) for gripper in parts.grippers}
+
+
+def _bound_grips(source: SourceUrdf, model: RobotModel, parts: RobotParts, ends: Ends) -> list[str]:
+    sampling, notes = CollisionSampling(model), []
+    for gripper in parts.grippers:
+        notes += bound_grip(source.root, gripper, pad_travel(sampling, gripper, *ends[gripper.name]))
+    return notes
 
 
 def _with_grasp_frames(source: SourceUrdf, model: RobotModel, parts: RobotParts, ends: Ends) -> RobotParts:

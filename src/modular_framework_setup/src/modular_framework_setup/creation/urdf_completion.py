@@ -11,6 +11,9 @@ from modular_framework_setup.creation.robot_parts import Gripper
 from modular_framework_urdf.xml_text import Element, add_child
 
 EFFORT, VELOCITY = 100.0, 1.0  # [N m or N], [rad/s or m/s]
+MAX_GRIP_N, GUESSED_GRIP_N = 250.0, 100.0
+"""Force of a finger beyond which an effort limit stands for "none" (the strongest electric grippers for arms press with
+about 250 N), and the force that is written then."""
 INTERFACE = "hardware_interface/PositionJointInterface"
 GAZEBO_PLUGIN = "libgazebo_ros_control.so"
 FRAME_MASS, FRAME_INERTIA = "1e-5", "1e-9"  # [kg], [kg m^2]; simulators may assume 1 kg for links without inertia
@@ -38,7 +41,9 @@ def complete_urdf(root: Element, tree: RobotTree, grippers: tuple[Gripper, ...])
         if element.find("inertial") is None and element.find("collision") is None and link.name not in tree.roots:
             _add_inertia(element)
         elif element.find("inertial") is None and element.find("collision") is not None:
-            notes.append(f"link '{link.name}' has a shape but no <inertial>: add its mass for the simulation")
+            notes.append(
+                f"link '{link.name}' has a shape but no <inertial>: add it (the simulation fills the shape with water)"
+            )
     driven = {part.name for item in tree.robot.transmissions for part in item.joints}
     for item in root.findall("joint"):
         is_movable = item.get("type") in ("revolute", "continuous", "prismatic")
@@ -48,6 +53,28 @@ def complete_urdf(root: Element, tree: RobotTree, grippers: tuple[Gripper, ...])
         plugin = add_child(add_child(root, "gazebo"), "plugin", name="gazebo_ros_control", filename=GAZEBO_PLUGIN)
         add_child(plugin, "robotNamespace").text = "/"
     return notes
+
+
+def bound_grip(root: Element, gripper: Gripper, travel: float) -> list[str]:
+    """Lowers the effort of a gripper's driver where it stands for none: such a force would crush what it holds.
+
+    Args:
+        root: of the URDF; changed.
+        gripper: of the robot.
+        travel: distance of a finger tip per unit of the driver [m/rad or m/m]; 0 where it is unknown.
+
+    Returns:
+        A sentence for a user to correct it, if it was changed.
+    """
+    limit = _joint(root, gripper.driver).find("limit")
+    effort = float(limit.get("effort"))
+    if effort <= MAX_GRIP_N * travel or not travel > 0.0:
+        return []
+    limit.set("effort", f"{GUESSED_GRIP_N * travel:.3g}")
+    return [
+        f"joint '{gripper.driver}' has the effort {effort:g}, with which a finger presses with "
+        f"{effort / travel:.0f} N; {limit.get('effort')} ({GUESSED_GRIP_N:g} N) is written instead: correct it"
+    ]
 
 
 def add_frame(root: Element, name: str, parent: str, pose: Array) -> None:
