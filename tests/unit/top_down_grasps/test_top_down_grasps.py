@@ -20,10 +20,10 @@ from modular_framework_core.grasp_generation.gripper_geometry import (
     measure_gripper,
     rotation_about,
 )
+from modular_framework_core.grasp_generation.object_names import is_named
 from modular_framework_core.grasp_generation.planning_scene_objects import (
     CropBox,
     SceneObjectError,
-    is_named,
     rotation_matrix,
     scene_object,
 )

@@ -62,11 +62,6 @@ class CropBox:
         return bool(np.all(point >= self.low) and np.all(point <= self.high))
 
 
-def is_named(object_id: str, wanted: str) -> bool:
-    """Returns whether an object id belongs to a model, or is the id itself; an empty name matches all."""
-    return not wanted or object_id == wanted or object_id.startswith(f"{wanted}__")
-
-
 def rotation_matrix(quaternion: Any) -> npt.NDArray[np.float64]:
     """Returns the rotation matrix of a quaternion message; an unset one (all zero) is no rotation."""
     values = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])

@@ -7,11 +7,11 @@ import rospy
 from moveit_msgs.msg import CollisionObject, PlanningSceneComponents
 from moveit_msgs.srv import GetPlanningScene, GetPlanningSceneRequest
 
+from modular_framework_core.grasp_generation.object_names import is_named
 from modular_framework_core.grasp_generation.planning_scene_objects import (
     CropBox,
     SceneObject,
     SceneObjectError,
-    is_named,
     scene_object,
 )
 from modular_framework_core.grasp_generation.ros_generator_settings import GeneratorSettings

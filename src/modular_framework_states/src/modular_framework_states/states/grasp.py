@@ -5,11 +5,20 @@ from __future__ import annotations
 
 from typing import Any, Unpack
 
+import rospy
+
+from modular_framework_core.grasp_generation.object_names import is_named
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
+from modular_framework_ros.calls import CallError, wait_until
 from modular_framework_states.grasp_goals import GraspGoalError, Stage, send
+from modular_framework_states.held_objects import held_objects
 from modular_framework_states.manager_clients import ManagerError, selected_or_named
+
+SIMULATION_PARAMETER = "simulation"
+SCENE_PERIOD_S, SCENE_TIMEOUT_S = 0.1, 2.0
+"""How often the planning scene is read, and how long the simulation may take to attach what the fingers hold [s]."""
 
 
 class Grasp(FrameworkState):
@@ -20,16 +29,25 @@ class Grasp(FrameworkState):
         grasp_name: Name of the grasp; empty takes the oldest anonymous one. Userdata ``selected_grasp`` is taken
             instead when it is an input key.
         timeout: Longest wait for the end of the motion [s].
+        verify_held: True also requires, in simulation, that the object of the grasp is attached to the manipulator in
+            the planning scene. Fingers may stop on something else, as on each other; without a simulation only their
+            positions tell.
         **keys: Outcomes and userdata keys of any state.
     """
 
     DEFAULT_IO_KEYS = ("manipulator_controller_client", "max_torque")
 
     def __init__(
-        self, grasp_type: Stage, grasp_name: str = "", timeout: Positive = 60.0, **keys: Unpack[StateKeys]
+        self,
+        grasp_type: Stage,
+        grasp_name: str = "",
+        timeout: Positive = 60.0,
+        verify_held: bool = False,
+        **keys: Unpack[StateKeys],
     ) -> None:
         super().__init__(**keys)
         self._type, self._name, self._timeout_s = grasp_type, grasp_name, float(timeout)
+        self._verify_held = verify_held
 
     def execute(self, userdata: Any) -> str:
         """Sends the goal and waits for its end."""
@@ -37,6 +55,20 @@ class Grasp(FrameworkState):
             grasp = selected_or_named(self, userdata, "grasp", self._name)
             client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
             send(client, self._type, grasp, max_torque, self._timeout_s, self.preempt_requested)
-        except (ManagerError, GraspGoalError) as error:
+            if self._verify_held and rospy.get_param(SIMULATION_PARAMETER, False) and not self._holds(grasp.object_id):
+                what = f"'{grasp.object_id}'" if grasp.object_id else "an object"
+                return self.fail(
+                    f"the fingers stopped, but the simulation sees no two of them press on {what}; they stopped on "
+                    "something else"
+                )
+        except (ManagerError, GraspGoalError, CallError) as error:
             return self.fail(f"{self._type} of grasp '{self._name or 'selected'}' was not reached: {error}")
         return self.succeed()
+
+    def _holds(self, name: str) -> bool:
+        """Waits until the planning scene has an object attached to the manipulator; any object if no name is given."""
+
+        def attached() -> bool:
+            return any(is_named(held, name) for held in held_objects())
+
+        return wait_until(lambda: self.preempt_requested() or attached(), SCENE_TIMEOUT_S, SCENE_PERIOD_S)
