@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks parameters below a name whose further parts are names of joints, links or planning groups of the robot."""
+"""Checks nested parameters whose keys are names of the robot's joints, links or planning groups."""
 
 from __future__ import annotations
 
@@ -13,51 +13,54 @@ from modular_framework_ros.parameter_declarations import Declaration, NodeDeclar
 
 @dataclass(frozen=True, slots=True)
 class _Pattern:
-    """The rest of a declared name such as `{joint}/max_velocity`, by its parts."""
+    """Remaining parts of a declared name such as `{joint}/max_velocity`."""
 
     parts: tuple[str, ...]
     declared: Declaration
 
 
 def tree_fault(name: str, value: Any, below: NodeDeclaration, robot: Mapping[str, Collection[str]]) -> str:
-    """Returns what is wrong with a parameter below a tree, in words that follow its name; empty if nothing is.
+    """Returns the fault of a nested parameter as the predicate of a sentence about its name; "" if valid.
 
     Args:
-        name: Name of the parameter below the tree, such as `elbow_joint/max_velocity`.
-        value: Its value.
-        below: Declaration of the names below the tree; `{joint}` in a name stands for each joint.
-        robot: Names by kind, such as `joint`; a kind that is missing may have any names.
+        name: Name relative to the tree, such as `elbow_joint/max_velocity`.
+        value: Value of the parameter.
+        below: Declaration of the names in the tree; `{joint}` in a name stands for any joint.
+        robot: Names of the robot by kind, such as `joint`. Names of an absent kind are not checked.
     """
     patterns = [_Pattern(tuple(key.split("/")), item) for key, item in below.parameters.items()]
-    rest = tuple(name.split("/"))
-    while rest:
-        fitting: list[tuple[int, _Pattern]] = []
+    remaining_parts = tuple(name.split("/"))
+    while remaining_parts:
+        matches: list[tuple[int, _Pattern]] = []
         for pattern in patterns:
-            length = _length(pattern.parts[0], rest, robot) if pattern.parts else 0
+            length = _matched_length(pattern.parts[0], remaining_parts, robot) if pattern.parts else 0
             if length:
-                fitting.append((length, _Pattern(pattern.parts[1:], pattern.declared)))
-        if not fitting:
-            return _unknown(rest[0], patterns, robot)
-        longest = max(length for length, _ in fitting)
-        patterns = [pattern for length, pattern in fitting if length == longest]
-        rest = rest[longest:]
-    whole = [pattern.declared for pattern in patterns if not pattern.parts]
-    if not whole:
+                matches.append((length, _Pattern(pattern.parts[1:], pattern.declared)))
+        if not matches:
+            return _unknown(remaining_parts[0], patterns, robot)
+        longest = max(length for length, _ in matches)
+        patterns = [pattern for length, pattern in matches if length == longest]
+        remaining_parts = remaining_parts[longest:]
+    complete = [pattern.declared for pattern in patterns if not pattern.parts]
+    if not complete:
         return f"is {value!r}; allowed: {', '.join('/'.join(pattern.parts) for pattern in patterns)} below it"
-    return whole[0].fault(value)
+    return complete[0].fault(value)
 
 
-def _length(part: str, rest: tuple[str, ...], robot: Mapping[str, Collection[str]]) -> int:
-    """Returns the number of parts of a name that a part of a pattern stands for; 0 if it does not fit.
+def _matched_length(part: str, remaining_parts: tuple[str, ...], robot: Mapping[str, Collection[str]]) -> int:
+    """Returns the number of name parts that match a part of a pattern; 0 without a match.
 
-    The variables of a planar or floating joint have a slash in their names.
+    Variables of planar and floating joints have a slash in their names and match two parts.
     """
     if not part.startswith("{"):
-        return int(rest[0] == part)
+        return int(remaining_parts[0] == part)
     known = robot.get(part.strip("{}"))
     if known is None:
         return 1
-    return next((length for length in (2, 1) if len(rest) >= length and "/".join(rest[:length]) in known), 0)
+    return next(
+        (length for length in (2, 1) if len(remaining_parts) >= length and "/".join(remaining_parts[:length]) in known),
+        0,
+    )
 
 
 def _unknown(part: str, patterns: list[_Pattern], robot: Mapping[str, Collection[str]]) -> str:

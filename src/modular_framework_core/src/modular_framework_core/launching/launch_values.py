@@ -202,7 +202,7 @@ def _task_faults(values: Mapping[str, str]) -> Iterator[str]:
 
 
 def _generated_name_faults(values: Mapping[str, str]) -> Iterator[str]:
-    """Yields why the generated state machine cannot have its name."""
+    """Yields the fault of an invalid name of the generated state machine."""
     name = values.get(GENERATED_NAME, "")
     fault = module_name_fault(name.removesuffix(".py")) if name and not values.get("state_machine_to_load") else ""
     if fault:

@@ -98,11 +98,11 @@ class DeclaredNames:
             yield LaunchFault(name, f"{text}; list it in extra_parameters if a node of your own reads it")
 
     def below_trees(self, given: Mapping[str, Any], robot: Mapping[str, Collection[str]]) -> Iterator[LaunchFault]:
-        """Yields a fault for each parameter below a tree that names nothing of the robot, or is not allowed.
+        """Yields a fault for each parameter in a tree with an unknown name or an invalid value.
 
         Args:
-            given: Parameters by whole name.
-            robot: Names of the robot by kind: joint, link, group; a kind that is missing is not known.
+            given: Parameters by resolved name.
+            robot: Names of the robot by kind: joint, link, group. Names of an absent kind are not checked.
         """
         for tree, users in self.known.items():
             below = next((item.below for _, item in users if item.below), "")
@@ -141,7 +141,7 @@ class DeclaredNames:
         return self._launch.parameters.get(_resolved_name(name, node))
 
     def effective_values(self) -> dict[str, Any]:
-        """Returns the parameters of the launch and the declared defaults; numbers of type float are floats."""
+        """Returns the launch's parameters and the declared defaults; integers of type float are converted to float."""
         values = dict(self._launch.parameters)
         for name, users in self.known.items():
             item = users[0][1]

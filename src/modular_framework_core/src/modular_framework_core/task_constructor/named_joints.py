@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks the names inside the files of named joint states and trajectories."""
+"""Checks the joint names in named joint states and the state names in named trajectories."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from modular_framework_core.task_constructor.known_names import JOINT_STATES_FIL
 
 
 def named_joint_faults(folder: Path, joints: Collection[str]) -> Iterator[str]:
-    """Yields a sentence for each joint that the robot does not have, and each state that a trajectory lacks.
+    """Yields a sentence for each unknown joint of a named state and each unknown state of a trajectory.
 
-    A state all of whose joints are unlike those of the robot belongs to another robot, and is no fault.
+    A state without any joint similar to the robot's joints is ignored, because it belongs to a different robot.
 
     Args:
-        folder: Folder of the configuration files.
-        joints: Joints of the robot.
+        folder: Configuration folder.
+        joints: Joint names of the robot.
 
     Raises:
         ValueError: A file cannot be read.
@@ -42,5 +42,5 @@ def named_joint_faults(folder: Path, joints: Collection[str]) -> Iterator[str]:
 
 
 def _states_of(points: Any) -> list[str]:
-    found = points if isinstance(points, list) else []
-    return [str(point["name"]) for point in found if isinstance(point, Mapping) and "name" in point]
+    waypoints = points if isinstance(points, list) else []
+    return [str(point["name"]) for point in waypoints if isinstance(point, Mapping) and "name" in point]
