@@ -141,7 +141,7 @@ def test_an_unknown_name_is_answered_by_all_names_and_the_nearest(
 
 def test_a_template_is_explained_by_its_keys_and_userdata(capsys: pytest.CaptureFixture[str]) -> None:
     page = explanation(capsys, "framework_state_machine")
-    assert "Runs one state after the other; its userdata holds what the framework's states work with." in page
+    assert "Runs one state after the other, with the userdata that the framework's states expect." in page
     assert "  node_name: a name, optional, in a task only\n      Name of the ROS node" in page
     assert "  outcomes: a list of names, required in a task, optional in a nested machine\n" in page
     assert "  userdata: self.userdata, optional, in a nested machine only\n" in page

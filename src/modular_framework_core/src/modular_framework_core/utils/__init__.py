@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of the original framework's helper modules."""
+"""Modules under the names of the original framework."""

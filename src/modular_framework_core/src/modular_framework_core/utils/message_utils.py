@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The functions that make messages, under the module name nodes of the original framework import them from."""
+"""Functions that create messages, under the module name used by nodes of the original framework."""
 
 from modular_framework_core.grasping.grasp_messages import (
     generate_joint_state_message,
