@@ -97,9 +97,9 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
         """Returns the solver, warm: its first solution takes longer."""
         robot = self.robot(settings["robot"])
         group = robot.chain(str(settings["group"]))
-        check_solver(str(settings["solver"]))
+        check_solver(str(settings.get("solver", "")))
         solver = InverseKinematics(robot.model, group, _solver_settings(robot, settings))
-        if settings["solver"] == CLOSED_FORM and solver.method == NUMERIC:
+        if settings.get("solver") == CLOSED_FORM and solver.method == NUMERIC:
             raise ModeError(f"solver '{CLOSED_FORM}': group '{group.name}' has no closed form; leave the key out")
         solver.solutions(group.tip_link, _reachable_pose(robot, group, np.random.default_rng(0)), _home(robot))
         return solver
