@@ -196,7 +196,7 @@ def test_broken_episodes_count_as_failures_and_what_they_decide_is_told() -> Non
     assert found.verdict is Verdict.FIRST_BETTER
     assert found.verdict_without_broken is Verdict.NOT_SHOWN
     assert found.notes == (
-        "8 broken episodes counted as failures; without their pairs that is not so "
+        "8 broken episodes counted as failures; without their pairs the verdict changes "
         "(0 points, 95 % interval -24 to 24, 12 paired episodes)",
     )
     of_b = next(each for each in summarise(results_of(statuses)) if each.method == "B")
@@ -235,7 +235,7 @@ def test_pairs_of_a_seed_count_as_one() -> None:
     assert found.p_value == pytest.approx(2 / 2**5)
     assert found.verdict is Verdict.NOT_SHOWN
     assert "30 paired episodes of 10 scenes" in found.sentence
-    assert any("30 pairs of 10 scenes: those of one count as one" in note for note in found.notes)
+    assert any("30 pairs of 10 scenes; all pairs of a unit count as one" in note for note in found.notes)
 
 
 def test_repeated_problems_are_the_units_of_planning() -> None:
@@ -248,7 +248,7 @@ def test_repeated_problems_are_the_units_of_planning() -> None:
     assert (found.counts.pairs, found.counts.units, found.unit_noun) == (100, 20, "problem")
     assert found.p_value == pytest.approx(2 / 2**8)
     assert analysis.scope == (
-        "The unit is the problem: 20 problems for 100 trials: those of one count as one. "
+        "The unit is the problem: 20 problems for 100 trials; all trials of a unit count as one. "
         "Claims are about problems like these."
     )
     rate = next(each for each in analysis.summaries if each.method == "A").estimate
@@ -361,7 +361,7 @@ def test_many_comparisons_are_corrected_together() -> None:
     fewer = results_of({name: outcomes([1] * 12 + [int(name == "A")] * 6) for name in "ABCD"})
     found = {(each.first, each.second): each for each in compare(fewer)}
     assert found["A", "B"].verdict is Verdict.NOT_SHOWN
-    assert any("the interval leaves out 0, but the corrected test" in note for note in found["A", "B"].notes)
+    assert any("the interval excludes 0, but the corrected test" in note for note in found["A", "B"].notes)
 
 
 def test_success_and_another_metric_that_can_be_shown_have_half_of_the_error_rate_each() -> None:
@@ -401,7 +401,7 @@ def test_without_data_the_sentence_says_so(results: ExperimentResults, sentence:
 def test_values_that_are_all_missing_or_all_equal_have_a_sentence() -> None:
     missing = of_values(LENGTH, [np.nan] * 3, [np.nan] * 3)
     assert missing.sentence == (
-        "nothing to compare between A and B in path length: no pair has a value of both; 3 pairs are without one"
+        "nothing to compare between A and B in path length: no pair has both values; 3 pairs lack a value"
     )
     equal = of_values(LENGTH, [2.0] * 9, [2.0] * 9)
     assert equal.verdict is Verdict.NOT_SHOWN
@@ -459,5 +459,5 @@ def test_an_episode_that_is_there_twice_and_an_unknown_factor_are_refused() -> N
     description = dataclasses.replace(results.description, compared="planner")
     with pytest.raises(ValueError, match="has no factor 'planner'; its factors are: method"):
         compare(dataclasses.replace(results, description=description))
-    with pytest.raises(ValueError, match="'method' is none of the factors beside the compared one; those are: none"):
+    with pytest.raises(ValueError, match="'method' is not a factor beside the compared one; these factors are: none"):
         summarise_by_level(results, "method")

@@ -12,13 +12,13 @@ from statistics_results import TIME, results_of
 from statsmodels.stats.multitest import multipletests
 
 from modular_framework_benchmark.records.episode import EpisodeSpec
-from modular_framework_benchmark.statistics.corrections import corrected
+from modular_framework_benchmark.statistics.corrections import holm_tarone
 from modular_framework_benchmark.statistics.planned_power import power_text
 from modular_framework_benchmark.statistics.power import (
-    fewest_units,
+    detectable_difference,
+    min_units,
     pairs_for_rate,
     rate_power,
-    smallest_difference,
 )
 from modular_framework_benchmark.statistics.rates import PairOutcomes, paired_interval, paired_p_value
 from modular_framework_benchmark.statistics.sequential import anytime_p_value
@@ -66,34 +66,34 @@ def test_normal_values_half_a_deviation_apart_need_at_most_55_pairs() -> None:
 def test_with_the_fewest_units_a_clean_sweep_shows_a_difference_and_with_one_less_it_does_not(
     error_rate: float,
 ) -> None:
-    units = fewest_units(error_rate)
+    units = min_units(error_rate)
 
     def shows(count: int) -> bool:
         outcomes = PairOutcomes(count, 0, count)
         return stats.binomtest(count, count).pvalue <= error_rate and paired_interval(outcomes).low > 0.0
 
     assert shows(units) and (units == 6 or not shows(units - 1))
-    ever = fewest_units(error_rate, at_any_time=True)
+    ever = min_units(error_rate, at_any_time=True)
     assert anytime_p_value(np.ones(ever)) <= error_rate < anytime_p_value(np.ones(ever - 1))
 
 
 def test_the_smallest_difference_is_shown_with_the_power_and_one_point_less_is_not() -> None:
-    found = smallest_difference(100, 0.05, 0.3)
+    found = detectable_difference(100, 0.05, 0.3)
     assert found is not None
     assert rate_power(100, found, 0.3) >= 0.8 > rate_power(100, found - 0.01, 0.3)
-    assert smallest_difference(10, 0.05 / 56) is None
+    assert detectable_difference(10, 0.05 / 56) is None
 
 
 def test_holms_correction_is_that_of_statsmodels_where_every_comparison_can_be_shown() -> None:
     p_values = [0.01, 0.04, 0.03, 0.005]
     expected = multipletests(p_values, method="holm")[1]
-    assert corrected(p_values, [0.0] * 4, 0.05, 1.0)[0] == pytest.approx(expected)
-    assert corrected([0.02], [0.0], 0.05, 0.5) == ([0.04], 1)
+    assert holm_tarone(p_values, [0.0] * 4, 0.05, 1.0)[0] == pytest.approx(expected)
+    assert holm_tarone([0.02], [0.0], 0.05, 0.5) == ([0.04], 1)
 
 
 def test_comparisons_that_cannot_be_shown_do_not_count() -> None:
     # R. E. Tarone, Biometrics 46 (1990) 515-522: with k = 2, two of the four can have a p value of 0.025.
-    found, count = corrected([0.02, 0.5, 0.3, 1.0], [0.001, 0.01, 0.25, 1.0], 0.05, 1.0)
+    found, count = holm_tarone([0.02, 0.5, 0.3, 1.0], [0.001, 0.01, 0.25, 1.0], 0.05, 1.0)
     assert count == 2
     assert found[0] == pytest.approx(0.04)
     assert all(value > 0.05 for value in found[1:])
@@ -107,7 +107,7 @@ def test_the_correction_keeps_the_error_rate_of_identical_methods_with_few_decid
         won = random.binomial(decided, 0.5)
         p_values = [1.0 if not all_ else stats.binomtest(int(one), int(all_)).pvalue
                     for one, all_ in zip(won, decided, strict=True)]  # fmt: skip
-        false += min(corrected(p_values, [2.0 ** (1 - int(all_)) for all_ in decided], 0.05, 1.0)[0]) <= 0.05
+        false += min(holm_tarone(p_values, [2.0 ** (1 - int(all_)) for all_ in decided], 0.05, 1.0)[0]) <= 0.05
     assert 0 < false <= 130
 
 
@@ -133,7 +133,7 @@ def test_the_dry_run_says_that_nothing_can_be_shown_with_10_pairs_and_28_compari
 
 def test_the_dry_run_names_the_smallest_difference_and_what_others_need() -> None:
     text = planned(2, 100)
-    assert f"success: from {100 * (smallest_difference(100, 0.025, 0.3) or 0):g} points" in text
+    assert f"success: from {100 * (detectable_difference(100, 0.025, 0.3) or 0):g} points" in text
     assert f"{pairs_for_rate(0.05, 0.3, 0.025):,}, {pairs_for_rate(0.1, 0.3, 0.025)} and" in text
     assert "60, 70 and 80 % of the pairs won need" in text
 

@@ -135,7 +135,7 @@ def test_a_rule_with_one_method_or_no_episodes_goes_on() -> None:
         (lambda: AnytimeValid(smallest_difference=0.0), "smallest_difference is 0.0; it must be above 0 and at most 1"),
         (
             lambda: AnytimeValid("speed").decide(sequential([1], [1])),
-            "looks at 'speed', which is not measured; measured are: success",
+            "uses 'speed', which is not measured; measured are: success",
         ),
         (
             lambda: AnytimeValid().decide(results_of({"a": outcomes([1]), "b": outcomes([1])})),

@@ -109,7 +109,7 @@ class ExperimentSession:
         """Prints the first screen of the report and writes the page; fails when no episode says anything."""
         from modular_framework_benchmark.commands.report_command import write_page  # takes seconds to import
         from modular_framework_benchmark.reports.report_source import OpenedExperiment
-        from modular_framework_benchmark.statistics.observations import outside_reason
+        from modular_framework_benchmark.statistics.observations import unmeasured_reason
 
         if end.stopped_because:
             print(f"ended before all trials: {end.stopped_because}")
@@ -122,7 +122,7 @@ class ExperimentSession:
             print(f"error: no report: {error}; the results are stored. To write it: {again}", file=sys.stderr)
             return EXIT_FAILED
         print(answer, f"report: {page}", sep="\n")
-        if reason := outside_reason(results):
+        if reason := unmeasured_reason(results):
             print(f"error: {reason}", file=sys.stderr)
             return EXIT_FAILED
         return 0

@@ -125,7 +125,7 @@ def _add_box(figure: go.Figure, name: str, values: Values, index: int) -> None:
 
 
 def _add_profile(figure: go.Figure, name: str, profile: Curve, index: int, line_shape: str) -> None:
-    taus, share = np.asarray(profile.at, dtype=float), np.asarray(profile.share, dtype=float)
+    taus, share = np.asarray(profile.values, dtype=float), np.asarray(profile.fractions, dtype=float)
     low, high = np.asarray(profile.low, dtype=float), np.asarray(profile.high, dtype=float)
     red, green, blue = (int(color_of(index)[start : start + 2], 16) for start in (1, 3, 5))
     figure.add_trace(

@@ -27,7 +27,7 @@ from modular_framework_benchmark.statistics.comparison import (
     Verdict,
 )
 from modular_framework_benchmark.statistics.observations import SUCCESS as SUCCESS_METRIC
-from modular_framework_benchmark.statistics.sentences import listed
+from modular_framework_benchmark.statistics.sentences import enumeration
 from modular_framework_ros.reported_figures import Source
 
 NO_BREAK = "\u00a0"
@@ -173,8 +173,8 @@ def _grouped(items: Sequence[Comparison]) -> list[str]:
         span = f"{min(points):.0f} to {max(points):.0f}" if len(points) > 1 else f"{points[0]:.0f}"
         verb = "is" if len(methods) == 1 else "are"
         lines.append(
-            f"{words(items[0].metric)}: {listed(methods)} {verb} better than {listed(others)} in more pairs than worse "
-            f"(+{span} points)"
+            f"{words(items[0].metric)}: {enumeration(methods)} {verb} better than {enumeration(others)} in more pairs "
+            f"than worse (+{span} points)"
         )
     return lines
 

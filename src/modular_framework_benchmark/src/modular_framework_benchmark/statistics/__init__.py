@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says how sure a difference between methods is: intervals, tests, corrections, sequential stopping, sentences."""
+"""Statistical analysis of experiments: intervals, tests, multiplicity correction, sequential stopping, sentences."""

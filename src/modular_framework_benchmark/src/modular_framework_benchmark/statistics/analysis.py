@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The statistics of an experiment: every method and every pair of methods, by every metric.
+"""Statistical analysis of an experiment: every method and every pair of methods, for every metric.
 
-docs/statistics.md says which rule is used when, and why.
+docs/statistics.md gives the rules and their reasons.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import sentences
 from modular_framework_benchmark.statistics.comparison import Analysis, Comparison, MethodSummary, Verdict
-from modular_framework_benchmark.statistics.corrections import corrected
+from modular_framework_benchmark.statistics.corrections import holm_tarone
 from modular_framework_benchmark.statistics.findings import Finding, Settings, compare_pair
 from modular_framework_benchmark.statistics.observations import (
     SUCCESS,
@@ -20,44 +20,44 @@ from modular_framework_benchmark.statistics.observations import (
     methods_of,
     metrics_of,
     other_factors,
-    outside_reason,
     pairs_of_methods,
     restricted,
+    unmeasured_reason,
 )
 from modular_framework_benchmark.statistics.summaries import summarise_method
 from modular_framework_benchmark.statistics.verdicts import Correction, conclude
 
 
 def analyse(results: ExperimentResults, *, mean_intervals: bool = False) -> Analysis:
-    """Returns the statistics of an experiment.
+    """Returns the statistical analysis of an experiment.
 
     Args:
-        results: Its finished episodes.
-        mean_intervals: Whether differences of the means of bounded metrics get an interval, a betting interval.
+        results: Finished episodes of the experiment.
+        mean_intervals: Whether the mean differences of bounded metrics get a betting interval.
 
     Raises:
-        ValueError: The compared factor is none of the experiment's, or an episode is there twice.
+        ValueError: The experiment lacks the compared factor, or the results contain an episode twice.
     """
-    outside = outside_reason(results)
-    comparisons = () if outside else compare(results, mean_intervals=mean_intervals)
+    unmeasured = unmeasured_reason(results)
+    comparisons = () if unmeasured else compare(results, mean_intervals=mean_intervals)
     summaries = summarise(results)
     return Analysis(
         methods=methods_of(results),
         metrics=tuple(metric.name for metric in metrics_of(results)),
-        summaries=tuple(dataclasses.replace(item, estimate=None) for item in summaries) if outside else summaries,
+        summaries=tuple(dataclasses.replace(item, estimate=None) for item in summaries) if unmeasured else summaries,
         comparisons=comparisons,
-        sentences=(outside,) if outside else _main_sentences(results, comparisons),
+        sentences=(unmeasured,) if unmeasured else _main_sentences(results, comparisons),
         rule=_rule(results, len(comparisons)),
         scope=_scope(results),
     )
 
 
 def summarise(results: ExperimentResults, levels: str = "") -> tuple[MethodSummary, ...]:
-    """Returns each method by each metric.
+    """Returns the summary of every method for every metric.
 
     Args:
-        results: The finished episodes.
-        levels: Levels of other factors that they are restricted to.
+        results: Finished episodes.
+        levels: Levels of the other factors that the results are restricted to, such as `object=can`.
     """
     table = EpisodeTable(results)
     return tuple(
@@ -69,10 +69,10 @@ def summarise(results: ExperimentResults, levels: str = "") -> tuple[MethodSumma
 
 
 def summarise_by_level(results: ExperimentResults, factor: str) -> tuple[MethodSummary, ...]:
-    """Returns each method by each metric at each level of another factor: a description, without comparisons.
+    """Returns the summary of every method for every metric at each level of another factor, without comparisons.
 
     Raises:
-        ValueError: The experiment has no such factor, or it is the compared one.
+        ValueError: The experiment lacks the factor, or the factor is the compared one.
     """
     return tuple(
         summary
@@ -82,7 +82,7 @@ def summarise_by_level(results: ExperimentResults, factor: str) -> tuple[MethodS
 
 
 def compare(results: ExperimentResults, *, mean_intervals: bool = False) -> tuple[Comparison, ...]:
-    """Returns each pair of methods by each metric; the arguments are those of `analyse`."""
+    """Returns the comparison of every pair of methods for every metric; `analyse` describes the arguments."""
     description, table = results.description, EpisodeTable(results)
     settings = Settings(description.confidence, description.holds_at_any_time, mean_intervals)
     findings = [
@@ -95,40 +95,42 @@ def compare(results: ExperimentResults, *, mean_intervals: bool = False) -> tupl
 
 
 def _corrections(findings: Sequence[Finding], error_rate: float) -> list[Correction]:
-    """Returns what the correction for many makes of each comparison, in their order."""
+    """Returns the multiplicity correction of each comparison, in the order of the findings."""
     of_success = [found.metric.name == SUCCESS.name for found in findings]
-    p_values, at_least = _corrected(findings, of_success, error_rate)
+    p_values, levels = _corrected(findings, of_success, error_rate)
     without = p_values
     if any(found.without_broken for found in findings):
         without, _ = _corrected([found.without_broken or found for found in findings], of_success, error_rate)
     return [
-        Correction(p_value, p_without, error_rate, least)
-        for p_value, p_without, least in zip(p_values, without, at_least, strict=True)
+        Correction(p_value, p_without, error_rate, level)
+        for p_value, p_without, level in zip(p_values, without, levels, strict=True)
     ]
 
 
 def _corrected(
     findings: Sequence[Finding], of_success: Sequence[bool], error_rate: float
 ) -> tuple[list[float | None], list[float]]:
-    """Returns the corrected p value of each comparison, and the error rate that it has at the least."""
+    """Returns the corrected p value and the level of the strictest Holm step of each comparison."""
     families = [
-        [place for place, found in enumerate(findings) if of_success[place] is which and found.p_value is not None]
-        for which in (True, False)
+        [index for index, found in enumerate(findings) if of_success[index] is is_success and found.p_value is not None]
+        for is_success in (True, False)
     ]
-    smallest = [min((findings[place].smallest_p for place in family), default=1.0) for family in families]
+    min_attainable = [min((findings[index].min_attainable_p for index in family), default=1.0) for family in families]
     p_values: list[float | None] = [None] * len(findings)
-    least = [error_rate / 2, error_rate / 2]
-    for which, family in enumerate(families):
+    levels = [error_rate / 2, error_rate / 2]
+    for family_index, family in enumerate(families):
         if family:
-            # A family that cannot show anything with its share leaves it to the other, if that can use it.
-            bar = error_rate / 2 if smallest[which] <= error_rate / 2 else error_rate
-            share = 1.0 if smallest[1 - which] > bar else 0.5
-            tested = [findings[place].p_value or 0.0 for place in family]
-            found, count = corrected(tested, [findings[place].smallest_p for place in family], error_rate, share)
-            least[which] = error_rate * share / count
-            for place, p_value in zip(family, found, strict=True):
-                p_values[place] = p_value
-    return p_values, [least[0 if success else 1] for success in of_success]
+            # A family that cannot show anything at its half of the error rate leaves its half to the other family.
+            bar = error_rate / 2 if min_attainable[family_index] <= error_rate / 2 else error_rate
+            fraction = 1.0 if min_attainable[1 - family_index] > bar else 0.5
+            tested = [findings[index].p_value or 0.0 for index in family]
+            found, count = holm_tarone(
+                tested, [findings[index].min_attainable_p for index in family], error_rate, fraction
+            )
+            levels[family_index] = error_rate * fraction / count
+            for index, p_value in zip(family, found, strict=True):
+                p_values[index] = p_value
+    return p_values, [levels[0 if success else 1] for success in of_success]
 
 
 def _levels(results: ExperimentResults, name: str) -> tuple[str, ...]:
@@ -136,11 +138,11 @@ def _levels(results: ExperimentResults, name: str) -> tuple[str, ...]:
         if factor.name == name:
             return factor.levels
     known = ", ".join(factor.name for factor in other_factors(results)) or "none"
-    raise ValueError(f"'{name}' is none of the factors beside the compared one; those are: {known}")
+    raise ValueError(f"'{name}' is not a factor beside the compared one; these factors are: {known}")
 
 
 def _main_sentences(results: ExperimentResults, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
-    """Returns all about success, then the differences that are shown, then what else was compared."""
+    """Returns the sentences on success, then those on differences that are shown, then all others."""
     if not comparisons:
         return (f"nothing to compare: the only method is {', '.join(methods_of(results)) or 'none'}",)
     shown = (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)
@@ -160,22 +162,24 @@ def _rule(results: ExperimentResults, comparisons: int) -> str:
     elif description.extended:
         when = "Tests and intervals hold at any time, because episodes were added after results had been seen."
     return (
-        "A difference is shown where more pairs are won than lost and the test and the interval of that both say so; a "
-        f"failure is worse than any value, two failures are a tie. {when} With identical methods the experiment shows "
-        f"any difference with at most {error}, half of it for success and half for all other metrics (Holm's and "
-        f"Tarone's correction, {sentences.count(comparisons, 'comparison')})."
+        "A difference is shown if a method wins more pairs than it loses and test and interval both confirm this. A "
+        f"failure is worse than any value; two failures tie. {when} With identical methods the experiment shows any "
+        f"difference with a probability of at most {error}, half for success and half for all other metrics (Holm's "
+        f"and Tarone's correction, {sentences.count(comparisons, 'comparison')})."
     )
 
 
 def _scope(results: ExperimentResults) -> str:
-    """Returns what the claims speak for: units like those that were drawn, and the levels that were run."""
+    """Returns the population that the claims cover: the units, their family_index and the fixed levels."""
     if results.episodes.empty:
         return ""
     table = EpisodeTable(results)
     units = sentences.count(table.unit_count, table.unit_noun)
-    levels = sentences.listed([factor.name.replace("_", " ") for factor in other_factors(results)])
+    levels = sentences.enumeration([factor.name.replace("_", " ") for factor in other_factors(results)])
     fixed = f", at the levels of {levels} that were run" if levels else ""
-    share = (
-        f" for {table.trial_count} trials: those of one count as one" if table.unit_count < table.trial_count else ""
+    trials = (
+        f" for {table.trial_count} trials; all trials of a unit count as one"
+        if table.unit_count < table.trial_count
+        else ""
     )
-    return f"The unit is the {table.unit_noun}: {units}{share}. Claims are about {table.unit_noun}s like these{fixed}."
+    return f"The unit is the {table.unit_noun}: {units}{trials}. Claims are about {table.unit_noun}s like these{fixed}."

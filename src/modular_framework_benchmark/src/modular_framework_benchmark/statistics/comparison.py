@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the statistics say of an experiment: a summary of each method, a comparison of each pair of methods.
+"""Results of the statistical analysis: method summaries and comparisons of pairs of methods.
 
-Plain numbers and words (no NumPy scalars), so that they can be written to JSON; what cannot be computed is None.
+Numbers are Python numbers, so that the report writes them as JSON. A figure that cannot be computed is None.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from enum import Enum
 
 
 class Verdict(Enum):
-    """What a comparison shows."""
+    """Conclusion of a comparison."""
 
     FIRST_BETTER = "first_better"
     SECOND_BETTER = "second_better"
-    NOT_SHOWN = "not_shown"  # compared, and no difference was shown
-    NOT_SHOWABLE = "not_showable"  # too few units to show a difference, whatever they had given
-    NO_DATA = "no_data"  # nothing to compare
+    NOT_SHOWN = "not_shown"  # tested without showing a difference
+    NOT_SHOWABLE = "not_showable"  # too few units to show any difference
+    NO_DATA = "no_data"  # no pairs
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +27,8 @@ class Interval:
     Attributes:
         low: Lower end, in the unit of the figure.
         high: Upper end, in the unit of the figure.
-        confidence: Its level, such as 0.95.
-        method: How it was computed, in words: `Clopper-Pearson`.
+        confidence: Confidence level, such as 0.95.
+        method: Name of the method that computes the interval, such as `Clopper-Pearson`.
     """
 
     low: float
@@ -39,12 +39,12 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A figure with its interval.
+    """An estimate with its confidence interval.
 
     Attributes:
-        name: What is estimated: `rate`, `median`, `mean`, `restricted mean`, `win difference`.
-        value: The figure, in the metric's unit; a rate from 0 to 1. Infinite for a median that is a failure.
-        interval: Its interval; None where it has none.
+        name: Estimand: `rate`, `median`, `mean`, `restricted mean` or `win difference`.
+        value: Estimate in the metric's unit; a rate is from 0 to 1, a median that is a failure is infinite.
+        interval: Confidence interval, or None if none can be computed.
     """
 
     name: str
@@ -54,19 +54,19 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class EpisodeCounts:
-    """How the episodes of a method ended and what became of them in the figures of a metric.
+    """Numbers of a method's episodes by outcome and by their part in the figures of a metric.
 
     Attributes:
-        episodes: Finished episodes, broken ones included.
-        succeeded: Those that succeeded.
-        failed: Those that ran to their end without success.
-        timed_out: Those that did not end within the time limit.
-        broken: Those whose launch died or whose measurement failed. In rates and in metrics with a limit they count as
+        episodes: Finished episodes, including broken ones.
+        succeeded: Successful episodes.
+        failed: Episodes that ended without success.
+        timed_out: Episodes that exceeded the time limit.
+        broken: Episodes whose launch died or whose measurement failed. Rates and metrics with a limit count them as
             failures.
-        counted: Those with a value of the metric, the ones at the limit included.
-        censored: Those that count at the metric's limit.
-        missing: Those without a value, which are in none of the figures.
-        units: Independent units of those that are counted: problems, scenes or seeds.
+        counted: Episodes with a value of the metric, including censored ones.
+        censored: Episodes that count at the metric's limit.
+        missing: Episodes without a value, excluded from all figures.
+        units: Independent units (problems, scenes or seeds) of the counted episodes.
     """
 
     episodes: int
@@ -81,21 +81,21 @@ class EpisodeCounts:
 
     @property
     def unmeasured_share(self) -> float | None:
-        """Share of the episodes without a value within the limit, from 0 to 1; None without episodes."""
+        """Fraction of episodes without a value within the limit, from 0 to 1; None without episodes."""
         return (self.missing + self.censored) / self.episodes if self.episodes else None
 
 
 @dataclass(frozen=True, slots=True)
 class MethodSummary:
-    """A metric of a method.
+    """Summary of a metric for a method.
 
     Attributes:
         method: Level of the compared factor.
         metric: Name of the metric.
-        unit: Its unit; "" for none and for rates.
-        levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
-        counts: How the episodes ended.
-        estimate: Rate, or median with failures worse than any value; None without data.
+        unit: Unit of the metric; "" for rates and dimensionless metrics.
+        levels: Levels of the other factors that the episodes are restricted to, such as `object=can`; "" for all.
+        counts: Numbers of episodes by outcome.
+        estimate: Rate, or median that ranks failures worst; None without data.
         mean: Mean, or restricted mean of a metric with a limit; None for rates and without data.
         quartiles: First and third quartile of the values; None for rates and without data.
         sentence: The estimate in words.
@@ -114,18 +114,18 @@ class MethodSummary:
 
 @dataclass(frozen=True, slots=True)
 class PairCounts:
-    """What was compared.
+    """Numbers of compared pairs and episodes.
 
     Attributes:
-        pairs: Pairs of episodes: same trial, same levels of the other factors.
-        units: Independent parts of the pairs: pairs that share a problem or a seed are one unit.
-        won: Pairs in which the first method was better.
-        lost: Pairs in which the second was.
-        failed: Compared episodes that count as worse than any value.
+        pairs: Pairs of episodes with the same trial and the same levels of the other factors.
+        units: Independent units; pairs that share a problem or a seed belong to one unit.
+        won: Pairs in which the first method is better.
+        lost: Pairs in which the second method is better.
+        failed: Compared episodes that rank worse than any value.
         broken: Compared episodes that are broken.
-        missing: Pairs left out because an episode has no value of the metric.
-        unmatched: Finished episodes of either method whose partner is not finished or not planned.
-        at_random: Whether the pairs share nothing but their levels, because no two episodes have the same trial.
+        missing: Pairs excluded because an episode has no value of the metric.
+        unmatched: Finished episodes without a finished or planned partner.
+        at_random: Whether pairs share only their levels, because no trial occurs in both methods.
     """
 
     pairs: int
@@ -140,28 +140,28 @@ class PairCounts:
 
     @property
     def pairs_per_unit(self) -> float:
-        """Mean number of pairs of a unit; 0 without pairs."""
+        """Mean number of pairs per unit; 0 without pairs."""
         return self.pairs / self.units if self.units else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PairFigures:
-    """The figures of a pair of methods by a metric.
+    """Figures that compare two methods for a metric.
 
     Attributes:
-        first: One level of the compared factor.
-        second: The other level.
-        counts: What was compared.
-        levels: Levels of other factors that it was restricted to: `object=can`; "" for all.
-        unit_noun: What a unit is: `problem`, `scene`, `seed`.
+        first: First method, a level of the compared factor.
+        second: Second method.
+        counts: Numbers of compared pairs and episodes.
+        levels: Levels of the other factors that the pairs are restricted to, such as `object=can`; "" for all.
+        unit_noun: Name of an independent unit: `problem`, `scene` or `seed`.
         first_estimate: Rate or median of the first method over the pairs; None without data.
-        second_estimate: That of the second.
-        difference: Win difference, from -1 to 1, with its interval: the share of pairs in which the first is better
-            minus that in which the second is, one mean a unit. For a rate that is the difference of the rates, towards
-            the better one. None without data.
-        mean_difference: First minus second mean of the values of the pairs, in the metric's unit: a description
-            without a verdict. None for rates and without data.
-        p_value: P value of the test; None without data and with too few units.
+        second_estimate: Rate or median of the second method over the pairs; None without data.
+        difference: Win difference from -1 to 1: fraction of pairs won by the first method minus fraction won by the
+            second, averaged per unit first. For a rate it equals the difference of the rates, signed so that
+            positive is better. None without data.
+        mean_difference: Mean of the first method minus mean of the second over the pairs, in the metric's unit. It is
+            descriptive and has no verdict. None for rates and without data.
+        p_value: P value of the test; None without data or with too few units.
         test: Name of the test.
     """
 
@@ -180,20 +180,20 @@ class PairFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison(PairFigures):
-    """A pair of methods by a metric, with what it shows.
+    """Comparison of two methods for a metric, with its verdict.
 
     Attributes:
         metric: Name of the metric.
-        unit: Its unit; "" for none and for rates.
-        p_corrected: The p value after the correction for many comparisons; None without data.
-        correction: The correction, in words: `Holm, 6 comparisons`.
-        verdict: What is shown: a difference only where the corrected p value and the interval both say so.
-        verdict_without_broken: The same with the pairs of broken episodes left out; None where there are none.
-        pairs_needed: How many pairs in all would show `difference_planned` with 80 % power; None if already there or
-            unknown.
-        difference_planned: The win difference which `pairs_needed` is for.
-        sentence: The result in words, one sentence.
-        notes: What a reader must know beside it: censored, missing, broken, unfinished.
+        unit: Unit of the metric; "" for rates and dimensionless metrics.
+        p_corrected: P value after the multiplicity correction; None without data.
+        correction: Description of the correction, such as `Holm and Tarone; the least p value counts 6 times`.
+        verdict: Conclusion; a difference requires both the corrected p value and the interval.
+        verdict_without_broken: Verdict without the pairs of broken episodes; None without such pairs.
+        pairs_needed: Total number of pairs that shows `difference_planned` with 80 % power; None if the sample is large
+            enough or the number is unknown.
+        difference_planned: Win difference that `pairs_needed` refers to.
+        sentence: Result as one sentence.
+        notes: Remarks on censored, missing, broken and unfinished episodes.
     """
 
     metric: str
@@ -210,16 +210,16 @@ class Comparison(PairFigures):
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """The statistics of an experiment.
+    """Statistical analysis of an experiment.
 
     Attributes:
-        methods: The methods, as in the experiment file.
-        metrics: The metrics by name, the task's success first.
-        summaries: Each method by each metric.
-        comparisons: Each pair of methods by each metric, over all levels of the other factors.
-        sentences: The main results in words, the most important first.
-        rule: What the verdicts rest on, in words: test, correction, error rate, sequential or not.
-        scope: What the claims speak for: the units, their number, and the levels.
+        methods: Methods in the order of the experiment file.
+        metrics: Metric names, success first.
+        summaries: Summary of each method for each metric.
+        comparisons: Comparison of each pair of methods for each metric, pooled over the levels of other factors.
+        sentences: Main results, most important first.
+        rule: Rule behind the verdicts: test, correction, error rate, fixed or sequential.
+        scope: Population that the claims cover: the units, their number and the levels.
     """
 
     methods: tuple[str, ...]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Curve of a metric: the share of episodes that are at least as good as each value."""
+"""Performance profiles: the fraction of episodes at least as good as each value of a metric."""
 
 from __future__ import annotations
 
@@ -13,73 +13,73 @@ from modular_framework_benchmark.records.experiment import Direction, Metric
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics.observations import EpisodeTable, metrics_of
 
-MOST_POINTS = 200
+MAX_POINTS = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A share of episodes over a value of the metric.
+    """Fraction of episodes as a function of a metric's value.
 
     Attributes:
-        at: Values of the metric, rising, in its unit.
-        share: Share of the episodes at each, from 0 to 1.
-        low: Lower end of its interval at each.
-        high: Upper end.
-        confidence: Level of the interval at each point (not of the whole band).
-        episodes: How many episodes it is of.
-        left_out: Episodes that are in none of it because they have no value.
-        method: How it was computed, in words.
+        values: Values of the metric in its unit, ascending.
+        fractions: Fraction of episodes at each value, from 0 to 1.
+        low: Lower end of the confidence interval at each value.
+        high: Upper end of the confidence interval at each value.
+        confidence: Confidence level at each value, not of the whole band.
+        episodes: Number of episodes with a value.
+        missing: Number of episodes without a value.
+        method: Description of the computation.
     """
 
-    at: tuple[float, ...]
-    share: tuple[float, ...]
+    values: tuple[float, ...]
+    fractions: tuple[float, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
     confidence: float
     episodes: int
-    left_out: int
+    missing: int
     method: str
 
 
 def performance_profile(
-    results: ExperimentResults, metric_name: str, method: str, at: Sequence[float] | None = None
+    results: ExperimentResults, metric_name: str, method: str, values: Sequence[float] | None = None
 ) -> Curve:
-    """Returns the share of a method's episodes that are at least as good as each value of a metric.
+    """Returns the fraction of a method's episodes that are at least as good as each value of a metric.
 
     A failure reaches no value. Source: R. Agarwal and others, Deep
     reinforcement learning at the edge of the statistical precipice, NeurIPS 2021.
 
     Args:
-        results: The finished episodes.
+        results: Finished episodes.
         metric_name: Name of the metric.
         method: Level of the compared factor.
-        at: Values of the metric; None: up to 200 of those that were seen.
+        values: Values of the metric to evaluate; None for up to 200 observed values.
 
     Raises:
         ValueError: The metric is not measured.
     """
     metric = _metric(results, metric_name)
-    seen = EpisodeTable(results).observations(metric, method)
-    known = ~np.isnan(seen.scores)
-    reached, present = seen.scores[known], int(known.sum())
-    values = _points(reached[np.isfinite(reached)]) if at is None else np.sort(np.asarray(at, dtype=float))
+    observed = EpisodeTable(results).observations(metric, method)
+    known = ~np.isnan(observed.scores)
+    scores, count = observed.scores[known], int(known.sum())
+    grid = _grid(scores[np.isfinite(scores)]) if values is None else np.sort(np.asarray(values, dtype=float))
     confidence = results.description.confidence
-    ranked = np.sort(reached)
+    ordered = np.sort(scores)
     if metric.better is Direction.LOWER:
-        counts = np.searchsorted(ranked, values, side="right")
+        counts = np.searchsorted(ordered, grid, side="right")
     else:
-        counts = present - np.searchsorted(ranked, values, side="left")
-    units = len(np.unique(seen.units[known]))
-    low, high = _band(counts * units / max(present, 1), units, confidence)
+        counts = count - np.searchsorted(ordered, grid, side="left")
+    units = len(np.unique(observed.units[known]))
+    low, high = _band(counts * units / max(count, 1), units, confidence)
     return Curve(
-        at=_floats(values),
-        share=_floats(counts / max(present, 1)),
+        values=_floats(grid),
+        fractions=_floats(counts / max(count, 1)),
         low=low,
         high=high,
         confidence=confidence,
-        episodes=present,
-        left_out=int(np.sum(~known)),
-        method="share of episodes, Clopper-Pearson interval of as many as there are units at each value",
+        episodes=count,
+        missing=int(np.sum(~known)),
+        method="fraction of episodes; Clopper-Pearson interval at each value for as many episodes as units",
     )
 
 
@@ -88,14 +88,14 @@ def _metric(results: ExperimentResults, name: str) -> Metric:
         if metric.name == name:
             return metric
     known = ", ".join(metric.name for metric in metrics_of(results))
-    raise ValueError(f"metric '{name}' is not measured; measured are: {known}")
+    raise ValueError(f"metric '{name}' is not measured; the measured metrics are: {known}")
 
 
-def _points(values: np.ndarray) -> np.ndarray:
-    found = np.unique(values)
-    if len(found) <= MOST_POINTS:
-        return found
-    return np.unique(np.quantile(found, np.linspace(0.0, 1.0, MOST_POINTS)))
+def _grid(values: np.ndarray) -> np.ndarray:
+    distinct = np.unique(values)
+    if len(distinct) <= MAX_POINTS:
+        return distinct
+    return np.unique(np.quantile(distinct, np.linspace(0.0, 1.0, MAX_POINTS)))
 
 
 def _band(counts: np.ndarray, units: int, confidence: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

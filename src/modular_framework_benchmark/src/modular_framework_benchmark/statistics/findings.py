@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compares two methods by one metric, before any correction: won and lost pairs, their test and their interval.
+"""Compares two methods for a metric before the multiplicity correction: test and interval of the win difference.
 
-One statistic decides the direction, the p value and the interval of every metric: the win difference. Sources: S. J.
+The win difference decides the direction, the p value and the interval of every metric. Sources: S. J.
 Pocock and others, The win ratio, European Heart J. 33 (2012) 176-182; R. Agarwal and others, NeurIPS 2021.
 """
 
@@ -21,30 +21,30 @@ from modular_framework_benchmark.statistics.values import MIN_UNITS, bounded_mea
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding(PairFigures):
-    """A comparison before the correction for many.
+    """Comparison before the multiplicity correction.
 
     Attributes:
-        metric: What is compared.
-        spread: Mean square of the units' win differences, which is the share of pairs that are decided where each unit
-            is one pair: the number of pairs for a difference depends on it. None without data.
-        smallest_p: Smallest p value that so many decided units could have; 0 for a test that holds at any time.
-        without_broken: The same without the pairs of broken episodes; None where there are none.
+        metric: Compared metric.
+        discordance: Mean square of the units' win differences; with one pair per unit it is the fraction of discordant
+            pairs. The sample size depends on it. None without data.
+        min_attainable_p: Minimum attainable p value with this number of discordant units; 0 for an anytime-valid test.
+        without_broken: Comparison without the pairs of broken episodes; None without such pairs.
     """
 
     metric: Metric
-    spread: float | None = None
-    smallest_p: float = 1.0
+    discordance: float | None = None
+    min_attainable_p: float = 1.0
     without_broken: Finding | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How two methods are compared.
+    """Settings of a comparison.
 
     Attributes:
-        confidence: Level of the intervals.
-        at_any_time: Whether tests and intervals must hold however often one looks.
-        mean_intervals: Whether differences of the means of bounded metrics get a betting interval.
+        confidence: Confidence level of the intervals.
+        at_any_time: Whether tests and intervals must be anytime-valid.
+        mean_intervals: Whether the mean differences of bounded metrics get a betting interval.
     """
 
     confidence: float
@@ -53,27 +53,27 @@ class Settings:
 
 
 def compare_pair(table: EpisodeTable, metric: Metric, first: str, second: str, settings: Settings) -> Finding:
-    """Returns the comparison of two methods by a metric.
+    """Returns the comparison of two methods for a metric.
 
     Args:
-        table: The finished episodes.
-        metric: What is compared.
-        first: One method.
-        second: The other.
-        settings: How they are compared.
+        table: Finished episodes.
+        metric: Compared metric.
+        first: First method.
+        second: Second method.
+        settings: Settings of the comparison.
     """
     matched = table.pairs(metric, first, second)
-    return _found(replace(_empty(first, second, metric), unit_noun=table.unit_noun), matched, settings)
+    return _compare_pairs(replace(_empty_finding(first, second, metric), unit_noun=table.unit_noun), matched, settings)
 
 
-def _empty(first: str, second: str, metric: Metric) -> Finding:
+def _empty_finding(first: str, second: str, metric: Metric) -> Finding:
     return Finding(first, second, PairCounts(0, 0, 0, 0, 0, 0, 0, 0, False), metric=metric)
 
 
-def _found(empty: Finding, matched: Pairs, settings: Settings) -> Finding:
+def _compare_pairs(empty: Finding, matched: Pairs, settings: Settings) -> Finding:
     metric = empty.metric
     if settings.at_any_time:
-        matched = matched.of_complete_units()
+        matched = matched.complete_units()
     outcomes = matched.outcomes(metric.better)
     means, sizes = unit_means(outcomes, _coarser_units(matched))
     finding = replace(empty, counts=_counts(matched, outcomes, len(means)))
@@ -82,23 +82,23 @@ def _found(empty: Finding, matched: Pairs, settings: Settings) -> Finding:
     p_value, test, interval = _test(means, sizes, settings)
     finding = replace(
         finding,
-        first_estimate=_typical(matched.first.scores, metric),
-        second_estimate=_typical(matched.second.scores, metric),
+        first_estimate=_point_estimate(matched.first.scores, metric),
+        second_estimate=_point_estimate(matched.second.scores, metric),
         difference=Estimate("win difference", float(np.mean(means)), interval),
         mean_difference=_mean_difference(matched, metric, settings),
         p_value=p_value,
         test=test,
-        spread=float(np.mean(means**2)),
-        smallest_p=0.0 if settings.at_any_time else 2.0 ** (1.0 - np.count_nonzero(means)),
+        discordance=float(np.mean(means**2)),
+        min_attainable_p=0.0 if settings.at_any_time else 2.0 ** (1.0 - np.count_nonzero(means)),
     )
     if not matched.broken.any():
         return finding
-    return replace(finding, without_broken=_found(empty, matched.kept(~matched.broken), settings))
+    return replace(finding, without_broken=_compare_pairs(empty, matched.selected(~matched.broken), settings))
 
 
 def _coarser_units(matched: Pairs) -> Integers:
-    """Returns the units of the pairs; partners at random have units of their own, of which the fewer count."""
-    return min(matched.first.units, matched.second.units, key=lambda units: len(np.unique(units)))
+    """Returns the coarser partition into units; the partners of random pairs have different units."""
+    return min(matched.first.units, matched.second.units, key=lambda partition: len(np.unique(partition)))
 
 
 def _counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
@@ -117,7 +117,7 @@ def _counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
 
 
 def _test(means: Floats, sizes: Integers, settings: Settings) -> tuple[float | None, str, Interval | None]:
-    """Returns the p value, the test's name and the interval of the units' mean win difference."""
+    """Returns the p value, the test's name and the interval of the mean win difference over the units."""
     if len(means) < MIN_UNITS:
         return None, f"none: fewer than {MIN_UNITS} units", None
     if settings.at_any_time:
@@ -130,19 +130,19 @@ def _test(means: Floats, sizes: Integers, settings: Settings) -> tuple[float | N
     return sign_flip_p_value(means, sizes), "sign flip test of the units", interval
 
 
-def _typical(scores: Floats, metric: Metric) -> float:
+def _point_estimate(scores: Floats, metric: Metric) -> float:
     return float(np.mean(scores) if metric.kind is MetricKind.RATE else np.median(scores))
 
 
 def _mean_difference(matched: Pairs, metric: Metric, settings: Settings) -> Estimate | None:
-    """Returns the difference of the means of the pairs that have both values: a description."""
+    """Returns the mean difference of the pairs with two values; it is descriptive only."""
     differences = matched.first.values - matched.second.values
     known = ~np.isnan(differences)
     if metric.kind is MetricKind.RATE or not known.any():
         return None
     means, _ = unit_means(differences[known], _coarser_units(matched)[known])
-    reach = metric.bounds[1] - metric.bounds[0]
+    bounds_width = metric.bounds[1] - metric.bounds[0]
     interval = None
-    if settings.mean_intervals and math.isfinite(reach) and len(means) >= MIN_UNITS:
-        interval = sequential.anytime_interval(means, settings.confidence, reach)
+    if settings.mean_intervals and math.isfinite(bounds_width) and len(means) >= MIN_UNITS:
+        interval = sequential.anytime_interval(means, settings.confidence, bounds_width)
     return Estimate("mean difference", float(np.mean(means)), interval)

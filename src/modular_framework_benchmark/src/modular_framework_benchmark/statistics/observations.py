@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns the episodes of an experiment into what is compared: the values of a metric, by method and in pairs.
+"""Converts episodes into the observations that the statistics use: metric values per method and in pairs.
 
-The one place that decides what an episode counts for that failed, timed out, broke or has no value:
+This module defines the value of an episode that failed, timed out, broke or lacks a value:
 
-- success: every episode that is not a success is a failure, a broken one too;
-- any other metric that is no rate: an episode without success counts as worse than any value if the metric is one of
-  the whole task (outside the mode `task`: whatever the metric), or if it has no value. In a mean it counts at the
-  metric's limit, where the metric has one, and so does a value beyond the limit;
-- a rate without a value, a metric that no episode has a value of, and a success without a value: missing. It is left
-  out of the figures, and counted.
+- Success: every episode that does not succeed is a failure, including broken ones.
+- Other metrics except rates: an unsuccessful episode ranks worse than any value if the metric describes the whole task
+  (outside the mode `task`, for every metric) or if the episode has no value. Its value in a mean is the metric's limit,
+  if there is one. Values beyond the limit also count at the limit.
+- Missing: a rate without a value, a metric without a value in any episode, a successful episode without a value.
+  Missing values are excluded from the figures and counted.
 
-It also decides which episodes are independent: those that share what was drawn for a trial, a problem or a seed, are
-one unit.
+The module also defines the independent units: episodes that share a drawn problem or seed belong to one unit.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ from modular_framework_benchmark.statistics.comparison import EpisodeCounts
 
 SUCCESS = Metric("success", "task", MetricKind.RATE, Direction.HIGHER, description="The episode succeeded.")
 
-OUTSIDE = (EpisodeStatus.BROKEN, EpisodeStatus.INVALID)
-"""Ends of episodes whose cause lies outside the methods where every episode of every method has one."""
+UNMEASURED_STATUSES = (EpisodeStatus.BROKEN, EpisodeStatus.INVALID)
+"""Statuses that say nothing about the methods if every episode of every method has one of them."""
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -41,14 +40,14 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """A metric in a number of episodes.
+    """Observations of a metric in n episodes.
 
     Attributes:
-        values: Value in each episode for a mean, NaN where it has none, shape (n,).
-        scores: Value in each episode for a rank: infinitely bad for a failure, NaN where it is missing, shape (n,).
-        censored: Whether it counts at the limit, shape (n,).
-        broken: Whether the episode is broken, shape (n,).
-        units: Number of the independent unit of each episode, shape (n,).
+        values: Values for means, NaN if there is none, shape (n,).
+        scores: Values for ranks: infinitely bad for failures, NaN if missing, shape (n,).
+        censored: Whether each value counts at the limit, shape (n,).
+        broken: Whether each episode is broken, shape (n,).
+        units: Index of each episode's independent unit, shape (n,).
     """
 
     values: Floats
@@ -57,21 +56,21 @@ class Observations:
     broken: Flags
     units: Integers
 
-    def of(self, rows: Integers) -> Observations:
-        """Returns the metric in some of the episodes, by their places."""
+    def at_rows(self, rows: Integers) -> Observations:
+        """Returns the observations of the episodes with these indices."""
         return Observations(*(getattr(self, field.name)[rows] for field in dataclasses.fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """A metric in pairs of episodes, none of them missing.
+    """Observations of a metric in pairs of episodes, without missing values.
 
     Attributes:
-        first: The first method's episodes.
-        second: Those of the second, in the order of their partners.
-        missing: How many pairs were left out because a value is missing.
-        unmatched: How many episodes of either method have no partner.
-        at_random: Whether the partners share nothing but the levels of the other factors.
+        first: Observations of the first method.
+        second: Observations of the second method, in the order of their partners.
+        missing: Number of pairs excluded because a value is missing.
+        unmatched: Number of episodes without a partner.
+        at_random: Whether partners share only the levels of the other factors.
     """
 
     first: Observations
@@ -85,23 +84,23 @@ class Pairs:
 
     @property
     def broken(self) -> Flags:
-        """Returns whether an episode of each pair is broken."""
+        """Returns whether either episode of each pair is broken, shape (n,)."""
         return np.asarray(self.first.broken | self.second.broken)
 
-    def kept(self, which: Flags) -> Pairs:
-        """Returns some of the pairs."""
-        places = np.flatnonzero(which)
-        return dataclasses.replace(self, first=self.first.of(places), second=self.second.of(places))
+    def selected(self, mask: Flags) -> Pairs:
+        """Returns the pairs that the mask selects."""
+        rows = np.flatnonzero(mask)
+        return dataclasses.replace(self, first=self.first.at_rows(rows), second=self.second.at_rows(rows))
 
-    def of_complete_units(self) -> Pairs:
-        """Returns the pairs of units that are finished: those with as many pairs as any unit has."""
+    def complete_units(self) -> Pairs:
+        """Returns the pairs of complete units, those with as many pairs as the largest unit."""
         if not len(self):
             return self
         _, units, sizes = np.unique(self.first.units, return_inverse=True, return_counts=True)
-        return self.kept(sizes[units] == sizes.max())
+        return self.selected(sizes[units] == sizes.max())
 
     def outcomes(self, better: Direction) -> Floats:
-        """Returns 1 for each pair in which the first is better, -1 for the second, 0 for a tie; two failures tie."""
+        """Returns 1 for each pair that the first method wins, -1 if the second wins, 0 for a tie or two failures."""
         sign = 1.0 if better is Direction.HIGHER else -1.0
         first, second = self.first.scores, self.second.scores
         return sign * ((first > second).astype(float) - (first < second))
@@ -114,31 +113,31 @@ def unit_means(values: Floats, units: Integers) -> tuple[Floats, Integers]:
 
 
 def metrics_of(results: ExperimentResults) -> tuple[Metric, ...]:
-    """Returns the metrics that are compared: success first, then the others as they are listed."""
+    """Returns the compared metrics: success first, then the others in the order of the experiment."""
     described = results.description.metrics
     success = next((metric for metric in described if metric.name == SUCCESS.name), SUCCESS)
     return (success, *(metric for metric in described if metric.name != SUCCESS.name))
 
 
 def methods_of(results: ExperimentResults) -> tuple[str, ...]:
-    """Returns the methods, as the experiment lists them.
+    """Returns the methods in the order of the experiment.
 
     Raises:
-        ValueError: The compared factor is none of the experiment's.
+        ValueError: The experiment lacks the compared factor.
     """
     return _factor(results, results.description.compared).levels
 
 
 def other_factors(results: ExperimentResults) -> tuple[Factor, ...]:
-    """Returns the factors beside the compared one."""
+    """Returns the factors except the compared one."""
     return tuple(factor for factor in results.description.factors if factor.name != results.description.compared)
 
 
 def restricted(results: ExperimentResults, factor: str, level: str) -> ExperimentResults:
-    """Returns the results of the episodes with a level of a factor.
+    """Returns the results of the episodes at one level of a factor.
 
     Raises:
-        ValueError: The experiment has no such factor.
+        ValueError: The experiment lacks the factor.
     """
     _factor(results, factor)
     chosen = results.episodes[results.episodes[factor] == level]
@@ -147,17 +146,17 @@ def restricted(results: ExperimentResults, factor: str, level: str) -> Experimen
 
 
 class EpisodeTable:
-    """The finished episodes of an experiment, laid out once for all metrics and pairs of methods."""
+    """Finished episodes of an experiment, indexed once for all metrics and pairs of methods."""
 
     def __init__(self, results: ExperimentResults) -> None:
         """Reads the columns of the episodes.
 
         Args:
-            results: The finished episodes.
+            results: Finished episodes.
 
         Raises:
-            ValueError: The compared factor is none of the experiment's, or two episodes have the same method, levels
-                and trial.
+            ValueError: The experiment lacks the compared factor, or two episodes have the same method, levels and
+                trial.
         """
         methods_of(results)
         self.results = results
@@ -177,24 +176,24 @@ class EpisodeTable:
         self._columns: dict[str, Observations] = {}
 
     def observations(self, metric: Metric, method: str) -> Observations:
-        """Returns a metric in every finished episode of a method."""
-        return self._column(metric).of(self._rows[method])
+        """Returns the observations of a metric in every finished episode of a method."""
+        return self._column(metric).at_rows(self._rows[method])
 
     def counts(self, metric: Metric, method: str) -> EpisodeCounts:
-        """Returns how the episodes of a method ended and what became of them in the figures of a metric."""
+        """Returns the numbers of a method's episodes by outcome and by their part in a metric's figures."""
         statuses = self._statuses[self._rows[method]]
         seen = self.observations(metric, method)
         present = ~np.isnan(seen.scores)
 
-        def ended(status: EpisodeStatus) -> int:
+        def count_status(status: EpisodeStatus) -> int:
             return int(np.sum(statuses == status.value))
 
         return EpisodeCounts(
             episodes=len(statuses),
-            succeeded=ended(EpisodeStatus.SUCCEEDED),
-            failed=ended(EpisodeStatus.FAILED) + ended(EpisodeStatus.INVALID),
-            timed_out=ended(EpisodeStatus.TIMED_OUT),
-            broken=ended(EpisodeStatus.BROKEN),
+            succeeded=count_status(EpisodeStatus.SUCCEEDED),
+            failed=count_status(EpisodeStatus.FAILED) + count_status(EpisodeStatus.INVALID),
+            timed_out=count_status(EpisodeStatus.TIMED_OUT),
+            broken=count_status(EpisodeStatus.BROKEN),
             counted=int(present.sum()),
             censored=int(seen.censored.sum()),
             missing=int((~present).sum()),
@@ -202,9 +201,14 @@ class EpisodeTable:
         )
 
     def pairs(self, metric: Metric, first: str, second: str) -> Pairs:
-        """Returns a metric in the pairs of two methods: same trial, same levels of the other factors.
+        """Returns the observations of a metric in pairs of episodes with the same trial and other levels.
 
-        Where in the end no two episodes have the same trial and levels, those with the same levels are paired in order.
+        If no trial occurs in both methods of a finished experiment, episodes with the same levels are paired in order.
+
+        Args:
+            metric: Compared metric.
+            first: First method.
+            second: Second method.
         """
         rows = self._rows[first], self._rows[second]
         keys = [self._keys[of_method] for of_method in rows]
@@ -214,14 +218,14 @@ class EpisodeTable:
             keys = [_order_within(self._strata[of_method]) for of_method in rows]
         _, *places = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
         column = self._column(metric)
-        sides = [column.of(of_method[place]) for of_method, place in zip(rows, places, strict=True)]
+        sides = [column.at_rows(of_method[place]) for of_method, place in zip(rows, places, strict=True)]
         count = len(sides[0].scores)
         found = Pairs(sides[0], sides[1], 0, len(rows[0]) + len(rows[1]) - 2 * count, at_random)
-        found = found.kept(~np.isnan(sides[0].scores) & ~np.isnan(sides[1].scores))
+        found = found.selected(~np.isnan(sides[0].scores) & ~np.isnan(sides[1].scores))
         return dataclasses.replace(found, missing=count - len(found))
 
     def _column(self, metric: Metric) -> Observations:
-        """Returns a metric in every episode."""
+        """Returns the observations of a metric in every episode."""
         if metric.name not in self._columns:
             self._columns[metric.name] = self._read(metric)
         return self._columns[metric.name]
@@ -244,8 +248,8 @@ class EpisodeTable:
         return Observations(values, scores, censored, self._broken, self._units)
 
     def _failed(self, values: Floats, metric: Metric) -> Flags:
-        """Returns which episodes count as worse than any value."""
-        if metric.kind is MetricKind.RATE or np.isnan(values).all():  # nothing reports it: the hold time, unshaken
+        """Returns whether each episode ranks worse than any value."""
+        if metric.kind is MetricKind.RATE or np.isnan(values).all():  # never reported, such as the hold time
             return np.zeros(len(values), dtype=bool)
         whole_episode = metric.component == "task" or self.results.description.mode != "task"
         return np.asarray(~self._succeeded & (whole_episode | np.isnan(values)))
@@ -258,17 +262,17 @@ class EpisodeTable:
         names = [factor.name for factor in other_factors(self.results)] + ["trial"]
         found = ", ".join(f"{name}={row[name]}" for name in names)
         raise ValueError(
-            f"two episodes of method {method} have {found}; an experiment has each combination and trial once"
+            f"two episodes of method {method} have {found}; each combination of levels and trial must occur once"
         )
 
 
-def outside_reason(results: ExperimentResults) -> str:
-    """Returns why nothing was measured: every episode of every method ended for a reason outside the methods, else "".
+def unmeasured_reason(results: ExperimentResults) -> str:
+    """Returns the reason if every episode of every method ended for a cause outside the methods, otherwise "".
 
-    Such reasons are a launch that died, a simulation that was never ready, a world that was changed from outside.
+    Such causes are a launch that died, a simulation that never became ready, a world that was changed from outside.
     """
     episodes = results.episodes
-    if episodes.empty or not episodes["status"].isin([status.value for status in OUTSIDE]).all():
+    if episodes.empty or not episodes["status"].isin([status.value for status in UNMEASURED_STATUSES]).all():
         return ""
     causes = episodes["cause"].astype(str).value_counts()
     return (
@@ -278,7 +282,7 @@ def outside_reason(results: ExperimentResults) -> str:
 
 
 def pairs_of_methods(results: ExperimentResults) -> tuple[tuple[str, str], ...]:
-    """Returns every pair of methods, as the experiment lists them."""
+    """Returns every pair of methods in the order of the experiment."""
     return tuple(combinations(methods_of(results), 2))
 
 
@@ -291,7 +295,7 @@ def _factor(results: ExperimentResults, name: str) -> Factor:
 
 
 def _strata(results: ExperimentResults) -> NDArray[np.int64]:
-    """Returns the number of the combination of other factors' levels of each episode, shape (episodes,)."""
+    """Returns the index of each episode's combination of the other factors' levels, shape (episodes,)."""
     strata = np.zeros(len(results.episodes), dtype=np.int64)
     for factor in other_factors(results):
         codes, levels = pd.factorize(results.episodes[factor.name])
@@ -300,10 +304,10 @@ def _strata(results: ExperimentResults) -> NDArray[np.int64]:
 
 
 def _units(results: ExperimentResults, strata: Integers) -> tuple[Integers, str]:
-    """Returns the number of the independent unit of each episode, and what a unit is.
+    """Returns the index of each episode's independent unit, and the noun for a unit.
 
-    A unit is what was drawn for a trial. Problems and seeds that are crossed: the coarser of the two. A problem that is
-    the only one at its levels was not drawn.
+    A unit is a problem or seed that was drawn for a trial; of crossed problems and seeds, the coarser partition. A
+    problem that is the only one at its levels was not drawn.
     """
     episodes = results.episodes
     seeds = pd.factorize(episodes["seed"])[0].astype(np.int64)
@@ -316,6 +320,6 @@ def _units(results: ExperimentResults, strata: Integers) -> tuple[Integers, str]
 
 
 def _order_within(strata: Integers) -> Integers:
-    """Returns a key of each episode's levels and its place among those with the same levels."""
+    """Returns a key that combines each episode's stratum with its rank within the stratum."""
     places = pd.Series(strata).groupby(strata).cumcount().to_numpy(np.int64)
     return np.asarray(strata * (len(strata) + 1_000_000_000) + places)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says before an experiment runs which differences its planned episodes can show."""
+"""Power analysis of a planned experiment: the differences that its episodes can show."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import sentences
 from modular_framework_benchmark.statistics.observations import EpisodeTable, metrics_of, pairs_of_methods
-from modular_framework_benchmark.statistics.power import fewest_units, pairs_for_rate, smallest_difference
+from modular_framework_benchmark.statistics.power import detectable_difference, min_units, pairs_for_rate
 
-DECIDED = 0.3
-"""Share of the pairs in which the success of two methods is taken to differ, before any episode has run."""
-NAMED_RATES, NAMED_WINS = (0.05, 0.1, 0.2), (0.2, 0.4, 0.6)
-"""Win differences of success and of other metrics for which the number of units is given."""
+DISCORDANCE = 0.3
+"""Assumed fraction of discordant pairs in success."""
+PRINTED_RATES, PRINTED_WINS = (0.05, 0.1, 0.2), (0.2, 0.4, 0.6)
+"""Win differences of success and of other metrics whose sample size is printed."""
 
 
 def power_text(description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> str:
-    """Returns the smallest differences that are shown with 80 % power, and how many units some differences need.
+    """Returns the smallest differences shown with 80 % power, and the units that typical differences need.
 
     Args:
-        description: What is compared.
-        episodes: All that are planned.
+        description: Description of the experiment.
+        episodes: Planned episodes.
     """
     results = ExperimentResults(description, _planned(description, episodes), pd.DataFrame(), len(episodes))
     table, pairs, others = EpisodeTable(results), len(pairs_of_methods(results)), len(metrics_of(results)) - 1
@@ -37,37 +37,40 @@ def power_text(description: ExperimentDescription, episodes: Sequence[EpisodeSpe
         f"({sentences.count(pairs, 'comparison')} of success, {pairs * others} of other metrics; Holm's correction):"
     ]
     if description.sequential:
-        fewest = fewest_units(error_rate / max(pairs, 1), at_any_time=True)
-        return f"{lines[0]}\n    sequential rule: a difference in success after {fewest} {nouns} at the earliest"
-    for name, comparisons, decided in (("success", pairs, DECIDED), ("other metrics", pairs * others, 1.0)):
+        minimum = min_units(error_rate / max(pairs, 1), at_any_time=True)
+        return f"{lines[0]}\n    sequential rule: a difference in success after {minimum} {nouns} at the earliest"
+    for name, comparisons, discordance in (
+        ("success", pairs, DISCORDANCE),
+        ("other metrics", pairs * others, 1.0),
+    ):
         if comparisons:
-            found = _line(table.unit_count, nouns, error_rate / comparisons, decided)
+            found = _line(table.unit_count, nouns, error_rate / comparisons, discordance)
             lines.append(f"    {name}: {found}")
     return "\n".join(lines)
 
 
-def _line(units: int, nouns: str, error_rate: float, decided: float) -> str:
-    """Returns what is shown of success, whose pairs are decided in part, or of other metrics."""
-    of_success = decided < 1.0
-    differences = NAMED_RATES if of_success else NAMED_WINS
-    needed = [pairs_for_rate(difference, decided, error_rate) for difference in differences]
-    counts = sentences.listed([f"{count:,}" if count else "over a million" for count in needed])
-    named = f"{_named(differences, of_success)} need {counts} {nouns}"
-    smallest, fewest = smallest_difference(units, error_rate, decided), fewest_units(error_rate)
-    if units < fewest:
-        return f"nothing, whatever happens: at least {fewest} {nouns} would have to be won; {named}"
-    shown = "none is likely to be shown" if smallest is None else f"from {_named([smallest], of_success)}"
-    return f"{shown}; {named}" + (f", if {100 * decided:g} % of the pairs differ" if of_success else "")
+def _line(units: int, nouns: str, error_rate: float, discordance: float) -> str:
+    """Returns the detectable differences of success, whose pairs are partly discordant, or of other metrics."""
+    of_success = discordance < 1.0
+    differences = PRINTED_RATES if of_success else PRINTED_WINS
+    needed = [pairs_for_rate(difference, discordance, error_rate) for difference in differences]
+    counts = sentences.enumeration([f"{count:,}" if count else "over a million" for count in needed])
+    needed_text = f"{_difference_text(differences, of_success)} need {counts} {nouns}"
+    smallest, minimum = detectable_difference(units, error_rate, discordance), min_units(error_rate)
+    if units < minimum:
+        return f"nothing, whatever happens: at least {minimum} {nouns} would have to be won; {needed_text}"
+    shown = "none is likely to be shown" if smallest is None else f"from {_difference_text([smallest], of_success)}"
+    return f"{shown}; {needed_text}" + (f", if {100 * discordance:g} % of the pairs differ" if of_success else "")
 
 
-def _named(differences: Sequence[float], of_success: bool) -> str:
+def _difference_text(differences: Sequence[float], of_success: bool) -> str:
     figures = [100 * difference if of_success else 50 + 50 * difference for difference in differences]
-    numbers = sentences.listed([f"{figure:.3g}" for figure in figures])
+    numbers = sentences.enumeration([f"{figure:.3g}" for figure in figures])
     return f"{numbers} points" if of_success else f"{numbers} % of the pairs won"
 
 
 def _planned(description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> pd.DataFrame:
-    """Returns the planned episodes as a table of results would have them."""
+    """Returns the planned episodes in the form of a table of results."""
     names = [factor.name for factor in description.factors]
     rows = [
         {

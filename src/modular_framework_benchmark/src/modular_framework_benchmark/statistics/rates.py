@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rates: the interval of one, test and interval of won and lost pairs."""
+"""Confidence interval of a rate; test and confidence interval of a win difference."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from statsmodels.stats.proportion import proportion_confint
 from modular_framework_benchmark.statistics.comparison import Interval
 
 MAX_OUTSIDE = 3
-"""Units outside the most frequent outcome up to which Tango's interval is too narrow (it covers down to 85 %)."""
+"""Number of units outside the most frequent outcome up to which Tango's interval covers too little (down to 85 %)."""
 
 
 @dataclass(frozen=True, slots=True)
 class PairOutcomes:
-    """Outcomes of independent pairs, which is all that the claim of a comparison rests on.
+    """Numbers of won and lost independent pairs, the sufficient statistic of a comparison.
 
     Attributes:
-        won: Pairs in which the first method was better.
-        lost: Pairs in which the second was.
-        pairs: All pairs, ties included.
+        won: Pairs in which the first method is better.
+        lost: Pairs in which the second method is better.
+        pairs: Total number of pairs, including ties.
     """
 
     won: int
@@ -33,18 +33,18 @@ class PairOutcomes:
 
     @property
     def difference(self) -> float:
-        """Returns the win difference: won minus lost pairs, over all pairs."""
+        """Returns the win difference: won minus lost pairs, divided by all pairs."""
         return (self.won - self.lost) / self.pairs
 
 
 @lru_cache(maxsize=16384)
 def rate_interval(successes: int, episodes: int, confidence: float = 0.95) -> Interval:
-    """Returns the interval of a rate, Clopper and Pearson's, which never covers less than its level.
+    """Returns the Clopper-Pearson interval of a rate, whose coverage is never below its confidence level.
 
     Args:
-        successes: Episodes that were true.
-        episodes: All of them; with 0 the interval is all rates.
-        confidence: Level of the interval.
+        successes: Number of episodes in which the metric is true.
+        episodes: Number of episodes; the interval of 0 episodes is [0, 1].
+        confidence: Confidence level.
     """
     if not episodes:
         return Interval(0.0, 1.0, confidence, "Clopper-Pearson")
@@ -54,17 +54,17 @@ def rate_interval(successes: int, episodes: int, confidence: float = 0.95) -> In
 
 @lru_cache(maxsize=16384)
 def paired_p_value(outcomes: PairOutcomes) -> float:
-    """Returns the two-sided p value of McNemar's exact test: among decided pairs, either method is as likely to win."""
+    """Returns the two-sided p value of McNemar's exact test, that both methods win equally many discordant pairs."""
     return float(mcnemar([[0, outcomes.won], [outcomes.lost, 0]], exact=True).pvalue)
 
 
 @lru_cache(maxsize=16384)
 def paired_interval(outcomes: PairOutcomes, confidence: float = 0.95) -> Interval:
-    """Returns the interval of a win difference, which for a rate is the paired difference of two rates.
+    """Returns the confidence interval of a win difference, which for a rate is the paired difference of two rates.
 
-    It is Tango's score interval: every difference that the score test does not reject; at a difference of 0 that is
-    McNemar's statistic. Where at most `MAX_OUTSIDE` pairs lie outside the larger of won and lost it is the difference
-    of two Clopper-Pearson intervals, with half of the error each.
+    Tango's score interval contains every difference that the score test does not reject; at a difference of 0 the test
+    is McNemar's. If at most `MAX_OUTSIDE` pairs lie outside the larger of won and lost, the interval is the difference
+    of two Clopper-Pearson intervals with half of the error each.
     Source: T. Tango, Equivalence test and confidence interval for the difference in proportions for the paired-sample
     design, Statistics in Medicine 17 (1998) 891-908.
     """
@@ -81,24 +81,24 @@ def _score_limits(outcomes: PairOutcomes, confidence: float) -> tuple[float, flo
     critical = float(stats.norm.isf((1 - confidence) / 2))
     estimate = outcomes.difference
 
-    def limit(end: float) -> float:
+    def root(end: float) -> float:
         if estimate == end:
             return end
-        # The score falls from the estimate, where it is 0, to minus infinity at an end that was not observed.
+        # The score is 0 at the estimate and diverges to minus infinity at an end that was not observed.
         return float(optimize.brentq(lambda shift: abs(_score(outcomes, shift)) - critical, estimate, end))
 
-    return limit(-1.0), limit(1.0)
+    return root(-1.0), root(1.0)
 
 
 def _score(outcomes: PairOutcomes, difference: float) -> float:
-    """Returns Tango's score of a difference: how far the outcomes are from it [standard deviations]."""
+    """Returns Tango's score statistic of a difference [standard deviations]."""
     won, lost, pairs = outcomes.won, outcomes.lost, outcomes.pairs
-    surprise = won - lost - pairs * difference
-    if surprise == 0.0:
+    deviation = won - lost - pairs * difference
+    if deviation == 0.0:
         return 0.0
     linear = -won - lost + (2 * pairs - won + lost) * difference
     constant = -lost * difference * (1 - difference)
-    root = np.sqrt(max(linear**2 - 8 * pairs * constant, 0.0))
-    lost_rate = (root - linear) / (4 * pairs)
+    discriminant_root = np.sqrt(max(linear**2 - 8 * pairs * constant, 0.0))
+    lost_rate = (discriminant_root - linear) / (4 * pairs)
     variance = pairs * (2 * lost_rate + difference * (1 - difference))
-    return float(surprise / np.sqrt(variance)) if variance > 0.0 else float(np.copysign(1e9, surprise))
+    return float(deviation / np.sqrt(variance)) if variance > 0.0 else float(np.copysign(1e9, deviation))

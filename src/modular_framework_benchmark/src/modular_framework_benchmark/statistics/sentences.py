@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says the statistics in words: one sentence for each comparison and each summary."""
+"""Sentences of the report: one per comparison and one per summary."""
 
 from __future__ import annotations
 
@@ -11,53 +11,53 @@ from modular_framework_benchmark.statistics.comparison import EpisodeCounts, Est
 
 
 def claim(metric: Metric, better: str, worse: str, figures_text: str) -> str:
-    """Returns the sentence of a difference that is shown.
+    """Returns the sentence for a difference that is shown.
 
     Args:
-        metric: What was compared.
-        better: Method that is better.
-        worse: The other one.
-        figures_text: The figures behind it, those of `figures`.
+        metric: Compared metric.
+        better: Better method.
+        worse: Other method.
+        figures_text: Text of the figures, from `figures`.
     """
     return f"{better} {_comparative(metric)} {worse} ({figures_text})"
 
 
 def no_claim(metric: Metric, first: str, second: str, figures_text: str) -> str:
-    """Returns the sentence of a difference that is not shown; the arguments are those of `claim`."""
-    return f"no difference in {words(metric)} shown between {first} and {second} ({figures_text})"
+    """Returns the sentence for a comparison without a shown difference; `claim` describes the arguments."""
+    return f"no difference in {spaced_name(metric)} shown between {first} and {second} ({figures_text})"
 
 
 def not_showable(metric: Metric, first: str, second: str, counts: PairCounts, noun: str) -> str:
-    """Returns the sentence of a comparison with too few units to show anything."""
+    """Returns the sentence for a comparison with too few units to show any difference."""
     units = count(counts.units, "pair" if counts.units == counts.pairs else noun)
     return (
-        f"a difference in {words(metric)} between {first} and {second} could not have been shown with {units} "
+        f"a difference in {spaced_name(metric)} between {first} and {second} could not have been shown with {units} "
         f"({counts.won} won, {counts.lost} lost)"
     )
 
 
 def nothing_to_compare(metric: Metric, first: str, second: str, reason: str) -> str:
-    """Returns the sentence of a comparison without data."""
-    return f"nothing to compare between {first} and {second} in {words(metric)}: {reason}"
+    """Returns the sentence for a comparison without data."""
+    return f"nothing to compare between {first} and {second} in {spaced_name(metric)}: {reason}"
 
 
 def planned(pairs: int, difference: float) -> str:
-    """Returns the end of a sentence on how many pairs would show a win difference."""
+    """Returns the end of a sentence that gives the number of pairs needed for a win difference."""
     return f"; {pairs} paired episodes would show {100 * difference:g} points"
 
 
-def figures(metric: Metric, found: PairFigures, swapped: bool = False) -> str:
-    """Returns the win difference, its interval and the number of episodes, as in brackets behind a statement.
+def figures(metric: Metric, comparison: PairFigures, swapped: bool = False) -> str:
+    """Returns the win difference, its interval and the number of pairs, as text for parentheses.
 
     Args:
-        metric: What was compared.
-        found: The figures of the comparison.
-        swapped: Whether the second method comes first in the sentence.
+        metric: Compared metric.
+        comparison: Figures of the comparison.
+        swapped: Whether the sentence names the second method first.
     """
-    if found.difference is None:
+    if comparison.difference is None:
         return "no data"
-    sign, counts, interval = -1.0 if swapped else 1.0, found.counts, found.difference.interval
-    # the difference of rates of which lower ones are better has the other sign than its wins
+    sign, counts, interval = -1.0 if swapped else 1.0, comparison.counts, comparison.difference.interval
+    # For a rate whose lower values are better, the difference of the rates has the opposite sign of the wins.
     if metric.kind is MetricKind.RATE and metric.better is Direction.LOWER:
         sign = -sign
     parts = []
@@ -65,44 +65,44 @@ def figures(metric: Metric, found: PairFigures, swapped: bool = False) -> str:
         won, lost = (counts.lost, counts.won) if swapped else (counts.won, counts.lost)
         parts = [f"{won} pairs won, {lost} lost"]
     digits = 0 if interval is None else max(_digits(100 * interval.low, 100 * interval.high) - 1, 0)
-    parts.append(_points(100 * sign * found.difference.value, digits))
+    parts.append(_points(100 * sign * comparison.difference.value, digits))
     if interval is not None:
         ends = sorted(100 * sign * end for end in (interval.low, interval.high))
         low, high = (_number(end, digits) for end in ends)
         parts.append(f"{100 * interval.confidence:.3g} % interval {low} to {high}")
-    parts.append(_episodes(counts, found.unit_noun))
-    if found.mean_difference is not None:
-        value = (-1.0 if swapped else 1.0) * found.mean_difference.value
-        parts.append(f"mean difference {amount(metric, value)}")
+    parts.append(_episodes(counts, comparison.unit_noun))
+    if comparison.mean_difference is not None:
+        value = (-1.0 if swapped else 1.0) * comparison.mean_difference.value
+        parts.append(f"mean difference {signed_amount(metric, value)}")
     return ", ".join(parts)
 
 
 def summary(metric: Metric, method: str, estimate: Estimate | None, counts: EpisodeCounts) -> str:
-    """Returns the sentence of a method's summary."""
+    """Returns the sentence that summarises a metric of a method."""
     if estimate is None:
         reason = f"none of {count(counts.episodes, 'episode')} has a value" if counts.episodes else "no episodes"
-        return f"{method}: no {words(metric)} ({reason})"
+        return f"{method}: no {spaced_name(metric)} ({reason})"
     scale = 100.0 if metric.kind is MetricKind.RATE else 1.0
     unit = " %" if metric.kind is MetricKind.RATE else f" {metric.unit}".rstrip()
-    interval, spread = estimate.interval, "no interval"
+    interval, interval_text = estimate.interval, "no interval"
     digits = _digits(0.0, scale * estimate.value)
     if interval is not None:
         digits = _digits(scale * interval.low, scale * interval.high)
         low, high = (_number(scale * end, digits) for end in (interval.low, interval.high))
-        spread = f"{100 * interval.confidence:.3g} % interval {low} to {high}"
-    of = "" if metric.kind is MetricKind.RATE else f" {estimate.name} of"
+        interval_text = f"{100 * interval.confidence:.3g} % interval {low} to {high}"
+    prefix = "" if metric.kind is MetricKind.RATE else f" {estimate.name} of"
     return (
-        f"{method}:{of} {words(metric)} {_number(scale * estimate.value, digits)}{unit} ({spread}, "
+        f"{method}:{prefix} {spaced_name(metric)} {_number(scale * estimate.value, digits)}{unit} ({interval_text}, "
         f"{count(counts.counted, 'episode')}{_remarks(counts)})"
     )
 
 
-def words(metric: Metric) -> str:
-    """Returns the name of a metric in words."""
+def spaced_name(metric: Metric) -> str:
+    """Returns the name of a metric with spaces for underscores."""
     return metric.name.replace("_", " ")
 
 
-def amount(metric: Metric, value: float) -> str:
+def signed_amount(metric: Metric, value: float) -> str:
     """Returns a signed difference with its unit: `-0.31 s`."""
     text = _number(value, _digits(0.0, value))
     sign = "+" if not text.startswith("-") and float(text) != 0.0 else ""
@@ -116,30 +116,30 @@ def _points(value: float, digits: int) -> str:
 
 
 def ends_outside_zero(interval: Interval | None) -> bool:
-    """Returns whether an interval leaves out 0."""
+    """Returns whether an interval excludes 0."""
     return interval is not None and (interval.low > 0.0 or interval.high < 0.0)
 
 
-def join(levels: str, sentence: str) -> str:
-    """Returns a sentence with the levels it is restricted to in front."""
+def with_levels(levels: str, sentence: str) -> str:
+    """Returns a sentence with its restriction to levels in front."""
     return f"{levels}: {sentence}" if levels else sentence
 
 
-def listed(parts: Sequence[str]) -> str:
-    """Returns parts as a list in words."""
+def enumeration(parts: Sequence[str]) -> str:
+    """Returns the parts as an enumeration: `a, b and c`."""
     return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1] if parts else ""
 
 
 def _comparative(metric: Metric) -> str:
-    """Returns what a claim says: which of two episodes is better more often."""
+    """Returns the verb phrase of a claim, such as `succeeds more often than`."""
     higher = metric.better is Direction.HIGHER
     if metric.name == "success":
         return "succeeds more often than"
     if metric.kind is MetricKind.RATE:
-        return f"has a {'higher' if higher else 'lower'} rate of {words(metric)} than"
+        return f"has a {'higher' if higher else 'lower'} rate of {spaced_name(metric)} than"
     adjectives = {MetricKind.COUNT: ("more", "fewer"), MetricKind.TIME: ("the longer", "the shorter")}
     better, worse = adjectives.get(metric.kind, ("the higher", "the lower"))
-    return f"more often has {better if higher else worse} {words(metric)} than"
+    return f"more often has {better if higher else worse} {spaced_name(metric)} than"
 
 
 def _episodes(counts: PairCounts, noun: str) -> str:
@@ -156,13 +156,13 @@ def _remarks(counts: EpisodeCounts) -> str:
 
 
 def count(number: int, noun: str) -> str:
-    """Returns a number of things in words; of several words the first one gets the plural."""
+    """Returns a number with its noun; the plural applies to the first word of `noun`."""
     first, space, rest = noun.partition(" of ")
     return f"{number} {first}{'' if number == 1 else 's'}{space}{rest}"
 
 
 def _digits(low: float, high: float) -> int:
-    """Returns how many decimals show the width of an interval with two digits, and none of its ends as a wrong 0."""
+    """Returns the decimals that show an interval's width with two digits and no nonzero end as 0."""
     width = abs(high - low)
     if width == 0.0 or not math.isfinite(width):
         return 2

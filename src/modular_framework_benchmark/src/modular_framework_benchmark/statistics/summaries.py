@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Summarises one method by one metric."""
+"""Summary of a metric for a method."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from modular_framework_benchmark.statistics.values import (
 
 
 def summarise_method(table: EpisodeTable, metric: Metric, method: str) -> MethodSummary:
-    """Returns the summary of a method by a metric.
+    """Returns the summary of a metric for a method.
 
     Args:
-        table: The finished episodes.
-        metric: What is summarised.
+        table: Finished episodes.
+        metric: Metric to summarise.
         method: Level of the compared factor.
     """
-    seen = table.observations(metric, method)
+    observed = table.observations(metric, method)
     counts, confidence = table.counts(metric, method), table.results.description.confidence
-    present = seen.of(np.flatnonzero(~np.isnan(seen.scores)))
+    present = observed.at_rows(np.flatnonzero(~np.isnan(observed.scores)))
     is_rate = metric.kind is MetricKind.RATE
     estimate = mean = quartiles = None
     if len(present.scores):
         estimate = _rate(present, confidence) if is_rate else _median(present, confidence)
-    known = present.of(np.flatnonzero(~np.isnan(present.values)))
+    known = present.at_rows(np.flatnonzero(~np.isnan(present.values)))
     if len(known.values) and not is_rate:
         mean = _mean(known, metric, confidence)
         first, third = np.quantile(known.values, [0.25, 0.75])
@@ -46,18 +46,18 @@ def summarise_method(table: EpisodeTable, metric: Metric, method: str) -> Method
     )  # fmt: skip
 
 
-def _rate(seen: Observations, confidence: float) -> Estimate:
-    means, _ = unit_means(seen.values, seen.units)
+def _rate(observed: Observations, confidence: float) -> Estimate:
+    means, _ = unit_means(observed.values, observed.units)
     interval: Interval | None = None
-    if len(means) == len(seen.values) and len(means) >= MIN_UNITS:
+    if len(means) == len(observed.values) and len(means) >= MIN_UNITS:
         interval = rate_interval(int(means.sum()), len(means), confidence)
     else:
         interval = bounded_mean_interval(means, (0.0, 1.0), confidence)
     return Estimate("rate", float(np.mean(means)), interval)
 
 
-def _median(seen: Observations, confidence: float) -> Estimate:
-    medians = _unit_medians(seen.scores, seen.units)
+def _median(observed: Observations, confidence: float) -> Estimate:
+    medians = _unit_medians(observed.scores, observed.units)
     return Estimate("median", float(np.median(medians)), median_interval(medians, confidence))
 
 
@@ -69,15 +69,15 @@ def _unit_medians(scores: Floats, units: Integers) -> Floats:
     return np.array([np.median(part) for part in np.split(scores[order], starts[1:])])
 
 
-def _mean(seen: Observations, metric: Metric, confidence: float) -> Estimate:
-    """Returns the mean, or restricted mean, of the units; with an interval where the metric's bounds allow one."""
-    means, sizes = unit_means(seen.values, seen.units)
-    mean, single = float(np.mean(means)), len(means) == len(seen.values)
+def _mean(observed: Observations, metric: Metric, confidence: float) -> Estimate:
+    """Returns the mean or restricted mean over the units, with an interval if the metric's bounds allow one."""
+    means, sizes = unit_means(observed.values, observed.units)
+    mean, single = float(np.mean(means)), len(means) == len(observed.values)
     low, high = metric.bounds
     if metric.limit is not None:
         limits = (metric.limit, low if metric.better is Direction.LOWER else high)
-        interval = restricted_mean_interval(seen.values, seen.censored, limits, confidence) if single else None
+        interval = restricted_mean_interval(observed.values, observed.censored, limits, confidence) if single else None
         return Estimate("restricted mean", mean, interval)
-    inside = low <= seen.values.min() and seen.values.max() <= high
-    bounded = math.isfinite(low) and math.isfinite(high) and inside
+    within_bounds = low <= observed.values.min() and observed.values.max() <= high
+    bounded = math.isfinite(low) and math.isfinite(high) and within_bounds
     return Estimate("mean", mean, bounded_mean_interval(means, (low, high), confidence) if bounded else None)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws the conclusion of a comparison once its p value is corrected: verdict, sentence, what to know beside it.
+"""Draws the conclusion of a comparison after the multiplicity correction: verdict, sentence and notes.
 
-A difference is shown only where the corrected p value is at most the error rate and the interval, which belongs to the
-same statistic, leaves out 0. A fixed experiment claims nothing before its last episode.
+A difference is shown only if the corrected p value is at most the error rate and the interval of the same statistic
+excludes 0. A fixed experiment claims nothing before its last episode.
 """
 
 from __future__ import annotations
@@ -15,42 +15,42 @@ from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.statistics import sentences
 from modular_framework_benchmark.statistics.comparison import Comparison, PairFigures, Verdict
 from modular_framework_benchmark.statistics.findings import Finding
-from modular_framework_benchmark.statistics.power import fewest_units, pairs_for_rate
+from modular_framework_benchmark.statistics.power import min_units, pairs_for_rate
 
 PLANNED_RATE, PLANNED_WINS = 0.05, 0.2
-"""Win differences that the number of pairs is planned for: 5 points of a rate; 60 % won and 40 % lost of a value."""
+"""Win differences for which sample sizes are planned: 5 points of a rate; 60 % won and 40 % lost pairs of a value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What the correction for many comparisons made of a comparison.
+    """Result of the multiplicity correction for a comparison.
 
     Attributes:
         p_value: Corrected p value; None without a test.
-        p_without_broken: The same without the pairs of broken episodes.
+        p_without_broken: Corrected p value without the pairs of broken episodes.
         error_rate: Error rate of the experiment.
-        at_least: Error rate that the comparison has at the least.
+        strictest_level: Level of the strictest Holm step.
     """
 
     p_value: float | None
     p_without_broken: float | None
     error_rate: float
-    at_least: float
+    strictest_level: float
 
 
 def conclude(results: ExperimentResults, finding: Finding, correction: Correction) -> Comparison:
     """Returns the comparison with its verdict.
 
     Args:
-        results: The finished episodes.
-        finding: The comparison before the correction.
-        correction: What the correction made of it.
+        results: Finished episodes.
+        finding: Comparison before the multiplicity correction.
+        correction: Result of the multiplicity correction.
     """
     verdict = _verdict(results, finding, correction.p_value, correction)
     without = None
     if finding.without_broken is not None:
         without = _verdict(results, finding.without_broken, correction.p_without_broken, correction)
-    needed, planned = _plan(results, finding, verdict, correction.at_least)
+    needed, planned = _planned_pairs(results, finding, verdict, correction.strictest_level)
     return Comparison(
         **{field.name: getattr(finding, field.name) for field in fields(PairFigures)},
         metric=finding.metric.name,
@@ -61,13 +61,13 @@ def conclude(results: ExperimentResults, finding: Finding, correction: Correctio
         verdict_without_broken=without,
         pairs_needed=needed,
         difference_planned=planned,
-        sentence=sentences.join(finding.levels, _sentence(finding, verdict, needed, planned)),
+        sentence=sentences.with_levels(finding.levels, _sentence(finding, verdict, needed, planned)),
         notes=_notes(results, finding, (verdict, without), correction),
     )
 
 
 def unfinished(results: ExperimentResults) -> bool:
-    """Returns whether a fixed experiment has episodes left: to look at it now would be to look twice."""
+    """Returns whether a fixed experiment has remaining episodes, so that a verdict would be an interim analysis."""
     return len(results.episodes) < results.planned and not results.description.sequential
 
 
@@ -77,7 +77,7 @@ def _verdict(
     if finding.difference is None:
         return Verdict.NO_DATA
     at_any_time = results.description.holds_at_any_time
-    if finding.counts.units < fewest_units(correction.at_least, at_any_time):
+    if finding.counts.units < min_units(correction.strictest_level, at_any_time):
         return Verdict.NOT_SHOWABLE
     interval = finding.difference.interval
     if unfinished(results) or p_corrected is None or p_corrected > correction.error_rate or interval is None:
@@ -89,7 +89,7 @@ def _verdict(
 
 def _sentence(finding: Finding, verdict: Verdict, needed: int | None, planned: float | None) -> str:
     metric, first, second, counts = finding.metric, finding.first, finding.second, finding.counts
-    end = "" if needed is None or planned is None else sentences.planned(needed, planned)
+    ending = "" if needed is None or planned is None else sentences.planned(needed, planned)
     match verdict:
         case Verdict.NO_DATA:
             return sentences.nothing_to_compare(metric, first, second, _reason(finding))
@@ -98,46 +98,52 @@ def _sentence(finding: Finding, verdict: Verdict, needed: int | None, planned: f
         case Verdict.SECOND_BETTER:
             return sentences.claim(metric, second, first, sentences.figures(metric, finding, swapped=True))
         case Verdict.NOT_SHOWN:
-            return sentences.no_claim(metric, first, second, sentences.figures(metric, finding)) + end
+            return sentences.no_claim(metric, first, second, sentences.figures(metric, finding)) + ending
         case Verdict.NOT_SHOWABLE:
-            return sentences.not_showable(metric, first, second, counts, finding.unit_noun) + end
+            return sentences.not_showable(metric, first, second, counts, finding.unit_noun) + ending
 
 
 def _reason(finding: Finding) -> str:
     if finding.counts.missing:
-        return f"no pair has a value of both; {finding.counts.missing} pairs are without one"
+        return f"no pair has both values; {finding.counts.missing} pairs lack a value"
     return "no two episodes to compare"
 
 
-def _plan(
+def _planned_pairs(
     results: ExperimentResults, finding: Finding, verdict: Verdict, error_rate: float
 ) -> tuple[int | None, float | None]:
-    """Returns how many pairs would show which difference; None where that many are there already or it is unknown."""
-    open_ones = (Verdict.NOT_SHOWN, Verdict.NOT_SHOWABLE)
-    if verdict not in open_ones or results.description.holds_at_any_time or finding.spread is None:
+    """Returns the number of pairs needed for the planned difference, or None if the sample is large enough."""
+    undecided = (Verdict.NOT_SHOWN, Verdict.NOT_SHOWABLE)
+    if verdict not in undecided or results.description.holds_at_any_time or finding.discordance is None:
         return None, None
     difference = PLANNED_RATE if finding.metric.kind is MetricKind.RATE else PLANNED_WINS
     units = finding.counts.units
-    # Half a decided pair is added, so that a few equal pairs do not promise that no pair is ever decided.
-    spread = (finding.spread * units + 0.5) / (units + 1)
-    needed = pairs_for_rate(difference, max(round(spread, 3), 0.001), error_rate)
+    # Adding half a discordant pair prevents a small sample of ties from predicting that all pairs tie.
+    discordance = (finding.discordance * units + 0.5) / (units + 1)
+    needed = pairs_for_rate(difference, max(round(discordance, 3), 0.001), error_rate)
     if needed is None or needed <= units:
         return None, None
     return math.ceil(needed * finding.counts.pairs_per_unit), difference
 
 
 def _correction_text(correction: Correction) -> str:
-    size = round(correction.error_rate / correction.at_least)
+    size = round(correction.error_rate / correction.strictest_level)
     return "none" if size == 1 else f"Holm and Tarone; the least p value counts {size} times"
 
 
 def _notes(
     results: ExperimentResults, finding: Finding, verdicts: tuple[Verdict, Verdict | None], correction: Correction
 ) -> tuple[str, ...]:
-    """Returns what a reader must know beside the sentence."""
-    notes = (_disagreement(finding, verdicts[0], correction), *_counted(finding), _broken(finding, verdicts))
-    left = f"unfinished: {len(results.episodes)} of {results.planned} episodes; nothing is claimed before the last one"
-    return (*(note for note in notes if note), *((left,) if unfinished(results) else ()))
+    """Returns the notes that qualify the sentence."""
+    notes = (
+        _disagreement(finding, verdicts[0], correction),
+        *_exclusions(finding),
+        _broken_note(finding, verdicts),
+    )
+    remaining = (
+        f"unfinished: {len(results.episodes)} of {results.planned} episodes; nothing is claimed before the last one"
+    )
+    return (*(note for note in notes if note), *((remaining,) if unfinished(results) else ()))
 
 
 def _disagreement(finding: Finding, verdict: Verdict, correction: Correction) -> str:
@@ -146,13 +152,13 @@ def _disagreement(finding: Finding, verdict: Verdict, correction: Correction) ->
         return ""
     outside = sentences.ends_outside_zero(finding.difference.interval)
     if outside and p_value > correction.error_rate:
-        return f"the interval leaves out 0, but the corrected test does not show a difference (p = {p_value:.2g})"
+        return f"the interval excludes 0, but the corrected test does not show a difference (p = {p_value:.2g})"
     if not outside and p_value <= correction.error_rate:
         return f"the test finds a difference (p = {p_value:.2g}), but the interval includes 0"
     return ""
 
 
-def _counted(finding: Finding) -> tuple[str, ...]:
+def _exclusions(finding: Finding) -> tuple[str, ...]:
     counts = finding.counts
     return (
         f"{counts.failed} of {2 * counts.pairs} episodes failed and count as worse than any value"
@@ -160,16 +166,16 @@ def _counted(finding: Finding) -> tuple[str, ...]:
         else "",
         f"{sentences.count(counts.missing, 'pair')} left out because an episode has no value" if counts.missing else "",
         f"{sentences.count(counts.unmatched, 'episode')} without a partner" if counts.unmatched else "",
-        f"{counts.pairs} pairs of {sentences.count(counts.units, finding.unit_noun)}: those of one count as one"
+        f"{counts.pairs} pairs of {sentences.count(counts.units, finding.unit_noun)}; all pairs of a unit count as one"
         if counts.pairs_per_unit > 1.0
         else "",
     )
 
 
-def _broken(finding: Finding, verdicts: tuple[Verdict, Verdict | None]) -> str:
+def _broken_note(finding: Finding, verdicts: tuple[Verdict, Verdict | None]) -> str:
     count, without = finding.counts.broken, finding.without_broken
     if not count or without is None:
         return ""
-    same = "the same is shown" if verdicts[0] is verdicts[1] else "that is not so"
+    effect = "the verdict is the same" if verdicts[0] is verdicts[1] else "the verdict changes"
     text = f" ({sentences.figures(without.metric, without)})" if without.difference else ""
-    return f"{sentences.count(count, 'broken episode')} counted as failures; without their pairs {same}{text}"
+    return f"{sentences.count(count, 'broken episode')} counted as failures; without their pairs {effect}{text}"
