@@ -9,7 +9,7 @@ from pathlib import Path
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
-from modular_framework_benchmark.experiments.surroundings import NotThere
+from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
 
 LAUNCH = "modular_framework_api/start_framework.launch"
@@ -51,7 +51,7 @@ time_limit: 60
 """
 
 
-class FakeSurroundings:
+class FakeResources:
     """One launch file, one task, and the models of a folder."""
 
     def __init__(self, folder: Path) -> None:
@@ -63,7 +63,7 @@ class FakeSurroundings:
 
     def launch_file(self, name: str) -> Path:
         if name != LAUNCH:
-            raise NotThere(f"there is no launch file {name}")
+            raise UnresolvedReference(f"there is no launch file {name}")
         return self._folder / "start_framework.launch"
 
     def launch_arguments(self, launch: str) -> Mapping[str, str | None]:
@@ -77,23 +77,23 @@ class FakeSurroundings:
 
     def task(self, name: str, folder: Path) -> str:
         if name != "simulation_pick.yaml":
-            raise NotThere(f"there is no task '{name}'")
+            raise UnresolvedReference(f"there is no task '{name}'")
         return str(self._folder / name)
 
     def model(self, name: str, launch: str, arguments: Mapping[str, str], folder: Path) -> Path:
         if name not in SHAPES:
-            raise NotThere(f"there is no model '{name}'; allowed: {', '.join(SHAPES)}")
+            raise UnresolvedReference(f"there is no model '{name}'; allowed: {', '.join(SHAPES)}")
         return self._folder / name / "model.sdf"
 
     def package(self, name: str) -> Path:
         if name != "some_moveit_config":
-            raise NotThere(f"there is no package '{name}'")
+            raise UnresolvedReference(f"there is no package '{name}'")
         return self._folder
 
 
 def read(text: str, folder: Path) -> Experiment:
     """Returns the experiment of a text, whose file would be in a folder."""
-    return read_experiment(text, folder / "experiment.yaml", FakeSurroundings(folder / "models"), METRICS)
+    return read_experiment(text, folder / "experiment.yaml", FakeResources(folder / "models"), METRICS)
 
 
 def faults_of(text: str, folder: Path) -> list[str]:

@@ -23,7 +23,7 @@ from modular_framework_benchmark.experiments.experiment_file import read_experim
 from modular_framework_benchmark.experiments.reading import ExperimentFault
 from modular_framework_benchmark.experiments.ros_controller_names import controller_faults
 from modular_framework_benchmark.experiments.ros_launch_check import launch_faults
-from modular_framework_benchmark.experiments.ros_surroundings import RosSurroundings
+from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
 from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
 from modular_framework_core.launching.launch_arguments import check_arguments
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview
@@ -120,7 +120,7 @@ def experiment_faults(content: dict[str, Any], folder: Path) -> str:
     """Returns the faults of an experiment; "" if it could run."""
     try:
         read_experiment(
-            yaml.safe_dump(content), folder / "experiment.yaml", RosSurroundings(), known_metrics(), checks()
+            yaml.safe_dump(content), folder / "experiment.yaml", RosResourceLookup(), known_metrics(), checks()
         )
     except ExperimentFault as error:
         return str(error)

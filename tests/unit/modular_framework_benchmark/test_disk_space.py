@@ -14,7 +14,7 @@ from fake_runners import record_of
 from sample_experiment import sample_description, sample_episodes, sample_record
 
 from modular_framework_benchmark.commands.prune_command import main as prune
-from modular_framework_benchmark.experiments.design import lay_out
+from modular_framework_benchmark.experiments.design import plan_episodes
 from modular_framework_benchmark.modes.ros_disk_estimate import disk_text, size_text
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
@@ -52,7 +52,7 @@ class WritingPool:
 
 def opened(folder: Path) -> tuple[ResultDatabase, int, int]:
     experiment = read(PICK, folder)
-    episodes = lay_out(experiment)
+    episodes = plan_episodes(experiment)
     database = open_database(folder / "results.db", create=True)
     return database, database.add_experiment(experiment.described("d", {}), episodes), len(episodes)
 

@@ -13,14 +13,14 @@ from experiment_texts import PICK, read
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modular_framework_benchmark.experiments.design import digest_of, lay_out
+from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
 from modular_framework_benchmark.experiments.distributions import Choice, Normal, Uniform, generator_of
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
 
 def laid_out(text: str, folder: Path) -> tuple[list[EpisodeSpec], str]:
     experiment = read(text, folder)
-    episodes = lay_out(experiment)
+    episodes = plan_episodes(experiment)
     return episodes, digest_of(experiment, episodes)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from experiment_texts import PICK, FakeSurroundings, faults_of, read
+from experiment_texts import PICK, FakeResources, faults_of, read
 
 from modular_framework_benchmark.experiments.experiment import StoppingKind
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
@@ -42,7 +42,7 @@ def test_a_value_that_is_only_a_level_keeps_its_type(tmp_path: Path) -> None:
 def test_the_height_of_a_surface_survives_pyyaml_and_its_old_name_is_read(tmp_path: Path) -> None:
     def poses(text: str) -> list[object]:
         settings = read(text, tmp_path).combinations[0].settings
-        return [item.drawn((1, 0), 0) for item in settings["objects"]]
+        return [item.sampled((1, 0), 0) for item in settings["objects"]]
 
     expected = poses(PICK)
     assert poses(yaml.safe_dump(yaml.safe_load(PICK))) == expected
@@ -63,7 +63,7 @@ def test_a_listed_method_without_another_one_to_compare_with_is_a_fault(tmp_path
         " {method: above, planner: PRM, object: ball}]\n"
     )
     (fault,) = faults_of(PICK + listed, tmp_path)
-    assert "object cube, planner PRM has only method 'above'; list another one, to compare it with" in fault
+    assert "object cube, planner PRM has only method 'above'; add another one to compare it with" in fault
 
 
 @pytest.mark.parametrize(
@@ -124,14 +124,14 @@ def test_two_factors_that_set_the_same_value_are_a_fault(tmp_path: Path) -> None
         "planner: [RRTConnect, PRM]", "planner: {RRTConnect: {arguments: {method_launch_file: x}}, P: }"
     )
     (fault,) = (one for one in faults_of(text, tmp_path) if "sets" in one)
-    assert "factor 'planner' sets arguments.method_launch_file, as factor 'method' does" in fault
+    assert "factor 'planner' sets arguments.method_launch_file, which factor 'method' sets too" in fault
 
 
 def test_a_file_that_is_missing_empty_or_no_yaml_is_refused(tmp_path: Path) -> None:
-    from experiment_texts import METRICS, FakeSurroundings
+    from experiment_texts import METRICS, FakeResources
 
     with pytest.raises(ExperimentFault, match="there is no such file"):
-        load_experiment(tmp_path / "none.yaml", FakeSurroundings(tmp_path / "m"), METRICS)
+        load_experiment(tmp_path / "none.yaml", FakeResources(tmp_path / "m"), METRICS)
     assert "the file is empty" in faults_of("# nothing\n", tmp_path)[0]
     assert "this is not valid YAML" in faults_of("experiment: [", tmp_path)[0]
     assert "the file must be a mapping" in faults_of("[1, 2]", tmp_path)[0]
@@ -145,7 +145,7 @@ def test_a_metric_of_ones_own_is_a_function_that_is_found_but_not_run(tmp_path: 
     experiment = read(PICK.replace("[success, task_time]", f"[success, {entry}]"), tmp_path)
     own = experiment.description.metrics[1]
     assert (own.name, own.better, own.unit, own.kind) == ("swing", Direction.LOWER, "rad", MetricKind.TIME)
-    assert experiment.measures == ("success", {"name": "swing", "function": f"{tmp_path / 'mine.py'}:swing"})
+    assert experiment.metric_specs == ("success", {"name": "swing", "function": f"{tmp_path / 'mine.py'}:swing"})
     assert (
         "'swng' is unknown; allowed: swing, two; did you mean 'swing'"
         in faults_of(PICK.replace("[success, task_time]", "[mine.py:swng]"), tmp_path)[0]
@@ -164,7 +164,7 @@ def test_the_times_of_a_planner_are_limited_by_its_own_budget(tmp_path: Path) ->
         name: METRICS[name].metric for name in ("planning_time", "motion_duration", "planning_processor_time", "lift")
     }
     for budget_s in (5.0, None):
-        metrics, _ = read_metrics(None, known, budget_s, Reading(FaultList(), tmp_path, FakeSurroundings(tmp_path)))
+        metrics, _ = read_metrics(None, known, budget_s, Reading(FaultList(), tmp_path, FakeResources(tmp_path)))
         limits = {metric.name: metric.limit for metric in metrics}
         assert limits == dict.fromkeys(known) | {"planning_time": budget_s}
 
@@ -196,7 +196,7 @@ def test_the_rule_of_the_readme_is_accepted_and_a_difference_is_a_share(tmp_path
 
 
 def test_a_planning_experiment_takes_its_problems_in_turn(tmp_path: Path) -> None:
-    from modular_framework_benchmark.experiments.design import lay_out
+    from modular_framework_benchmark.experiments.design import plan_episodes
 
     text = """
 experiment: plans
@@ -213,7 +213,7 @@ trials: 5
         (tmp_path / "problems" / family).mkdir(parents=True, exist_ok=True)
         for kind in ("scene", "request"):
             (tmp_path / "problems" / family / f"{kind}{number:04}.yaml").write_text("{}")
-    episodes = lay_out(read(text, tmp_path))
+    episodes = plan_episodes(read(text, tmp_path))
     names = {one.trial: one.settings["problem"]["name"] for one in episodes}
     assert [names[trial] for trial in range(5)] == ["box/0001", "box/0002", "cage/0001", "box/0001", "box/0002"]
     assert len({one.seed for one in episodes if one.settings["problem"]["name"] == "box/0001"}) == 2

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from experiment_texts import FakeSurroundings
+from experiment_texts import FakeResources
 
 from modular_framework_benchmark.commands.mode_runners import RUNNERS, known_metrics, runner_factory
-from modular_framework_benchmark.experiments.design import lay_out
+from modular_framework_benchmark.experiments.design import plan_episodes
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import read_experiment
 from modular_framework_benchmark.experiments.reading import ExperimentFault
@@ -150,11 +150,11 @@ def test_settings_that_cannot_be_used_break_the_episode_and_say_what_is_allowed(
 
 
 def read(text: str, folder: Path) -> Experiment:
-    return read_experiment(text, folder / "grasps.yaml", FakeSurroundings(folder / "models"), known_metrics())
+    return read_experiment(text, folder / "grasps.yaml", FakeResources(folder / "models"), known_metrics())
 
 
 def test_the_methods_of_an_experiment_meet_the_same_scenes(tmp_path: Path) -> None:
-    episodes = lay_out(read(GRASPS, tmp_path))
+    episodes = plan_episodes(read(GRASPS, tmp_path))
     assert len(episodes) == 6
     by_trial = [[spec.settings for spec in episodes if spec.trial == trial] for trial in range(3)]
     for first, second in by_trial:

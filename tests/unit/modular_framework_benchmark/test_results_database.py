@@ -53,7 +53,7 @@ def test_a_record_is_read_as_it_was_written(path: Path) -> None:
         assert database.record(number, 1) == bad
         with pytest.raises(ResultsError, match="episode 2 of 'picks' is not finished"):
             database.record(number, 2)
-        with pytest.raises(ResultsError, match="episode 99 of 'picks' is none of its episodes"):
+        with pytest.raises(ResultsError, match="episode 99 of 'picks' does not exist"):
             database.record(number, 99)
 
 
@@ -205,7 +205,7 @@ def test_more_repetitions_and_levels_extend_an_experiment(path: Path) -> None:
         (sample_description(digest="d2"), 2, "in the database and no longer in the experiment"),
         (sample_description(digest="d2", time_limit_s=30.0), 3, "time_limit_s was 60.0 and is now 30.0"),
         (sample_description(digest="d2", mode="grasps"), 3, "mode was 'task'"),
-        (sample_description(digest="d2"), 3, "what its methods run with differs"),
+        (sample_description(digest="d2"), 3, "the software of its methods differs"),
     ],
 )
 def test_a_changed_experiment_of_the_same_name_is_refused(path: Path, description, trials: int, message: str) -> None:
@@ -254,7 +254,7 @@ def test_one_database_holds_several_experiments(path: Path) -> None:
             {"metrics": (Metric("wall_s", "task", MetricKind.TIME, Direction.LOWER),)},
             "metric 'wall_s': the name is taken",
         ),
-        ({"metrics": (Metric("a b", "task", MetricKind.TIME, Direction.LOWER),)}, "metric 'a b' is no identifier"),
+        ({"metrics": (Metric("a b", "task", MetricKind.TIME, Direction.LOWER),)}, "metric 'a b' is not an identifier"),
         ({"metrics": (Metric("success", "task", MetricKind.TIME, Direction.LOWER),)}, "`success` is a rate"),
         ({"compared": "planner"}, "compared factor 'planner': allowed are grasp_method, object, speed"),
         (
@@ -299,7 +299,7 @@ def test_records_that_do_not_fit_their_experiment_are_refused(path: Path) -> Non
     with open_database(path, create=True) as database:
         number = database.add_experiment(sample_description(), sample_episodes())
         for record, message in (
-            (sample_record(replace(spec, trial=99)), "is none of experiment 'picks'"),
+            (sample_record(replace(spec, trial=99)), "experiment 'picks' has no episode"),
             (
                 sample_record(spec, metrics={"height": 1.0}),
                 "has the metrics height, .* allowed: planning_time, slipped",

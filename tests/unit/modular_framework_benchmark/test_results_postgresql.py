@@ -32,7 +32,7 @@ def test_a_server_that_is_restarted_or_stopped_loses_nothing_and_stores_nothing_
         server.start()
         assert database.write(number, sample_record(EPISODES[1])), "a restart between two records is not noticed"
         server.stop()
-        with pytest.raises(RecordNotStoredError, match="is kept in .*taken in when the database is next opened"):
+        with pytest.raises(RecordNotStoredError, match="is saved in .*imported when the database is next opened"):
             database.write(number, sample_record(EPISODES[2]))
         server.start()
     for _ in range(2):

@@ -106,7 +106,7 @@ def test_a_full_disk_loses_no_episode(filled: Path) -> None:
     answer, _, key = in_child(fill).partition(" KEY ")
     assert answer.startswith(f"DatabaseFullError {filled}.unwritten/")
     assert f"{filled}: reading or writing failed; look for a full disk" in answer
-    assert "taken in when the database is next opened" in answer
+    assert "imported when the database is next opened" in answer
     with sqlite3.connect(filled) as connection:
         assert connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
         assert connection.execute(
@@ -180,7 +180,7 @@ def test_a_locked_database_loses_no_episode(filled: Path) -> None:
     with open_database(filled, busy_timeout_s=0.05) as database:
         holder = sqlite3.connect(filled, isolation_level=None)
         holder.execute("BEGIN EXCLUSIVE")
-        with pytest.raises(RecordNotStoredError, match="another process keeps it locked; end that process") as caught:
+        with pytest.raises(RecordNotStoredError, match="another process holds its lock; end that process") as caught:
             database.write(1, sample_record(EPISODES[1]))
         assert isinstance(caught.value.__cause__, DatabaseLockedError)
         with pytest.raises(DatabaseLockedError, match="results.db"):
@@ -207,8 +207,8 @@ def test_a_waiting_record_that_cannot_be_used_stays_with_a_warning(
     content["record"]["spec"]["trial"] = 99
     saved.write_text(json.dumps(content))
     assert finished(filled) == {EPISODES[0].key}
-    assert "torn.json: no record of an episode" in caplog.text
-    assert "is none of experiment 'picks'" in caplog.text
+    assert "torn.json: not a record of an episode" in caplog.text
+    assert "experiment 'picks' has no episode" in caplog.text
     assert {path.name for path in waiting.iterdir()} == {"torn.json", saved.name}
 
 
@@ -232,7 +232,7 @@ def test_planted_records_are_not_taken_in(filled: Path, planted: str, caplog: py
             waiting.rename(waiting.with_name("elsewhere"))
             waiting.symlink_to(waiting.with_name("elsewhere"))
     assert finished(filled) == {EPISODES[0].key}
-    assert "others could have filled it" in caplog.text
+    assert "other users may write it" in caplog.text
     if planted == "folder that anybody may fill":
         waiting.chmod(0o700)
         assert finished(filled) == {EPISODES[0].key, EPISODES[1].key}
@@ -302,7 +302,7 @@ def test_the_database_of_another_program_is_told(tmp_path: Path) -> None:
     with sqlite3.connect(path) as connection:
         connection.execute("CREATE TABLE experiments (id INTEGER)")
     with pytest.raises(
-        SchemaVersionError, match="is no result database: its tables are experiments; name another file"
+        SchemaVersionError, match="is not a result database: its tables are experiments; name another file"
     ):
         open_database(path, create=True)
 

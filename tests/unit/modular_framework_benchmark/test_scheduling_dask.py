@@ -15,7 +15,7 @@ import pytest
 from dask_cluster import LosingRunner, running_cluster, wait_until_none
 from experiment_texts import PICK, read
 
-from modular_framework_benchmark.experiments.design import digest_of, lay_out
+from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.scheduling import dask_pool
 from modular_framework_benchmark.scheduling.dask_pool import DaskPool
@@ -36,7 +36,7 @@ def test_the_episode_of_a_lost_worker_runs_again_and_each_result_is_stored_once(
     cluster: distributed.LocalCluster, tmp_path: Path
 ) -> None:
     experiment = read(SMALL, tmp_path)
-    episodes = lay_out(experiment)
+    episodes = plan_episodes(experiment)
     mark = f"dask{os.getpid()}"
     with open_database(tmp_path / "results.db", create=True) as database:
         number = database.add_experiment(experiment.described(digest_of(experiment, episodes), {}), episodes)

@@ -9,7 +9,7 @@ from pathlib import Path
 import fake_runners
 from experiment_texts import PICK, read
 
-from modular_framework_benchmark.experiments.design import lay_out
+from modular_framework_benchmark.experiments.design import plan_episodes
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.scheduling.progress import Progress
 
@@ -30,7 +30,7 @@ class Terminal(io.StringIO):
 
 
 def test_the_counts_and_the_time_left_are_those_of_this_run(tmp_path: Path) -> None:
-    clock, stream, specs = Clock(), io.StringIO(), lay_out(read(PICK, tmp_path))
+    clock, stream, specs = Clock(), io.StringIO(), plan_episodes(read(PICK, tmp_path))
     progress = Progress(48, 8, stream, clock)
     assert "time left: not known yet" in progress.text()
     for number, status in enumerate([EpisodeStatus.SUCCEEDED, EpisodeStatus.FAILED, EpisodeStatus.TIMED_OUT] * 4):
@@ -44,13 +44,13 @@ def test_the_counts_and_the_time_left_are_those_of_this_run(tmp_path: Path) -> N
 
 
 def test_a_broken_episode_is_told_at_once_with_its_cause(tmp_path: Path) -> None:
-    stream, specs = io.StringIO(), lay_out(read(PICK, tmp_path))
+    stream, specs = io.StringIO(), plan_episodes(read(PICK, tmp_path))
     Progress(48, 0, stream, Clock()).add(fake_runners.record_of(specs[3], EpisodeStatus.BROKEN, "move_group died"))
     assert stream.getvalue() == f"episode 3 ({specs[3].key}) is broken: move_group died\n"
 
 
 def test_a_terminal_has_a_bar_that_fits_into_its_width(tmp_path: Path) -> None:
-    clock, stream, specs = Clock(), Terminal(), lay_out(read(PICK, tmp_path))
+    clock, stream, specs = Clock(), Terminal(), plan_episodes(read(PICK, tmp_path))
     progress = Progress(48, 0, stream, clock)
     for spec in specs[:24]:
         clock.time_s += 1.0

@@ -16,7 +16,7 @@ import fake_runners
 import pytest
 from experiment_texts import PICK, read
 
-from modular_framework_benchmark.experiments.design import digest_of, lay_out
+from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
@@ -39,7 +39,7 @@ class Bench:
 
     def __init__(self, folder: Path, text: str = SMALL) -> None:
         experiment = read(text, folder)
-        self.episodes = lay_out(experiment)
+        self.episodes = plan_episodes(experiment)
         self.folder = folder
         self.database: ResultDatabase = open_database(folder / "results.db", create=True)
         digest = digest_of(experiment, self.episodes)
@@ -134,7 +134,7 @@ def test_a_stopping_rule_is_asked_after_each_trial_and_ends_the_run(
 
 
 def test_a_worker_keeps_the_episodes_of_one_stack_and_helps_at_the_end(tmp_path: Path) -> None:
-    episodes = lay_out(read(PICK + "block: 3\n", tmp_path))
+    episodes = plan_episodes(read(PICK + "block: 3\n", tmp_path))
     queue = EpisodeQueue(episodes)
     taken: dict[str, list[EpisodeSpec]] = {"a": [], "b": []}
     while len(queue):
@@ -151,7 +151,7 @@ def test_a_worker_keeps_the_episodes_of_one_stack_and_helps_at_the_end(tmp_path:
 
 
 def test_the_last_episode_of_a_stack_is_left_to_the_worker_that_has_it_running(tmp_path: Path) -> None:
-    episodes = lay_out(read(PICK + "block: 3\n", tmp_path))
+    episodes = plan_episodes(read(PICK + "block: 3\n", tmp_path))
     first, second = episodes[:3], episodes[6:9]  # six of each stack
     queue = EpisodeQueue([*first, *second])
     assert [queue.next_for("a"), queue.next_for("b")] == [first[0], second[0]]

@@ -48,5 +48,7 @@ def test_a_method_without_episodes_has_an_empty_profile() -> None:
 
 def test_a_metric_that_is_not_measured_is_refused() -> None:
     results = results_of({"a": ["succeeded"]}, (LENGTH,), {"path_length": {"a": [1.0]}})
-    with pytest.raises(ValueError, match="metric 'speed' is not measured; the measured metrics are: success, path_length"):
+    with pytest.raises(
+        ValueError, match="metric 'speed' is not measured; the measured metrics are: success, path_length"
+    ):
         performance_profile(results, "speed", "a")

@@ -16,7 +16,7 @@ from experiment_texts import PICK, read
 from postgresql_server import Network, require_server, running_server
 from sqlalchemy import create_engine, text
 
-from modular_framework_benchmark.experiments.design import digest_of, lay_out
+from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
 from modular_framework_benchmark.records.episode import EpisodeRecord
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_benchmark.results.errors import RecordNotStoredError
@@ -58,7 +58,7 @@ def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[distrib
 
 def test_nothing_is_lost_and_nothing_is_stored_twice(cluster: distributed.LocalCluster, tmp_path: Path) -> None:
     experiment = read(EXPERIMENT, tmp_path)
-    episodes = lay_out(experiment)
+    episodes = plan_episodes(experiment)
     mark = f"team{os.getpid()}"
     with running_server() as server:
         network = Network(server)

@@ -15,7 +15,7 @@ from modular_framework_benchmark.commands.experiment_session import ExperimentSe
 from modular_framework_benchmark.commands.mode_runners import RunnerError, known_metrics
 from modular_framework_benchmark.commands.stopping_rules import settings_of
 from modular_framework_benchmark.episodes.errors import SettingsError
-from modular_framework_benchmark.experiments.design import digest_of, lay_out
+from modular_framework_benchmark.experiments.design import digest_of, plan_episodes
 from modular_framework_benchmark.experiments.design_text import design_text
 from modular_framework_benchmark.experiments.experiment import Experiment
 from modular_framework_benchmark.experiments.experiment_file import load_experiment
@@ -92,11 +92,11 @@ def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Nam
 
 def _run(options: argparse.Namespace) -> int:
     # imported where it is needed: `resume` does without roslaunch
-    from modular_framework_benchmark.experiments.ros_surroundings import RosSurroundings
+    from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
     from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
 
-    experiment = load_experiment(experiment_path(options.file), RosSurroundings(), known_metrics(), setting_checks())
-    episodes = lay_out(experiment)
+    experiment = load_experiment(experiment_path(options.file), RosResourceLookup(), known_metrics(), setting_checks())
+    episodes = plan_episodes(experiment)
     if options.dry_run:
         from modular_framework_benchmark.statistics.planned_power import power_text  # takes a second to import
 
@@ -113,7 +113,7 @@ def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], option
 
     Args:
         experiment: What they belong to.
-        episodes: All that `lay_out` gives, or some of them.
+        episodes: All that `plan_episodes` gives, or some of them.
         options: How to run them.
 
     Raises:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads experiment files, checks them and lays out their episodes."""
+"""Reads and checks experiment files, and plans their episodes."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lays out the episodes of an experiment: which there are, with which scenes and seeds, in which order."""
+"""Plans the episodes of an experiment: their combinations, scenes, seeds and order."""
 
 from __future__ import annotations
 
@@ -14,79 +14,79 @@ from modular_framework_benchmark.experiments.experiment import Combination, Expe
 from modular_framework_benchmark.experiments.reading import MAX_SEED
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
-PER_TRIAL = ("objects", "problems", "problem")
-"""Settings that differ between the trials of a combination; the others decide the stack that runs."""
+TRIAL_SETTINGS = ("objects", "problems", "problem")
+"""Settings that differ between the trials of a combination; the other settings determine the running stack."""
 
 
-def lay_out(experiment: Experiment) -> list[EpisodeSpec]:
-    """Returns the episodes in the order they are run.
+def plan_episodes(experiment: Experiment) -> list[EpisodeSpec]:
+    """Returns the episodes in the order of their execution.
 
-    Trials come one after the other, or by blocks of some. Within a block the episodes that can share a running stack
-    are neighbours; groups of these, and the episodes in them, have a random order, made from the experiment's seed.
+    The order goes through the trials, or through blocks of trials. Within a block, episodes that can share a running
+    stack are adjacent. The order of these groups and of the episodes within them is random, seeded by the experiment.
     """
     episodes: list[EpisodeSpec] = []
     groups = _groups(experiment)
     for first in range(0, experiment.trials, experiment.block):
         trials = range(first, min(first + experiment.block, experiment.trials))
         shuffle = generator_of(experiment.seed, "order", first)
-        order = [[(trial, item) for trial in trials for item in group] for group in groups]
+        order = [[(trial, combination) for trial in trials for combination in group] for group in groups]
         shuffle.shuffle(order)
         for group in order:
             shuffle.shuffle(group)
-            for trial, item in group:
-                episodes.append(_episode(experiment, item, trial, len(episodes)))
+            for trial, combination in group:
+                episodes.append(_episode(experiment, combination, trial, len(episodes)))
     return episodes
 
 
 def _groups(experiment: Experiment) -> list[list[Combination]]:
-    """Returns the combinations, those together whose episodes can share a stack."""
+    """Returns the combinations, grouped by shared stack."""
     groups: dict[str, list[Combination]] = {}
-    for item in experiment.combinations:
-        groups.setdefault(stack_of(item.settings), []).append(item)
+    for combination in experiment.combinations:
+        groups.setdefault(stack_of(combination.settings), []).append(combination)
     return list(groups.values())
 
 
 def stack_of(settings: Mapping[str, Any]) -> str:
-    """Returns what decides the running stack of an episode: those with the same text can share one."""
-    return _canonical({key: value for key, value in settings.items() if key not in PER_TRIAL})
+    """Returns the settings that determine an episode's stack as text; episodes with equal texts can share a stack."""
+    return _canonical({key: value for key, value in settings.items() if key not in TRIAL_SETTINGS})
 
 
-def _episode(experiment: Experiment, item: Combination, trial: int, number: int) -> EpisodeSpec:
-    rest = pair_of(item.configuration, experiment.description.compared)
+def _episode(experiment: Experiment, combination: Combination, trial: int, number: int) -> EpisodeSpec:
+    pair_key = pair_of(combination.configuration, experiment.description.compared)
     return EpisodeSpec(
         number=number,
-        configuration=dict(item.configuration),
+        configuration=dict(combination.configuration),
         trial=trial,
-        seed=generator_of(experiment.seed, "episode", rest, trial).randint(1, MAX_SEED),
-        settings=_drawn(experiment, item.settings, rest, trial),
+        seed=generator_of(experiment.seed, "episode", pair_key, trial).randint(1, MAX_SEED),
+        settings=_drawn(experiment, combination.settings, pair_key, trial),
     )
 
 
 def pair_of(configuration: Mapping[str, str], compared: str) -> str:
-    """Returns what the episodes of a pair have in common beside the trial: the levels of the factors not compared."""
+    """Returns the levels of the factors that are not compared, which the episodes of a pair share."""
     return ",".join(f"{name}={configuration[name]}" for name in sorted(configuration) if name != compared)
 
 
-def _drawn(experiment: Experiment, settings: Mapping[str, Any], rest: str, trial: int) -> dict[str, Any]:
-    """Returns the settings of one episode: plain JSON values."""
-    drawn = {key: value for key, value in settings.items() if key not in PER_TRIAL}
+def _drawn(experiment: Experiment, settings: Mapping[str, Any], pair_key: str, trial: int) -> dict[str, Any]:
+    """Returns the settings of one episode as plain JSON values."""
+    drawn = {key: value for key, value in settings.items() if key not in TRIAL_SETTINGS}
     if "objects" in settings:
         drawn["objects"] = [
-            item.drawn((experiment.seed, rest, trial), index) for index, item in enumerate(settings["objects"])
+            item.sampled((experiment.seed, pair_key, trial), index) for index, item in enumerate(settings["objects"])
         ]
     if "problems" in settings:
         drawn["problem"] = settings["problems"][trial % len(settings["problems"])]
     return drawn | {
-        "metrics": list(experiment.measures),
+        "metrics": list(experiment.metric_specs),
         "record": dict(experiment.record),
         "time_limit": experiment.description.time_limit_s,
     }
 
 
 def digest_of(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
-    """Returns SHA-256 of what decides the episodes, hexadecimal.
+    """Returns the SHA-256 digest of everything that determines the episodes, hexadecimal.
 
-    Paths count by their last two parts, so that the digest is the same in every folder; what is in the files counts.
+    Paths count by their last two parts and files by their content, so that the digest does not depend on the folder.
     """
     digest = hashlib.sha256()
     head = {
@@ -96,26 +96,26 @@ def digest_of(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
         "metrics": [metric.name for metric in experiment.description.metrics],
         "files": dict(experiment.files),
     }
-    for part in _parts(head, episodes):
+    for part in _digest_parts(head, episodes):
         digest.update(part.encode())
     return digest.hexdigest()
 
 
-def _parts(head: Mapping[str, Any], episodes: Sequence[EpisodeSpec]) -> Iterator[str]:
+def _digest_parts(head: Mapping[str, Any], episodes: Sequence[EpisodeSpec]) -> Iterator[str]:
     yield _canonical(head)
     for spec in episodes:
         yield _canonical([spec.number, dict(spec.configuration), spec.trial, spec.seed, _portable(spec.settings)])
 
 
 def _portable(value: Any) -> Any:
-    """Returns a value in which absolute paths are their last two parts."""
+    """Returns a value whose absolute paths are shortened to their last two parts."""
     match value:
         case str() if value.startswith("/") and "/" in value[1:] and Path(value.rpartition(":")[0] or value).suffix:
             return "/".join(Path(value).parts[-2:])
         case Mapping():
-            return {key: _portable(item) for key, item in value.items()}
+            return {key: _portable(combination) for key, combination in value.items()}
         case list() | tuple():
-            return [_portable(item) for item in value]
+            return [_portable(combination) for combination in value]
         case _:
             return value
 

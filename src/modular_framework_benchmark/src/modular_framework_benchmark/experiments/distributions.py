@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers of a scene that are drawn anew in each trial, always the same for the same seed."""
+"""Random numbers of a scene, drawn for each trial and reproducible by seed."""
 
 from __future__ import annotations
 
@@ -12,52 +12,52 @@ from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Seq
 
 ALLOWED = "a number, [LOW, HIGH], {normal: [MEAN, DEVIATION]} or {choice: [A, B, ...]}"
 DIGITS = 6
-"""Drawn numbers are rounded to this many decimals, so that the record shows what was used."""
+"""Decimals of drawn numbers, so that the record shows the exact value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fixed:
-    """Always the same number."""
+    """A constant."""
 
     value: float
 
     def draw(self, generator: random.Random) -> float:
-        """Returns the number."""
+        """Returns the constant."""
         return self.value
 
 
 @dataclass(frozen=True, slots=True)
 class Uniform:
-    """Any number between two, all as likely."""
+    """A uniform distribution."""
 
     low: float
     high: float
 
     def draw(self, generator: random.Random) -> float:
-        """Returns a number between them."""
+        """Returns a number between `low` and `high`."""
         return round(generator.uniform(self.low, self.high), DIGITS)
 
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Normally distributed."""
+    """A normal distribution."""
 
     mean: float
     deviation: float
 
     def draw(self, generator: random.Random) -> float:
-        """Returns a number around the mean."""
+        """Returns a normally distributed number."""
         return round(generator.gauss(self.mean, self.deviation), DIGITS)
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of some numbers, all as likely."""
+    """A uniform choice among given numbers."""
 
     values: tuple[float, ...]
 
     def draw(self, generator: random.Random) -> float:
-        """Returns one of them."""
+        """Returns one of the numbers."""
         return generator.choice(self.values)
 
 
@@ -65,7 +65,16 @@ Distribution = Fixed | Uniform | Normal | Choice
 
 
 def read_distribution(node: Node, what: str, reading: Reading) -> Distribution | None:
-    """Reads a number or a distribution; notes a fault and returns None when it is neither."""
+    """Reads a number or a distribution.
+
+    Args:
+        node: Value of the file.
+        what: Name of the value in fault messages.
+        reading: Reader that collects faults.
+
+    Returns:
+        The distribution, or None after a fault.
+    """
     match node:
         case Scalar():
             value = reading.number(node, what) if isinstance(node.value, (int, float)) else None
@@ -110,6 +119,6 @@ def _numbers(node: Node, what: str, reading: Reading) -> list[float] | None:
 
 
 def generator_of(*key: object) -> random.Random:
-    """Returns a generator of random numbers that depends on a key alone, on every machine."""
+    """Returns a random generator seeded by a key, equal on every machine."""
     digest = hashlib.sha256("/".join(str(part) for part in key).encode()).digest()
     return random.Random(int.from_bytes(digest, "big"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An experiment that was read from a file and checked."""
+"""A checked experiment and its execution settings."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from modular_framework_benchmark.records.experiment import ExperimentDescription
 
 
 class StoppingKind(Enum):
-    """When an experiment ends."""
+    """Kind of stopping rule."""
 
     FIXED = "fixed"  # after all trials
-    SEQUENTIAL = "sequential"  # as soon as the methods are told apart, or after all trials
+    SEQUENTIAL = "sequential"  # once all comparisons are decided, at the latest after all trials
 
 
 @dataclass(frozen=True, slots=True)
 class Stopping:
-    """When an experiment ends.
+    """Stopping rule of an experiment.
 
     Attributes:
-        kind: The rule.
-        metric: Name of the metric that a sequential rule looks at.
-        smallest_difference: Win difference below which the methods count as alike, from 0 to 1, for a rate the
-            difference of the rates; None: it stops for a shown difference only.
+        kind: Kind of rule.
+        metric: Name of the metric that a sequential rule tests.
+        smallest_difference: Equivalence margin as a win difference from 0 to 1, for a rate the difference of the
+            rates. With None only a shown difference decides a comparison.
     """
 
     kind: StoppingKind = StoppingKind.FIXED
@@ -36,11 +36,11 @@ class Stopping:
 
 @dataclass(frozen=True, slots=True)
 class Combination:
-    """One level of each factor, and what they set together.
+    """A combination of one level per factor, with the resulting settings.
 
     Attributes:
-        configuration: Level of each factor, by its name.
-        settings: Keys of the mode; numbers of a scene are `Distribution`s still.
+        configuration: Level of each factor, keyed by factor name.
+        settings: Values of the mode's keys; numbers of a scene are `Distribution`s.
     """
 
     configuration: Mapping[str, str]
@@ -49,20 +49,20 @@ class Combination:
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """An experiment and how it is run.
+    """An experiment and its execution settings.
 
     Attributes:
-        description: What the result database keeps of it; the digest is still empty.
-        combinations: What is run in each trial.
-        trials: How many trials there are, at most with a sequential rule.
-        seed: What scenes and seeds are made from.
-        block: Trials between two changes of the method, at the least.
-        measures: The metrics as the episodes need them: a name, or {function: absolute FILE.py:NAME, ...} of a user.
-        stopping: When it ends.
-        workers: How many episodes run at the same time.
-        record: Which files an episode keeps: `log`, `trajectories`, `bag`, `video`.
-        files: SHA-256 of each file beside it that decides the episodes, by what names it.
-        substitutions: What will run in place of what is named where requests need it, known beforehand.
+        description: Description for the result database, without digest.
+        combinations: Combinations that each trial runs.
+        trials: Number of trials; an upper limit for a sequential rule.
+        seed: Seed of the scenes and of the episodes' seeds.
+        block: Minimum number of trials between two changes of the method.
+        metric_specs: Metrics as the episodes need them: a name, or {function: absolute FILE.py:NAME, ...} of a user.
+        stopping: Stopping rule.
+        workers: Number of episodes that run in parallel.
+        record: Whether an episode keeps each kind of file: `log`, `trajectories`, `bag`, `video`.
+        files: SHA-256 digests of the other files that determine the episodes, keyed by portable file name.
+        substitutions: Substitutions of planners by others that some requests need, known in advance.
     """
 
     description: ExperimentDescription
@@ -70,7 +70,7 @@ class Experiment:
     trials: int
     seed: int
     block: int
-    measures: tuple[Any, ...]
+    metric_specs: tuple[Any, ...]
     stopping: Stopping
     workers: int
     record: Mapping[str, bool]
@@ -78,10 +78,10 @@ class Experiment:
     substitutions: tuple[str, ...] = ()
 
     def described(self, digest: str, ran_with: Mapping[str, str]) -> ExperimentDescription:
-        """Returns what the result database keeps of it.
+        """Returns the description for the result database.
 
         Args:
-            digest: Of what decides its episodes.
-            ran_with: Digests of what they run with, see `run_digests`.
+            digest: Digest of everything that determines the episodes.
+            ran_with: Digests of the software that runs, from `run_digests`.
         """
         return replace(self.description, digest=digest, ran_with={**self.files, **ran_with})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads and checks an experiment file before anything starts: all faults at once, each with its line and column."""
+"""Reads and checks an experiment file before any episode runs; reports all faults with line and column."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from modular_framework_benchmark.experiments.factor_reading import (
     read_design,
     read_factors,
 )
-from modular_framework_benchmark.experiments.metric_choices import Measure, metric_files, read_metrics
+from modular_framework_benchmark.experiments.metric_choices import MetricSpec, metric_files, read_metrics
 from modular_framework_benchmark.experiments.mode_settings import (
     MODES,
     model_files,
     read_settings,
 )
 from modular_framework_benchmark.experiments.reading import ExperimentFault, Reading, ValueReading
+from modular_framework_benchmark.experiments.resource_lookup import ResourceLookup
 from modular_framework_benchmark.experiments.setting_checks import CheckedSettings, SettingsCheck
 from modular_framework_benchmark.experiments.setting_trees import check_references, location_below
-from modular_framework_benchmark.experiments.surroundings import Surroundings
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
 from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault, closest
@@ -41,26 +41,26 @@ OPTIONAL = (
 )  # fmt: skip
 KEYS = (*REQUIRED, *OPTIONAL)
 FILES = {"log": True, "trajectories": True, "bag": False, "video": False}
-MOST_EPISODES = 10_000_000
+MAX_EPISODES = 10_000_000
 
 SettingChecks = Map[str, SettingsCheck]
 KnownMetrics = Map[str, Map[str, Metric]]
-"""The metrics there are, by name, by mode."""
+"""Available metrics by name, keyed by mode."""
 
 
 def load_experiment(
-    path: Path, surroundings: Surroundings, known_metrics: KnownMetrics, checks: SettingChecks | None = None
+    path: Path, resources: ResourceLookup, known_metrics: KnownMetrics, checks: SettingChecks | None = None
 ) -> Experiment:
     """Reads and checks an experiment file.
 
     Args:
-        path: The file.
-        surroundings: What there is to refer to.
-        known_metrics: The metrics of each mode.
-        checks: What looks up the settings of each mode; None: they are not looked up.
+        path: Experiment file.
+        resources: Lookup of launch files, tasks, models and packages.
+        known_metrics: Metrics of each mode.
+        checks: Checks of each mode that resolve the names in its settings; None to skip these checks.
 
     Raises:
-        ExperimentFault: The file cannot be used; carries every fault.
+        ExperimentFault: The file is invalid; the error contains every fault.
     """
     start = SourceLocation(str(path), 1, 1)
     try:
@@ -69,17 +69,17 @@ def load_experiment(
         raise ExperimentFault([Fault(start, "there is no such file; name an experiment file (.yaml)")]) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ExperimentFault([Fault(start, f"the file cannot be read: {error}")]) from error
-    return read_experiment(text, path, surroundings, known_metrics, checks)
+    return read_experiment(text, path, resources, known_metrics, checks)
 
 
 def read_experiment(
     text: str,
     path: Path,
-    surroundings: Surroundings,
+    resources: ResourceLookup,
     known_metrics: KnownMetrics,
     checks: SettingChecks | None = None,
 ) -> Experiment:
-    """Reads and checks the text of an experiment file; arguments and errors as for `load_experiment`."""
+    """Reads and checks the text of an experiment file; `load_experiment` describes arguments and errors."""
     faults = FaultList()
     start = SourceLocation(str(path), 1, 1)
     if not any(line.strip() and not line.lstrip().startswith("#") for line in text.splitlines()):
@@ -90,7 +90,7 @@ def read_experiment(
         raise ExperimentFault.of(error) from error
     if not isinstance(root, Mapping):
         raise ExperimentFault([Fault(root.location, "the file must be a mapping, from keys such as experiment")])
-    reading = Reading(faults, path.resolve().parent, surroundings)
+    reading = Reading(faults, path.resolve().parent, resources)
     experiment = _Reader(root, text, path, reading, known_metrics, checks or {}).read()
     if experiment is None:
         raise ExperimentFault(faults.sorted())
@@ -98,7 +98,7 @@ def read_experiment(
 
 
 class _Reader:
-    """Reads the parts of one file."""
+    """Reader of the parts of an experiment file."""
 
     def __init__(
         self,
@@ -126,7 +126,7 @@ class _Reader:
         )
 
     def read(self) -> Experiment | None:
-        """Returns the experiment; None when there are faults."""
+        """Returns the experiment, or None after faults."""
         entries, reading = self._root.entries, self._reading
         for key in REQUIRED:
             if key not in entries:
@@ -140,7 +140,7 @@ class _Reader:
         self._note_unpaired(design, compared)
         numbers = self._numbers(len(design))
         combinations = self._combinations(factors, design)
-        metrics, measures = self._metrics(combinations)
+        metrics, metric_specs = self._metrics(combinations)
         self._note_metric_names(metrics, factors)
         stopping = self._stopping(metrics)
         if "description" in entries:
@@ -168,12 +168,12 @@ class _Reader:
             trials=int(numbers["trials"] or 0),
             seed=int(numbers["seed"] or 0),
             block=int(numbers["block"] or 1),
-            measures=measures,
+            metric_specs=metric_specs,
             stopping=stopping,
             workers=int(numbers["workers"] or 1),
             record=record,
             files=_digests(
-                metric_files(measures) + [file for one in combinations for file in model_files(one.settings)]
+                metric_files(metric_specs) + [file for one in combinations for file in model_files(one.settings)]
             ),
             substitutions=tuple(self._substitutions),
         )
@@ -199,7 +199,7 @@ class _Reader:
         return name or ""
 
     def _note_unpaired(self, design: list[dict[str, str]], compared: str) -> None:
-        """Notes a listed design in which a method has no partner: nothing could be compared with it."""
+        """Adds a fault for each combination of a listed design that only one method has: its pairs lack a partner."""
         node = self._root.entries.get("design")
         if node is None or not design or not compared:
             return
@@ -211,7 +211,7 @@ class _Reader:
             if len(methods) < 2:
                 where = ", ".join(f"{name} {label}" for name, label in rest) or "the experiment"
                 self._reading.faults.add(
-                    node.location, f"{where} has only {compared} '{min(methods)}'; list another one, to compare it with"
+                    node.location, f"{where} has only {compared} '{min(methods)}'; add another one to compare it with"
                 )
 
     def _numbers(self, combinations: int) -> dict[str, float | int | None]:
@@ -223,9 +223,9 @@ class _Reader:
         def number(key: str, default: float, low: float, high: float) -> float | None:
             return reading.number(entries[key], key, low, high) if key in entries else default
 
-        most = MOST_EPISODES // max(combinations, 1)
+        max_trials = MAX_EPISODES // max(combinations, 1)
         return {
-            "trials": count("trials", 20, 1, most),
+            "trials": count("trials", 20, 1, max_trials),
             "seed": count("seed", 1, 0),
             "block": count("block", 1),
             "workers": count("workers", 1, 1, 1024),
@@ -241,18 +241,18 @@ class _Reader:
         return read_stopping(mapping, metrics, self._reading)
 
     def _note_repeated_problems(self, stopping: Stopping, items: tuple[Combination, ...], trials: int) -> None:
-        """Notes problems that repeat under a sequential rule: a repeated problem adds to a unit that was looked at."""
+        """Adds a fault for repeated problems under a sequential rule, which would change units already analysed."""
         counts = {len(item.settings.get("problems", ())) for item in items}
-        fewest = min((count for count in counts if count > 1), default=trials)
-        if stopping.kind is StoppingKind.SEQUENTIAL and fewest < trials:
+        min_problems = min((count for count in counts if count > 1), default=trials)
+        if stopping.kind is StoppingKind.SEQUENTIAL and min_problems < trials:
             self._reading.faults.add(
                 self._root.entries["stopping"].location,
-                f"a sequential rule needs a problem for each trial: {fewest} problems, {trials} trials; make more "
-                "problems, set fewer trials, or use {rule: fixed}",
+                f"a sequential rule needs a problem for each trial: {min_problems} problems, {trials} trials; make "
+                "more problems, set fewer trials, or use {rule: fixed}",
             )
 
-    def _metrics(self, combinations: tuple[Combination, ...]) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
-        if self._mode is None:  # which metrics there are is not known
+    def _metrics(self, combinations: tuple[Combination, ...]) -> tuple[tuple[Metric, ...], tuple[MetricSpec, ...]]:
+        if self._mode is None:  # the available metrics depend on the mode
             return (), ()
         budgets = {one.settings.get("planning_time", one.settings.get("timeout")) for one in combinations}
         budget_s = budgets.pop() if len(budgets) == 1 else None
@@ -264,7 +264,7 @@ class _Reader:
             if metric.name.lower() in (name.lower() for name in factors):
                 self._reading.faults.add(
                     node.location,  # type: ignore[union-attr]
-                    f"'{metric.name}' is a metric and a factor; give one of them another name",
+                    f"'{metric.name}' is both a metric and a factor; rename one of them",
                 )
 
     def _record(self) -> dict[str, bool]:
@@ -292,7 +292,7 @@ class _Reader:
         return tuple(found)
 
     def _resolved(self, node: Mapping, settings: Map[str, Any]) -> str:
-        """Looks up the names in the settings of a combination; returns what runs, equal texts for equal things."""
+        """Resolves the names in a combination's settings; returns a text that is equal for equal executions."""
         check = self._checks.get(str(self._mode))
         checked = CheckedSettings((), settings) if check is None else check(settings)
         for fault in checked.faults:
@@ -305,9 +305,9 @@ def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueRead
     """Reads the stopping rule.
 
     Args:
-        node: The mapping of the file.
-        metrics: Of the experiment, for the name of the one it looks at.
-        reading: Where faults are noted.
+        node: Mapping of the file.
+        metrics: Metrics of the experiment, as allowed values of the rule's metric.
+        reading: Reader that collects faults.
     """
     keys = ("rule", "metric", "smallest_difference")
     known = corrected_keys(node, keys, "the key of stopping", reading.faults)
@@ -325,22 +325,22 @@ def read_stopping(node: Mapping, metrics: tuple[Metric, ...], reading: ValueRead
         names = dict.fromkeys(["success", *(metric.name for metric in metrics)])
         values["metric"] = reading.choice(known.entries["metric"], "the metric of stopping", names)
     if kind is StoppingKind.FIXED and values:
-        reading.faults.add(node.location, "the rule fixed looks at nothing; remove the other keys, or write sequential")
+        reading.faults.add(node.location, "the rule fixed has no other keys; remove them, or write sequential")
     return Stopping(kind, **{key: value for key, value in values.items() if value is not None})
 
 
 def read_run_settings(text: str, metrics: tuple[Metric, ...]) -> tuple[int, Stopping]:
-    """Reads from the text of an experiment, checked before, what does not decide its episodes.
+    """Reads the execution settings, which do not determine the episodes, from the text of a checked experiment.
 
     Args:
-        text: The file.
-        metrics: Of the experiment.
+        text: Text of the experiment file.
+        metrics: Metrics of the experiment.
 
     Returns:
-        Number of workers, and the stopping rule.
+        The number of workers and the stopping rule.
 
     Raises:
-        ExperimentFault: The text has changed, and cannot be used any more.
+        ExperimentFault: The stored text is invalid.
     """
     faults = FaultList()
     root = loads(text, "the stored experiment", faults)
@@ -359,7 +359,7 @@ def _keys_of_all_modes() -> tuple[str, ...]:
 
 
 def _digests(paths: list[Path]) -> dict[str, str]:
-    """Returns SHA-256 of each file, by the last two parts of its path: the same on every machine."""
+    """Returns the SHA-256 digest of each file, keyed by the last two parts of its path for portability."""
     return {
         f"{path.parent.name}/{path.name}": hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(set(paths))
     }

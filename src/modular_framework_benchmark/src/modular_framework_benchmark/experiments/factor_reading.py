@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the factors of an experiment file, and puts their levels together."""
+"""Reads the factors of an experiment file and combines their levels."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ EXAMPLE = "{grasp_method: {above: {arguments: {...}}, aside: {...}}, object: [cu
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """A level of a factor: its label, with the type it was written in, and the settings it makes."""
+    """A level of a factor: its label as written in the file, and its settings."""
 
     value: Scalar
     settings: Mapping
 
 
 Levels = Map[str, Map[str, Level]]
-"""The levels by their labels, by the factor's name."""
+"""Levels by label, keyed by factor name."""
 
 
 def read_factors(node: Node, mode_keys: Collection[str], reading: Reading) -> Levels:
-    """Returns the factors, each with its levels by their labels."""
+    """Returns the levels of each factor by label, and adds faults."""
     mapping = reading.mapping(node, "factors", EXAMPLE)
     if mapping is None:
         return {}
     if not mapping.entries:
-        reading.faults.add(node.location, f"factors is empty; it needs what is to be compared, such as {EXAMPLE}")
+        reading.faults.add(node.location, f"factors is empty; name the values to compare, such as {EXAMPLE}")
     factors: dict[str, Map[str, Level]] = {}
     for name, value in mapping.entries.items():
         if not name.isidentifier():
@@ -79,43 +79,43 @@ def _items_of(node: Node) -> Iterable[object]:
 
 
 def _note_conflicts(factors: Levels, reading: Reading) -> None:
-    """Notes where two factors set the same value: which of them would hold is not said."""
-    first: dict[tuple[str, ...], str] = {}
+    """Adds a fault for each value that two factors set, because the effective value would be undefined."""
+    setters: dict[tuple[str, ...], str] = {}
     for name, levels in factors.items():
         for level in levels.values():
             for path, value in leaves(level.settings):
-                ends = [path[:length] for length in range(1, len(path) + 1)]
-                other = next((first[end] for end in ends if first.get(end, name) != name), None)
-                if other is not None:
+                prefixes = [path[:length] for length in range(1, len(path) + 1)]
+                setter = next((setters[end] for end in prefixes if setters.get(end, name) != name), None)
+                if setter is not None:
                     reading.faults.add(
                         value.location,
-                        f"factor '{name}' sets {'.'.join(path)}, as factor '{other}' does; let one of them set it",
+                        f"factor '{name}' sets {'.'.join(path)}, which factor '{setter}' sets too; remove one of them",
                     )
         for level in levels.values():
-            first |= {path: first.get(path, name) for path, _ in leaves(level.settings)}
+            setters |= {path: setters.get(path, name) for path, _ in leaves(level.settings)}
 
 
 def note_unused(factors: Levels, base: Mapping, node: Mapping, reading: Reading) -> None:
-    """Notes each factor that changes nothing: its levels set nothing, and no value refers to it."""
-    used = {name for name, _ in references(base)}
+    """Adds a fault for each factor without effect: its levels set nothing and no value refers to it."""
+    effective = {name for name, _ in references(base)}
     for levels in factors.values():
         for level in levels.values():
-            used |= {name for name, _ in references(level.settings)}
+            effective |= {name for name, _ in references(level.settings)}
     for name, levels in factors.items():
-        if levels and name not in used and not any(level.settings.entries for level in levels.values()):
+        if levels and name not in effective and not any(level.settings.entries for level in levels.values()):
             reading.faults.add(
                 node.keys[name],
-                f"factor '{name}' changes nothing; write ${name} where its level belongs, or say what each level sets",
+                f"factor '{name}' changes nothing; write ${name} in a value, or give each level its settings",
             )
 
 
 def note_equal_levels(factors: Levels, resolved: Map[tuple[tuple[str, str], ...], str], reading: Reading) -> None:
-    """Notes two levels of a factor that run the same in every combination that has them: they cannot differ.
+    """Adds a fault for two levels of a factor that execute the same in every combination.
 
     Args:
-        factors: The factors.
-        resolved: What runs, by combination; empty if it could not be looked up.
-        reading: Where faults are noted.
+        factors: Levels of each factor.
+        resolved: Description of the execution of each combination; empty if unknown.
+        reading: Reader that collects faults.
     """
     for name, levels in factors.items():
         runs: dict[str, dict[tuple[tuple[str, str], ...], str]] = {label: {} for label in levels}
@@ -131,13 +131,13 @@ def note_equal_levels(factors: Levels, resolved: Map[tuple[tuple[str, str], ...]
 
 
 def combined(base: Mapping, factors: Levels, configuration: Map[str, str], meant: Map[str, str]) -> Mapping:
-    """Returns the settings of one level of each factor: those of the base, and over them those of the levels.
+    """Returns the base settings overridden by the settings of one level per factor.
 
     Args:
         base: Settings of every combination.
-        factors: The factors.
+        factors: Levels of each factor.
         configuration: Label of a level of each factor.
-        meant: The factor that a misspelt `$NAME` stands for, by NAME.
+        meant: Intended factor of each misspelt `$NAME`, by NAME.
     """
     chosen = {name: factors[name][label] for name, label in configuration.items()}
     tree = base
@@ -149,7 +149,7 @@ def combined(base: Mapping, factors: Levels, configuration: Map[str, str], meant
 
 
 def read_design(node: Node | None, factors: Levels, reading: Reading) -> list[dict[str, str]]:
-    """Returns the combinations of levels that are run: all of them, or those that the file lists."""
+    """Returns the combinations of levels to run: all combinations, or those that the file lists."""
     full = [dict(zip(factors, labels, strict=True)) for labels in itertools.product(*factors.values())]
     if node is None or isinstance(node, Scalar) and node.value == "full":
         return full

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The settings of modes that start a launch file: the file, its arguments, the task, the objects."""
+"""Settings of the modes that start a launch file: the file, its arguments, the task, the objects."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Mapping as Map
 from typing import Any
 
 from modular_framework_benchmark.experiments.reading import Reading
+from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.experiments.scene_objects import ObjectNodes, SceneObject, named_object
-from modular_framework_benchmark.experiments.surroundings import NotThere
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor.key_spelling import intended_key
 
@@ -20,39 +20,39 @@ OWN_ARGUMENTS = {
     "end_with_task": "an episode needs its launch after the task has ended",
     "seed": "each episode has its own seed, made from the experiment's key seed",
 }
-"""Launch arguments that the episodes set, and what to do instead."""
+"""Launch arguments that the episodes set themselves, with the alternative for the user."""
 FILE_ARGUMENTS = ("world_file", "scene_file", "generated_state_machine_name")
-"""Arguments that name a file, but decide neither the nodes that start nor the robot."""
+"""Arguments that name a file but determine neither the launched nodes nor the robot."""
 
 
 def read_launch(node: Node, reading: Reading) -> str | None:
-    """Reads PACKAGE/FILE, or the path of a launch file."""
+    """Reads a launch file as PACKAGE/FILE or as a path."""
     name = reading.text(node, "launch")
     if name is None:
         return None
     given = str(reading.path(name)) if name.startswith((".", "~", "/")) else name
     try:
-        reading.surroundings.launch_file(given)
-    except NotThere as error:
+        reading.resources.launch_file(given)
+    except UnresolvedReference as error:
         reading.faults.add(node.location, str(error))
         return None
     return given
 
 
 def read_task(node: Node, reading: Reading) -> str | None:
-    """Reads the name of a task, or its path."""
+    """Reads a task by name or path."""
     name = reading.text(node, "task")
     if name is None:
         return None
     try:
-        return reading.surroundings.task(name, reading.folder)
-    except NotThere as error:
+        return reading.resources.task(name, reading.folder)
+    except UnresolvedReference as error:
         reading.faults.add(node.location, str(error))
     return None
 
 
 def read_arguments(node: Node, reading: Reading) -> dict[str, str] | None:
-    """Reads launch arguments; numbers and truth values become the text that roslaunch expects."""
+    """Reads launch arguments as the text that roslaunch expects."""
     mapping = reading.mapping(node, "arguments", "{world_file: ur5_table.world}")
     if mapping is None:
         return None
@@ -80,21 +80,21 @@ def _argument_text(value: Scalar) -> str:
 
 
 def finish(node: Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
-    """Checks arguments against the launch file, looks the models up, and returns the settings.
+    """Checks the arguments against the launch file, finds the models, and returns the settings.
 
-    The settings have no `arguments` if those that were read do not decide what starts: one is wrong that names a file.
+    The settings lack `arguments` if an invalid argument leaves the launched nodes unknown.
     """
     if "launch" not in values:
         return values
     launch, arguments = values["launch"], values.get("arguments", {})
     try:
-        known = reading.surroundings.launch_arguments(launch)
-    except NotThere as error:
+        known = reading.resources.launch_arguments(launch)
+    except UnresolvedReference as error:
         reading.faults.add(_location_of(node, "launch"), str(error))
         return {key: value for key, value in values.items() if key != "launch"}
     sound, decides = _sound_arguments(node, launch, arguments, known, reading)
     if values.get("task") == DEFAULT_TASK:
-        values["task"] = reading.surroundings.task(DEFAULT_TASK, reading.folder)
+        values["task"] = reading.resources.task(DEFAULT_TASK, reading.folder)
     before = len(reading.faults)
     objects = placed_objects(values.get("objects", []), launch, sound, reading)
     if len(reading.faults) == before and "objects" in values:
@@ -108,15 +108,15 @@ def _check_success(node: Mapping, success: dict[str, Any], names: list[str], rea
     if wanted is not None and wanted not in names:
         reading.faults.add_unknown(_location_of(node, "success"), "the object of success", wanted, names)
     elif success and not names:
-        reading.faults.add(_location_of(node, "success"), "success speaks of an object, and there is none in objects")
+        reading.faults.add(_location_of(node, "success"), "success names an object, but objects is empty; add it there")
 
 
 def _sound_arguments(
     node: Mapping, launch: str, given: dict[str, str], known: Map[str, str | None], reading: Reading
 ) -> tuple[dict[str, str], bool]:
-    """Returns the arguments without those that are wrong, and whether what starts does not depend on the latter.
+    """Returns the valid arguments, and whether they determine the launched nodes.
 
-    A misspelt name counts as the argument that was meant.
+    A misspelt name counts as the intended argument.
     """
     keys = node.entries.get("arguments")
     locations = keys.keys if isinstance(keys, Mapping) else {}
@@ -132,7 +132,7 @@ def _sound_arguments(
             decides = decides and meant is not None
     wrong = {"": ""}
     while wrong:  # faults of files are found once the other values are right
-        wrong = {_argument_in(text): text for text in reading.surroundings.launch_faults(launch, sound)}
+        wrong = {_argument_in(text): text for text in reading.resources.launch_faults(launch, sound)}
         for name, text in wrong.items():
             reading.faults.add(locations.get(name, _location_of(node, "arguments")), text)
             is_truth = str(known.get(name)).lower() in ("true", "false")
@@ -144,7 +144,7 @@ def _sound_arguments(
 
 
 def _argument_in(fault: str) -> str:
-    """Returns the argument that a fault names; empty if it names none."""
+    """Returns the argument named in a fault; empty if there is none."""
     named = re.search(r"argument '([^']*)'", fault)
     return named[1] if named is not None else ""
 
@@ -152,20 +152,20 @@ def _argument_in(fault: str) -> str:
 def placed_objects(
     found: list[ObjectNodes], launch: str, arguments: dict[str, str], reading: Reading
 ) -> list[SceneObject]:
-    """Returns objects with their models' files; notes faults.
+    """Returns objects with the files of their models, and adds faults.
 
     Args:
-        found: The objects as they were read.
-        launch: Launch file whose description package has the models.
-        arguments: Its arguments.
-        reading: Where faults are noted.
+        found: Objects of the experiment file.
+        launch: Launch file whose description package contains the models.
+        arguments: Arguments of the launch file.
+        reading: Reader that collects faults.
     """
     taken: set[str] = set()
     objects = []
     for item in found:
         try:
-            file = reading.surroundings.model(item.model, launch, arguments, reading.folder)
-        except NotThere as error:
+            file = reading.resources.model(item.model, launch, arguments, reading.folder)
+        except UnresolvedReference as error:
             reading.faults.add(item.node.entries["model"].location, str(error))
             continue
         objects.append(named_object(item, file, taken, reading))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads which metrics an experiment has: names of those that are known, or functions in files of the user's own."""
+"""Reads the metrics of an experiment: names of known metrics, or functions in the user's files."""
 
 from __future__ import annotations
 
@@ -20,47 +20,47 @@ OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", 
 KNOWN_KEYS = ("metric", "limit")
 EXAMPLE = "{function: my_metric.py:smoothness, better: lower, unit: rad}"
 
-Measure = Any  # name of a known metric, or the mapping of a user's function
+MetricSpec = Any  # name of a known metric, or the mapping of a user's function
 
 
 def read_metrics(
     node: Node | None, known: Map[str, Metric], budget_s: float | None, reading: Reading
-) -> tuple[tuple[Metric, ...], tuple[Measure, ...]]:
-    """Returns the metrics, and how the episodes are told of them.
+) -> tuple[tuple[Metric, ...], tuple[MetricSpec, ...]]:
+    """Returns the metrics, and their form in the episodes' settings.
 
     Args:
-        node: The list of the file; None where there is none: all that are known.
-        known: The metrics of the mode, by name.
-        budget_s: Real time that a planner or solver is given, the limit of its times [s]; None without one.
-        reading: Where faults are noted.
+        node: List of the file; None for all known metrics.
+        known: Metrics of the mode, keyed by name.
+        budget_s: Time budget of a planner or solver, the limit of its times [s]; None without a budget.
+        reading: Reader that collects faults.
     """
     if node is None:
         return tuple(_limited(metric, budget_s) for metric in known.values()), tuple(known)
     metrics: dict[str, Metric] = {}
-    measures: list[Measure] = []
+    metric_specs: list[MetricSpec] = []
     for item in reading.items(node, "metrics", "[success, task_time]") or ():
         found = _read_metric(item, known, reading)
         if found is None:
             continue
-        metric, measure = found
+        metric, metric_spec = found
         if metric.name.lower() in (name.lower() for name in metrics):
             reading.faults.add(item.location, f"metrics has '{metric.name}' twice; remove one, or give it another name")
         metrics[metric.name] = _limited(metric, budget_s)
-        measures.append(measure)
-    return tuple(metrics.values()), tuple(measures)
+        metric_specs.append(metric_spec)
+    return tuple(metrics.values()), tuple(metric_specs)
 
 
 def _limited(metric: Metric, budget_s: float | None) -> Metric:
-    """Gives a duration its own limit; the time limit of an episode is none, for it counts by another clock."""
+    """Returns a duration with its limit; the time limit of an episode is not used, because its clock differs."""
     if metric.kind is not MetricKind.TIME or metric.limit is not None:
         return metric
     if metric.better is Direction.HIGHER:
-        return dataclasses.replace(metric, limit=0.0)  # what fails has held for no time at all
+        return dataclasses.replace(metric, limit=0.0)  # a failure has held the object for 0 s
     within_budget = metric.component in ("planning", "kinematics") and metric.clock is Clock.WALL
     return dataclasses.replace(metric, limit=budget_s if within_budget else None)
 
 
-def _read_metric(item: Node, known: Map[str, Metric], reading: Reading) -> tuple[Metric, Measure] | None:
+def _read_metric(item: Node, known: Map[str, Metric], reading: Reading) -> tuple[Metric, MetricSpec] | None:
     if isinstance(item, Mapping) and "function" in item.entries:
         return _own_metric(item, reading)
     if isinstance(item, Mapping):
@@ -73,14 +73,14 @@ def _read_metric(item: Node, known: Map[str, Metric], reading: Reading) -> tuple
     if name not in known:
         reading.faults.add(
             item.location,
-            f"the metric '{name}' is unknown; {listing(known)}, or a function of one's own: FILE.py:NAME"
+            f"the metric '{name}' is unknown; {listing(known)}, or a user's function: FILE.py:NAME"
             f"{nearest(name, known)}",
         )
         return None
     return known[name], name
 
 
-def _known_with_limit(item: Mapping, known: Map[str, Metric], reading: Reading) -> tuple[Metric, Measure] | None:
+def _known_with_limit(item: Mapping, known: Map[str, Metric], reading: Reading) -> tuple[Metric, MetricSpec] | None:
     node = corrected_keys(item, KNOWN_KEYS, "the key of a metric", reading.faults)
     if "metric" not in node.entries:
         reading.faults.add(item.location, f"a metric needs the key metric or function, such as {EXAMPLE}")
@@ -92,7 +92,7 @@ def _known_with_limit(item: Mapping, known: Map[str, Metric], reading: Reading) 
     return dataclasses.replace(found[0], limit=limit), found[1]
 
 
-def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, Measure] | None:
+def _own_metric(item: Mapping, reading: Reading) -> tuple[Metric, MetricSpec] | None:
     node = corrected_keys(item, OWN_KEYS, "the key of a metric", reading.faults)
     target = reading.text(node.entries["function"], "function")
     located = None if target is None else _located_function(target, node.entries["function"], reading)
@@ -130,21 +130,21 @@ def _choice(node: Mapping, key: str, allowed: list[str], default: str, reading: 
 
 
 def _located_function(target: str, node: Node, reading: Reading) -> tuple[Path, str] | None:
-    """Returns file and name of a function that is there; the file is read, but not run."""
+    """Returns the file and name of an existing function; the file is parsed but not executed."""
     file, _, function = target.rpartition(":")
     if not file.endswith(".py") or not function.isidentifier():
-        reading.faults.add(node.location, f"'{target}' is no function of a file; allowed: FILE.py:NAME")
+        reading.faults.add(node.location, f"'{target}' is not a function of a file; allowed: FILE.py:NAME")
         return None
     path = reading.path(file)
     try:
         tree = ast.parse(path.read_bytes(), str(path))
     except FileNotFoundError:
-        there = sorted(found.name for found in path.parent.glob("*.py")) if path.parent.is_dir() else []
-        hint = nearest(path.name, there)
+        python_files = sorted(found.name for found in path.parent.glob("*.py")) if path.parent.is_dir() else []
+        hint = nearest(path.name, python_files)
         reading.faults.add(node.location, f"there is no file {path}; name a Python file with the function{hint}")
         return None
     except (OSError, SyntaxError, ValueError) as error:
-        reading.faults.add(node.location, f"{path} is no Python file that can be read: {error}")
+        reading.faults.add(node.location, f"{path} is not a readable Python file: {error}")
         return None
     functions = {item.name: item for item in tree.body if isinstance(item, ast.FunctionDef)}
     if function not in functions:
@@ -155,13 +155,13 @@ def _located_function(target: str, node: Node, reading: Reading) -> tuple[Path, 
         arguments.posonlyargs or arguments.args or arguments.vararg
     ):
         reading.faults.add(
-            node.location, f"the function '{function}' must take one argument, what is known of an episode"
+            node.location, f"the function '{function}' must take one argument, the measurements of an episode"
         )
         return None
     return path, function
 
 
-def metric_files(measures: tuple[Measure, ...]) -> list[Path]:
-    """Returns the files of the user's own functions."""
-    functions = [measure["function"] for measure in measures if not isinstance(measure, str)]
+def metric_files(metric_specs: tuple[MetricSpec, ...]) -> list[Path]:
+    """Returns the files of the user's functions."""
+    functions = [metric_spec["function"] for metric_spec in metric_specs if not isinstance(metric_spec, str)]
     return [Path(function.rpartition(":")[0]) for function in functions]

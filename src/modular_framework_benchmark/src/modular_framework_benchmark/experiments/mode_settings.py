@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The settings of each mode: which keys there are, what they may be, and what they are when they are not given."""
+"""Settings of each mode: keys, allowed values and defaults."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 from modular_framework_benchmark.experiments import launch_settings, problem_sets
 from modular_framework_benchmark.experiments.reading import Reading, json_value
+from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_benchmark.experiments.scene_objects import read_objects
-from modular_framework_benchmark.experiments.surroundings import NotThere
 from modular_framework_core.files.located_yaml import Mapping as Node_Mapping
 from modular_framework_core.files.located_yaml import Node, Scalar
 
@@ -21,7 +21,7 @@ OWN_PARAMETERS = {
     "/task/wait_for_start": "an episode starts its task itself",
     "/task/record_directory": "an episode keeps the record of its task in its own folder",
 }
-"""Parameters that the episodes set, and what to do instead."""
+"""Parameters that the episodes set themselves, with the alternative for the user."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +29,9 @@ class SettingKey:
     """A key of a mode.
 
     Attributes:
-        read: Reads its value; notes faults.
-        default: Its value when it is not given.
-        required: Whether it has to be given.
+        read: Reader of the value, which adds faults.
+        default: Value of an absent key.
+        required: Whether the key must be present.
     """
 
     read: ReadValue
@@ -39,7 +39,14 @@ class SettingKey:
     required: bool = False
 
     def value(self, key: str, mode: str, node: Node_Mapping, reading: Reading) -> Any:
-        """Returns the value of the key in the settings of a mode; None, with a fault noted, if it cannot be read."""
+        """Returns the value of the key; None with an added fault if it is unreadable or required and absent.
+
+        Args:
+            key: Name of the key.
+            mode: Name of the mode.
+            node: Settings of a combination.
+            reading: Reader that collects faults.
+        """
         if key in node.entries:
             return self.read(node.entries[key], reading)
         if self.required:
@@ -50,11 +57,11 @@ class SettingKey:
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """What the settings of a mode are.
+    """Settings of a mode.
 
     Attributes:
-        keys: Its keys.
-        finish: Checks the values that depend on each other, and returns the settings; some may be left out.
+        keys: Keys of the mode.
+        finish: Check of the relations between keys, which returns the final settings; some may be omitted.
     """
 
     keys: Mapping[str, SettingKey]
@@ -66,11 +73,11 @@ def read_settings(mode: str, node: Node_Mapping, reading: Reading) -> dict[str, 
 
     Args:
         mode: Name of the mode.
-        node: Base and levels together; known keys only.
-        reading: Where faults are noted, and what there is to refer to.
+        node: Base settings overridden by the levels; known keys only.
+        reading: Reader that collects faults and looks up references.
 
     Returns:
-        A value for each key of the mode; keys whose value cannot be read are left out.
+        A value for each key of the mode; keys with an unreadable value are omitted.
     """
     values = {key: setting.value(key, mode, node, reading) for key, setting in MODES[mode].keys.items()}
     return MODES[mode].finish(node, {key: value for key, value in values.items() if value is not None}, reading)
@@ -96,7 +103,7 @@ def _truth(what: str) -> ReadValue:
 
 
 def _success(allowed: Mapping[str, float]) -> ReadValue:
-    """Returns a reader of what has to hold for success: numbers of at least 0, and the name of an object."""
+    """Returns a reader of the success criteria: numbers from 0, and the name of an object."""
     keys = (*allowed, "object")
 
     def read(node: Node, reading: Reading) -> dict[str, Any] | None:
@@ -122,14 +129,14 @@ def _parameters(node: Node, reading: Reading) -> dict[str, Any] | None:
         if name in OWN_PARAMETERS:
             reading.faults.add(location, f"the parameter '{name}' cannot be given: {OWN_PARAMETERS[name]}")
         elif not name.startswith("/") or name != "/" + "/".join(part for part in name.split("/") if part):
-            reading.faults.add(location, f"the parameter '{name}' must be a whole name from /, such as /planner_name")
+            reading.faults.add(location, f"the parameter '{name}' must be a full name from /, such as /planner_name")
         else:
             parameters[name] = json_value(mapping.entries[name])
     return parameters
 
 
 def _extra_parameters(node: Node, reading: Reading) -> list[str] | None:
-    """Reads the names of parameters that nodes of the user's own read."""
+    """Reads the names of parameters that the user's own nodes read."""
     items = reading.items(node, "extra_parameters", "[/my_node/my_parameter]")
     return (
         None
@@ -147,14 +154,14 @@ def _named_values(what: str, example: str) -> ReadValue:
 
 
 def _robot(node: Node, reading: Reading) -> Any:
-    """Reads a MoveIt configuration package, or the files of a description."""
+    """Reads a MoveIt configuration package, or the URDF and SRDF files."""
     if isinstance(node, Node_Mapping):
         return _robot_files(node, reading)
     package = reading.text(node, "robot")
     if package is not None:
         try:
-            reading.surroundings.package(package)
-        except NotThere as error:
+            reading.resources.package(package)
+        except UnresolvedReference as error:
             reading.faults.add(node.location, str(error))
             return None
     return package
@@ -179,14 +186,14 @@ def _robot_files(node: Node_Mapping, reading: Reading) -> dict[str, str] | None:
 
 
 def _grasp_settings(node: Node_Mapping, values: dict[str, Any], reading: Reading) -> dict[str, Any]:
-    """Looks the models up, and checks that the target is one of the objects; it is the first one by default."""
+    """Finds the models and checks that the target is an object; the default target is the first object."""
     if "objects" not in values:
         return values
     before, target = len(reading.faults), values.get("target")
     objects = launch_settings.placed_objects(values["objects"], launch_settings.DEFAULT_LAUNCH, {}, reading)
     names = [found.name for found in objects]
     if not values["objects"]:
-        reading.faults.add(node.entries["objects"].location, "objects is empty; name at least the one to grasp")
+        reading.faults.add(node.entries["objects"].location, "objects is empty; add at least the object to grasp")
     elif target and target not in names and len(reading.faults) == before:
         reading.faults.add_unknown(node.entries["target"].location, "the target", target, names)
     with_files = [replace(found, model=str(found.file)) for found in objects]
@@ -256,7 +263,7 @@ MODES: Mapping[str, Mode] = {
 
 
 def model_files(settings: Mapping[str, Any]) -> list[Path]:
-    """Returns the files of a combination whose content decides its episodes."""
+    """Returns the files of a combination whose content determines its episodes."""
     objects = [found.file for found in settings.get("objects", ())]
     task = [Path(settings["task"])] if settings.get("task") else []
     problems = [Path(problem[key]) for problem in settings.get("problems", ()) for key in ("scene", "request")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds motion planning problems in MotionBenchMaker's layout: sceneNNNN.yaml beside requestNNNN.yaml."""
+"""Finds motion planning problems in the layout of MotionBenchMaker: sceneNNNN.yaml beside requestNNNN.yaml."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from modular_framework_core.files.located_yaml import Node, Sequence
 
 
 def read_problems(node: Node, reading: Reading) -> list[dict[str, str]] | None:
-    """Returns the problems of a folder, or of several, in the order of their names.
+    """Returns the problems of one or several folders, sorted by name within a folder.
 
     Args:
-        node: Path of a folder, or a list of them.
-        reading: Where faults are noted.
+        node: Path of a folder, or a list of paths.
+        reading: Reader that collects faults.
 
     Returns:
-        {name, scene, request} for each: FAMILY/NUMBER, and absolute paths.
+        {name, scene, request} per problem: FAMILY/NUMBER, and absolute paths.
     """
     problems: list[dict[str, str]] = []
     for item in node.items if isinstance(node, Sequence) else (node,):
@@ -27,7 +27,7 @@ def read_problems(node: Node, reading: Reading) -> list[dict[str, str]] | None:
         folder = reading.path(text)
         found = _problems_in(folder, item, reading) if folder.is_dir() else []
         if not folder.is_dir():
-            reading.faults.add(item.location, f"there is no folder {folder}; name one with scene and request files")
+            reading.faults.add(item.location, f"there is no folder {folder}; name a folder of scene and request files")
         elif not found:
             reading.faults.add(
                 item.location, f"{folder} has no problem; allowed: sceneNNNN.yaml beside requestNNNN.yaml, at any depth"
@@ -45,7 +45,7 @@ def _problems_in(folder: Path, item: Node, reading: Reading) -> list[dict[str, s
         request = scene.with_name(f"request{number}.yaml")
         if not request.is_file():
             reading.faults.add(
-                item.location, f"{scene} has no {request.name} beside it; add it, or take the scene away"
+                item.location, f"{scene} has no {request.name} beside it; add the request, or remove the scene"
             )
             continue
         name = f"{scene.parent.name}/{number}"

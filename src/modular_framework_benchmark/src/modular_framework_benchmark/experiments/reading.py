@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads single values of an experiment file: each function returns the value, or notes a fault and returns None."""
+"""Readers of single values of an experiment file: each returns the value, or adds a fault and returns None."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from modular_framework_benchmark.experiments.surroundings import Surroundings
+from modular_framework_benchmark.experiments.resource_lookup import ResourceLookup
 from modular_framework_core.files.faults import FaultList, FileFaults, TaskFault
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 
@@ -19,35 +19,35 @@ MAX_SEED = 2**31 - 1
 
 
 class ExperimentFault(FileFaults):
-    """An experiment file cannot be used."""
+    """An experiment file is invalid."""
 
     kind = "experiment"
 
     @classmethod
     def of(cls, error: TaskFault) -> ExperimentFault:
-        """Returns the fault of a file that is no readable YAML."""
+        """Returns the fault of a file that is not valid YAML."""
         return cls(error.faults)
 
 
 @dataclass(frozen=True, slots=True)
 class ValueReading:
-    """Reads values that refer to nothing outside the file.
+    """Reader of values that refer to nothing outside the file.
 
     Attributes:
-        faults: Where faults are noted.
+        faults: Collected faults.
     """
 
     faults: FaultList
 
     def text(self, node: Node, what: str) -> str | None:
-        """Returns a text that is not empty."""
+        """Returns a nonempty text."""
         if isinstance(node, Scalar) and isinstance(node.value, str) and node.value:
             return node.value
         self.faults.add(node.location, f"{what} must be a text, found {kind_of(node)}")
         return None
 
     def name(self, node: Node, what: str) -> str | None:
-        """Returns a text that can be the name of a file or a column."""
+        """Returns a text that is valid as a file name and as a database column."""
         name = self.text(node, what)
         if name is None or _NAME.fullmatch(name):
             return name
@@ -55,7 +55,7 @@ class ValueReading:
         return None
 
     def choice(self, node: Node, what: str, allowed: Collection[str]) -> str | None:
-        """Returns one of some texts."""
+        """Returns one of the allowed texts."""
         text = self.text(node, what)
         if text is None or text in allowed:
             return text
@@ -63,14 +63,21 @@ class ValueReading:
         return None
 
     def truth(self, node: Node, what: str) -> bool | None:
-        """Returns true or false."""
+        """Returns a truth value."""
         if isinstance(node, Scalar) and isinstance(node.value, bool):
             return node.value
         self.faults.add(node.location, f"{what} must be true or false, found {kind_of(node)}")
         return None
 
     def number(self, node: Node, what: str, low: float = -math.inf, high: float = math.inf) -> float | None:
-        """Returns a finite number from a range, both ends included."""
+        """Returns a finite number of a closed range.
+
+        Args:
+            node: Value of the file.
+            what: Name of the value in fault messages.
+            low: Smallest allowed number.
+            high: Largest allowed number.
+        """
         value = node.value if isinstance(node, Scalar) else None
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if is_number and math.isfinite(value) and low <= value <= high:  # type: ignore[arg-type, operator]
@@ -79,7 +86,14 @@ class ValueReading:
         return None
 
     def count(self, node: Node, what: str, low: int = 1, high: int = MAX_SEED) -> int | None:
-        """Returns a whole number from a range, both ends included."""
+        """Returns an integer of a closed range.
+
+        Args:
+            node: Value of the file.
+            what: Name of the value in fault messages.
+            low: Smallest allowed number.
+            high: Largest allowed number.
+        """
         value = node.value if isinstance(node, Scalar) else None
         if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
             return value
@@ -89,7 +103,7 @@ class ValueReading:
         return None
 
     def items(self, node: Node, what: str, example: str) -> tuple[Node, ...] | None:
-        """Returns the items of a list that is not empty."""
+        """Returns the items of a nonempty list."""
         if isinstance(node, Sequence) and node.items:
             return node.items
         found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
@@ -97,7 +111,7 @@ class ValueReading:
         return None
 
     def mapping(self, node: Node, what: str, example: str) -> Mapping | None:
-        """Returns a mapping; nothing counts as an empty one."""
+        """Returns a mapping; an empty value counts as an empty mapping."""
         if isinstance(node, Mapping):
             return node
         if isinstance(node, Scalar) and node.value is None:
@@ -108,23 +122,23 @@ class ValueReading:
 
 @dataclass(frozen=True, slots=True)
 class Reading(ValueReading):
-    """Reads values that may refer to files and packages.
+    """Reader of values that may refer to files and packages.
 
     Attributes:
-        folder: Folder of the experiment file, from which relative paths count.
-        surroundings: What there is to refer to.
+        folder: Folder of the experiment file, the base of relative paths.
+        resources: Lookup of launch files, tasks, models and packages.
     """
 
     folder: Path
-    surroundings: Surroundings
+    resources: ResourceLookup
 
     def path(self, text: str) -> Path:
-        """Returns a path of the file: relative ones count from its folder, `~` is the home folder."""
+        """Returns an absolute path: relative paths start at the file's folder, `~` is the home folder."""
         return (self.folder / Path(text).expanduser()).resolve()
 
 
 def json_value(node: Node) -> Any:
-    """Returns a value as the parameter server and JSON take it."""
+    """Returns a value in the form of the parameter server and of JSON."""
     return node.plain()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How deep a model reaches below its frame: what puts it on a surface."""
+"""Height of a model's frame above a surface on which the model rests."""
 
 from __future__ import annotations
 
@@ -18,34 +18,39 @@ from modular_framework_simulation.models.sdf_resources import Resources, no_pack
 from modular_framework_urdf.rotations import rotate_vector
 
 GAP_M = 0.001
-"""Room left between an object and what it is put on, so that they do not touch before time starts [m]."""
+"""Clearance between an object and its surface, so that they are not in contact at the start [m]."""
 
 
 def resting_height(model: Path, surface_m: float, roll_rad: float, pitch_rad: float) -> float:
-    """Returns the height at which the frame of a model has to be for it to stand on a surface [m].
+    """Returns the height of the model frame at which the model stands on a surface [m].
 
     Args:
-        model: Its .sdf file.
+        model: SDF file of the model.
         surface_m: Height of the horizontal surface [m].
-        roll_rad: Its orientation [rad].
-        pitch_rad: Its orientation [rad].
+        roll_rad: Roll angle of the model [rad].
+        pitch_rad: Pitch angle of the model [rad].
 
     Raises:
-        DescriptionError: The file cannot be used, or has no collision shape.
+        DescriptionError: The file is invalid, or has no collision shape.
     """
     return round(surface_m + GAP_M - lowest_point(model, roll_rad, pitch_rad), 6)
 
 
 @lru_cache(maxsize=4096)
 def lowest_point(model: Path, roll_rad: float, pitch_rad: float) -> float:
-    """Returns the height of the lowest point of a model's collision shapes above its frame [m], mostly negative.
+    """Returns the height of the lowest point of a model's collision shapes relative to its frame [m].
+
+    Args:
+        model: SDF file of the model.
+        roll_rad: Roll angle of the model [rad].
+        pitch_rad: Pitch angle of the model [rad].
 
     Raises:
-        DescriptionError: As `resting_height`.
+        DescriptionError: See `resting_height`.
     """
-    turned = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0))
+    rotated = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (roll_rad, pitch_rad, 0.0))
     lowest = [
-        _lowest_of(turned @ link.pose @ collision.pose, collision.geometry)
+        _lowest_height(rotated @ link.pose @ collision.pose, collision.geometry)
         for link in _read(model).links
         for collision in link.collisions
     ]
@@ -65,20 +70,20 @@ def _read(model: Path) -> specs.Model:
     return read_model_text(text, str(model), Resources((model.parent.parent,), no_packages))
 
 
-def _lowest_of(pose: Pose, shape: specs.Geometry) -> float:
-    """Returns the lowest height of a shape: that of its frame less its reach downwards [m]."""
+def _lowest_height(pose: Pose, shape: specs.Geometry) -> float:
+    """Returns the height of a shape's lowest point: height of its frame minus its downward extent [m]."""
     down = [rotate_vector(pose.quaternion, axis)[2] for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     match shape:
         case specs.Sphere():
-            reach = shape.radius
+            extent = shape.radius
         case specs.Box():
-            reach = sum(abs(share) * size / 2 for share, size in zip(down, shape.size, strict=True))
+            extent = sum(abs(cosine) * size / 2 for cosine, size in zip(down, shape.size, strict=True))
         case specs.Cylinder():
-            reach = abs(down[2]) * shape.length / 2 + shape.radius * math.sqrt(max(0.0, 1 - down[2] ** 2))
+            extent = abs(down[2]) * shape.length / 2 + shape.radius * math.sqrt(max(0.0, 1 - down[2] ** 2))
         case specs.Mesh():
-            reach = -float(np.min(np.asarray(load_mesh(shape).vertices) @ np.asarray(down)))
+            extent = -float(np.min(np.asarray(load_mesh(shape).vertices) @ np.asarray(down)))
         case _:
             raise DescriptionError(
                 "<collision>", "got a plane", "allowed: a shape of limited size; give z instead of on"
             )
-    return pose.position[2] - reach
+    return pose.position[2] - extent

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Resolves what a launch names, before anything starts: parameters, planners, pipelines, adapters, groups, joints."""
+"""Resolves the names in a launch before it starts: parameters, planners, pipelines, adapters, groups, joints."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ RUN_TASK, ARGUMENTS = "run_task", "arguments"
 
 
 class LaunchCheck:
-    """Checks a launch with the parameters that replace those of its files.
+    """Checks a launch together with the parameters that override those of its files.
 
     Args:
-        launch: What the launch file starts.
-        given: Parameters by whole name that are set over those of the launch file.
-        extra: Names of them that nodes of the user's own read.
+        launch: Preview of the launch file.
+        given: Overriding parameters, keyed by full name.
+        extra: Names of overriding parameters that the user's own nodes read.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class LaunchCheck:
             self._pipelines = tuple(launch.below(f"{self._node.name}/{PIPELINES}"))
 
     def faults(self) -> list[LaunchFault]:
-        """Returns everything that is wrong."""
+        """Returns all faults of the launch."""
         try:
             return [
                 *self._names.unread(self._given, self._extra),
@@ -77,11 +77,11 @@ class LaunchCheck:
             return [LaunchFault("", str(error))]
 
     def faults_of_values(self) -> list[LaunchFault]:
-        """Returns the faults of values alone, for a launch of which only a part is known."""
+        """Returns the faults in parameter values, for a partly known launch."""
         return list(self._names.wrong_values())
 
     def registry(self) -> PlannerRegistry | None:
-        """Returns the planners of the launch; None if it starts no move_group."""
+        """Returns the planners of the launch, or None without a move_group node."""
         if self._node is None:
             return None
         limits = self.launch.below(f"{self._node.namespace}{DESCRIPTION}_planning")
@@ -105,7 +105,7 @@ class LaunchCheck:
                 yield unknown_name(name, error.what, error.name, error.known)
                 continue
             except ModelError:
-                continue  # noted above
+                continue  # adapter_faults reported it
             for parameter, text in registry.adapter_faults([found.pipeline]).items():
                 if parameter not in broken:
                     yield LaunchFault(name, text)
@@ -124,7 +124,7 @@ class LaunchCheck:
         return robot_names(urdf, srdf)
 
     def _robot_faults(self) -> Iterator[LaunchFault]:
-        """Yields the planning groups, joints and links that the robot does not have."""
+        """Yields planning groups, joints and links that the robot lacks."""
         robot = self._robot
         for name, value in self._names.naming("group") if robot.groups else ():
             if value not in robot.groups:
@@ -138,7 +138,7 @@ class LaunchCheck:
         yield from self._names.below_trees(self._given, robot.by_kind())
 
     def _kinematics_faults(self) -> Iterator[LaunchFault]:
-        """Yields the groups, solvers and keys of kinematics.yaml that do not exist."""
+        """Yields unknown groups, solvers and keys of kinematics.yaml."""
         groups = self._robot.groups
         for name, value in self.launch.parameters.items():
             _, found, rest = name.partition(f"/{DESCRIPTION}_kinematics/")
@@ -153,7 +153,7 @@ class LaunchCheck:
                 yield unknown_name(name, key, str(value), (NUMERIC, *PLUGINS))
 
     def resolved_parameters(self) -> dict[str, Any]:
-        """Returns the parameters with the defaults of those that are not set; equal for launches that run the same."""
+        """Returns the parameters with defaults for those that are not set; equal for equivalent launches."""
         parameters = self._names.effective_values()
         if self._node is None:
             return parameters
@@ -162,12 +162,12 @@ class LaunchCheck:
         return rest | resolved_names(self.launch, self._node)
 
     def named_solvers(self) -> list[str]:
-        """Returns the kinematics solvers that kinematics.yaml names, one per group."""
+        """Returns the kinematics solver of each group in kinematics.yaml."""
         below, key = f"/{DESCRIPTION}_kinematics/", "/kinematics_solver"
         return [str(value) for name, value in self.launch.parameters.items() if below in name and name.endswith(key)]
 
     def planner(self) -> ResolvedPlanner | None:
-        """Returns what plans for the task; None if the launch has no planner, or none of the name it gives."""
+        """Returns the planner of the task, or None if the launch has no planner of that name."""
         registry, group = self.registry(), str(self.launch.parameters.get("/arm_group_name", ""))
         try:
             return registry.resolve(str(self.launch.parameters.get("/planner_name", "")), group) if registry else None
@@ -175,7 +175,7 @@ class LaunchCheck:
             return None
 
     def _task_faults(self) -> Iterator[LaunchFault]:
-        """Yields what is wrong with the task, its states and templates, or the state machine that is loaded."""
+        """Yields the faults of the task, its states and templates, or of the state machine to load."""
         for node in self.launch.nodes:
             if node.executable == RUN_TASK:
                 own = self.launch.below(node.name)
@@ -220,7 +220,7 @@ class LaunchCheck:
 
 
 class _Names:
-    """The names a task may use; equal ones have equal content, so that a task is checked once for each."""
+    """Hashable names that a task may use, as a cache key of the task check."""
 
     def __init__(self, names: KnownNames) -> None:
         self.names = names
@@ -237,7 +237,7 @@ class _Names:
 def _task_faults(
     script: str, states: tuple[Path, ...], templates: tuple[Path, ...], known: _Names
 ) -> tuple[LaunchFault, ...]:
-    """Returns the faults of a task; a task does not change while an experiment is read."""
+    """Returns the faults of a task; the cache assumes that its files do not change while an experiment is read."""
     try:
         pipeline.check_task(
             default_folders.task_script(Path(script)),
@@ -253,9 +253,9 @@ def _task_faults(
 
 
 def launch_faults(path: str, arguments: Sequence[str]) -> list[str]:
-    """Returns everything that is wrong with the names in a launch file, its arguments and its configuration files.
+    """Returns all faults in the names of a launch file, its arguments and its configuration files.
 
     Raises:
-        roslaunch.core.RLException: The launch file cannot be loaded.
+        roslaunch.core.RLException: The launch file is invalid.
     """
     return [fault.text for fault in LaunchCheck(preview_launch(path, arguments)).faults()]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The objects of an experiment: what is put into the world, and where, in each trial."""
+"""Objects that an experiment spawns in the world, with the distribution of their poses."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from modular_framework_simulation.errors import DescriptionError
 
 POSE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 SURFACE, OLD_SURFACE = "rests_at", "on"
-"""Key of the height of the surface, and its old name, which PyYAML reads and writes as true."""
+"""Key of the surface height, and its former name, which PyYAML reads and writes as true."""
 KEYS = ("model", "name", *POSE_KEYS, SURFACE)
 EXAMPLE = "{model: cube, x: [-0.2, 0.2], y: 0.5, rests_at: 0.84}"
 
 
 @dataclass(frozen=True, slots=True)
 class SceneObject:
-    """An object.
+    """An object that each episode spawns.
 
     Attributes:
         name: Name of the object in the world.
-        model: As the episode needs it: a model's name, or an absolute path.
-        file: Its .sdf file.
-        pose: Distribution of each of x, y, z [m], roll, pitch, yaw [rad] in the world frame; without z it stands on
+        model: Model as the episode needs it: a name or an absolute path.
+        file: SDF file of the model.
+        pose: Distributions of x, y, z [m] and roll, pitch, yaw [rad] in the world frame; without z the object rests on
             a surface.
-        surface: Height of that surface [m]; None with z.
+        surface: Distribution of the surface height [m]; None if z is given.
     """
 
     name: str
@@ -45,12 +45,12 @@ class SceneObject:
     pose: dict[str, Distribution]
     surface: Distribution | None
 
-    def drawn(self, key: tuple[object, ...], index: int) -> dict[str, Any]:
-        """Returns the object with the pose that it has in a trial.
+    def sampled(self, key: tuple[object, ...], index: int) -> dict[str, Any]:
+        """Returns the object with the pose drawn for a trial.
 
         Args:
-            key: What the draws depend on: the experiment's seed, the trial, ...
-            index: Place of the object in the list.
+            key: Key of the random generator: the experiment's seed, the trial, ...
+            index: Index of the object in the list.
         """
         numbers = {
             name: self.pose.get(name, Fixed(0.0)).draw(generator_of(*key, "objects", index, name)) for name in POSE_KEYS
@@ -63,14 +63,14 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True)
 class ObjectNodes:
-    """An object before its model was looked up.
+    """An object whose model is not looked up yet.
 
     Attributes:
-        node: Where it is in the file.
-        model: Name of its model, and where that is.
-        name: Its own name; None for one made from the model's.
-        pose: As of a `SceneObject`.
-        surface: As of a `SceneObject`.
+        node: Mapping of the file.
+        model: Name or path of the model.
+        name: Name of the object; None to derive it from the model.
+        pose: See `SceneObject`.
+        surface: See `SceneObject`.
     """
 
     node: Mapping
@@ -81,7 +81,7 @@ class ObjectNodes:
 
 
 def read_objects(node: Node, reading: Reading) -> list[ObjectNodes] | None:
-    """Reads the list of objects, which may be empty."""
+    """Reads a list of objects; it may be empty."""
     if not isinstance(node, Sequence):
         reading.faults.add(node.location, f"objects must be a list such as [{EXAMPLE}], found {kind_of(node)}")
         return None
@@ -100,13 +100,13 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
         found = f"both z and {SURFACE}" if "z" in node.entries else f"neither z nor {SURFACE}"
         reading.faults.add(
             node.location,
-            f"an object has {found}; allowed is one of them: z, the height of its frame, or {SURFACE}, that of the "
-            "surface it stands on [m]",
+            f"an object has {found}; allowed: z, the height of its frame [m], or {SURFACE}, the height of the surface "
+            "below it [m]",
         )
     pose = {
-        key: drawn
+        key: sampled
         for key in POSE_KEYS
-        if key in node.entries and (drawn := read_distribution(node.entries[key], key, reading)) is not None
+        if key in node.entries and (sampled := read_distribution(node.entries[key], key, reading)) is not None
     }
     surface = read_distribution(node.entries[SURFACE], SURFACE, reading) if SURFACE in node.entries else None
     model = reading.text(node.entries["model"], "model")
@@ -115,7 +115,7 @@ def _read_object(item: Node, reading: Reading) -> ObjectNodes | None:
 
 
 def _renamed(mapping: Mapping) -> Mapping:
-    """Returns the keys of an object with OLD_SURFACE as SURFACE, unless that is there too."""
+    """Returns the mapping with OLD_SURFACE renamed to SURFACE, unless both are present."""
     if SURFACE in mapping.entries:
         return mapping
     names = {key: SURFACE if key == OLD_SURFACE else key for key in mapping.entries}
@@ -127,25 +127,25 @@ def _renamed(mapping: Mapping) -> Mapping:
 
 
 def named_object(found: ObjectNodes, file: Path, taken: set[str], reading: Reading) -> SceneObject:
-    """Returns an object whose model was looked up; notes a fault for a name that another object has.
+    """Returns an object with its model's file; adds a fault if another object has the same name.
 
     Args:
-        found: The object.
-        file: Its .sdf file.
-        taken: Names of the objects before it; gets its own.
-        reading: Where faults are noted.
+        found: Object of the experiment file.
+        file: SDF file of the model.
+        taken: Names of the previous objects; the object's name is added.
+        reading: Reader that collects faults.
     """
     name = found.name or next(
         free for number in range(1, len(taken) + 2) if (free := f"{file.parent.name}_{number}") not in taken
     )
     if name in taken:
         location = found.node.entries["name"].location
-        reading.faults.add(location, f"two objects have the name '{name}'; give one of them another name")
+        reading.faults.add(location, f"two objects have the name '{name}'; rename one of them")
     taken.add(name)
     if found.surface is not None:
         try:
             lowest_point(file, 0.0, 0.0)
         except DescriptionError as error:
-            reading.faults.add(found.node.entries[SURFACE].location, f"the model's lowest point is not known: {error}")
+            reading.faults.add(found.node.entries[SURFACE].location, f"the model has no lowest point: {error}")
     is_path = "/" in found.model or found.model.endswith(".sdf")
     return SceneObject(name, str(file) if is_path else found.model, file, found.pose, found.surface)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a mode finds out about the settings of a combination of levels before any episode runs."""
+"""Result of a mode's check of the settings of a combination, before any episode runs."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class SettingFault:
-    """What is wrong with a setting.
+    """A fault of a setting.
 
     Attributes:
-        keys: Keys that lead to its value in the experiment file, outermost first.
-        text: A sentence.
+        keys: Keys that lead to the value in the experiment file, outermost first.
+        text: Description of the fault.
     """
 
     keys: tuple[str, ...]
@@ -23,12 +23,12 @@ class SettingFault:
 
 @dataclass(frozen=True, slots=True)
 class CheckedSettings:
-    """Settings whose names were looked up.
+    """Settings with resolved names.
 
     Attributes:
-        faults: What is wrong with them.
-        resolved: What runs, as JSON values; equal for settings that run the same.
-        substitutions: What will run in place of what is named where requests need it, known beforehand.
+        faults: Faults of the settings.
+        resolved: Description of the execution as JSON values; equal if the settings execute the same.
+        substitutions: Substitutions of planners by others that some requests need, known in advance.
     """
 
     faults: tuple[SettingFault, ...]
@@ -37,4 +37,4 @@ class CheckedSettings:
 
 
 SettingsCheck = Callable[[Mapping[str, Any]], CheckedSettings]
-"""Looks up the names in the settings of a combination; keys whose values cannot be read are missing."""
+"""Check that resolves the names in the settings of a combination, which lack keys with unreadable values."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts together what the base and the levels of an experiment file set; every value keeps its line and column."""
+"""Merges the settings of the base and of the levels of an experiment file; every value keeps its line and column."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _REFERENCE = re.compile(r"\$(\$|[A-Za-z_][A-Za-z0-9_-]*)")
 
 
 def references(node: Node) -> Iterator[tuple[str, Scalar]]:
-    """Yields each `$NAME` in the texts of a value, with the text it is in."""
+    """Yields each `$NAME` in the texts of a value, with its text."""
     match node:
         case Scalar(value=str(text)):
             for found in _REFERENCE.findall(text):
@@ -31,7 +31,7 @@ def references(node: Node) -> Iterator[tuple[str, Scalar]]:
 
 
 def check_references(node: Node, factors: Map[str, object], faults: FaultList) -> list[str]:
-    """Notes a fault for each `$NAME` that is no factor, and returns these names."""
+    """Adds a fault for each `$NAME` that is not a factor, and returns these names."""
     unknown = []
     for name, text in references(node):
         if name not in factors:
@@ -44,11 +44,11 @@ def check_references(node: Node, factors: Map[str, object], faults: FaultList) -
 
 
 def substituted(node: Node, levels: Map[str, Scalar]) -> Node:
-    """Returns a value in which each `$NAME` is the level of that factor.
+    """Returns a value in which each `$NAME` is replaced by the level of that factor.
 
     Args:
-        node: The value.
-        levels: Level of each factor. A text that is nothing but `$NAME` becomes the level itself, with its type.
+        node: Value of the file.
+        levels: Level of each factor. A text that equals `$NAME` becomes the level itself and keeps its type.
     """
     match node:
         case Scalar(value=str(text)):
@@ -72,12 +72,12 @@ def _text_of(name: str, levels: Map[str, Scalar]) -> str:
 
 
 def level_label(level: Scalar) -> str:
-    """Returns the label of a level."""
+    """Returns the label of a level as text."""
     return str(level.value).lower() if isinstance(level.value, bool) else str(level.value)
 
 
 def merged(base: Mapping, over: Mapping) -> Mapping:
-    """Returns a mapping with the entries of two; where both have mappings, these are merged, else the second wins."""
+    """Returns the base overridden by another mapping; mappings in both are merged recursively."""
     entries, keys = dict(base.entries), base.keys | over.keys
     for key, value in over.entries.items():
         before = entries.get(key)
@@ -87,7 +87,7 @@ def merged(base: Mapping, over: Mapping) -> Mapping:
 
 
 def leaves(node: Mapping, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Node]]:
-    """Yields each value of a mapping and of the mappings in it, with the keys that lead to it."""
+    """Yields the leaf values of nested mappings with the keys that lead to them."""
     for key, value in node.entries.items():
         if isinstance(value, Mapping) and value.entries:
             yield from leaves(value, (*above, key))
@@ -96,7 +96,7 @@ def leaves(node: Mapping, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[s
 
 
 def location_below(node: Mapping, keys: tuple[str, ...]) -> SourceLocation:
-    """Returns where the value is that keys lead to, or the innermost value above it."""
+    """Returns the location of the value that the keys lead to, or of the innermost value above it."""
     found: Node = node
     for key in keys:
         if not isinstance(found, Mapping):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps results in a database, and exports them."""
+"""Stores results in a database, and exports them."""

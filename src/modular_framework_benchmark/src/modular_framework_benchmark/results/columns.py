@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The columns that an experiment adds to Planner Arena's tables: metrics to `runs`, factors to `experiments`."""
+"""Columns that an experiment adds to the tables of Planner Arena: metrics to `runs`, factors to `experiments`."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ SUCCESS = "success"
 
 
 def check_names(description: ExperimentDescription) -> None:
-    """Checks that metrics and factors can be columns, of Planner Arena's tables and of the result table.
+    """Checks that metrics and factors are valid column names of Planner Arena's tables and of the result table.
 
     Raises:
-        DescriptionError: Says every name that cannot.
+        DescriptionError: A name is invalid; the error lists all invalid names.
     """
     factors = [factor.name.lower() for factor in description.factors]
     faults = _metric_faults(description.metrics)
@@ -43,7 +43,7 @@ def _metric_faults(metrics: Sequence[Metric]) -> list[str]:
     for metric in metrics:
         lower = metric.name.lower()
         if not metric.name.isidentifier():
-            faults.append(f"metric {metric.name!r} is no identifier, such as planning_time")
+            faults.append(f"metric {metric.name!r} is not an identifier, such as planning_time")
         elif lower in taken:
             faults.append(f"metric {metric.name!r}: the name is taken")
         elif lower == SUCCESS and (metric.name != SUCCESS or metric.kind is not MetricKind.RATE):
@@ -60,10 +60,10 @@ def metric_column(metric: Metric) -> Column[bool] | Column[float]:
 
 
 def add_metric_columns(connection: Connection, description: ExperimentDescription) -> None:
-    """Adds the columns of the metrics that `runs` lacks.
+    """Adds the missing columns of the metrics to `runs`.
 
     Raises:
-        DescriptionError: A metric was a rate in another experiment of this database and is none here, or the reverse.
+        DescriptionError: The database has a metric of this name with a different kind.
     """
     present = {each["name"].lower(): each for each in inspect(connection).get_columns(RUNS.name)}
     for metric in description.metrics:
@@ -79,13 +79,13 @@ def add_metric_columns(connection: Connection, description: ExperimentDescriptio
 
 
 def factor_columns(connection: Connection, description: ExperimentDescription) -> dict[str, str]:
-    """Adds the columns of the factors that `experiments` lacks; the compared factor is in `plannerConfigs` instead.
+    """Adds the missing columns of the factors to `experiments`; the compared factor is in `plannerConfigs`.
 
-    A factor whose levels are all numbers gets a column of numbers, for Planner Arena compares what looks like a number
-    as one. A factor whose name is taken by another column gets one with `_level` at its end.
+    A factor whose levels are all numbers gets a numeric column, because Planner Arena compares number-like values as
+    numbers. A factor whose name belongs to another column gets the suffix `_level`.
 
     Returns:
-        The column of each factor, by the factor's name.
+        Column name of each factor, keyed by factor name.
     """
     present = {each["name"].lower(): each for each in inspect(connection).get_columns(EXPERIMENTS.name)}
     taken = {column.name for column in EXPERIMENTS.columns} | {"experiment", "planner"}
@@ -108,9 +108,9 @@ def factor_columns(connection: Connection, description: ExperimentDescription) -
 
 
 def insert_row(connection: Connection, row: Insert) -> int:
-    """Inserts a row whose number the database chooses, and returns the number."""
+    """Inserts a row and returns the primary key that the database assigns."""
     key = connection.execute(row).inserted_primary_key
-    assert key is not None  # every insert of one row has one
+    assert key is not None  # the insertion of one row returns its key
     return int(key[0])
 
 

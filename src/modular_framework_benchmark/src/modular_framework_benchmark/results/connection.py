@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Opens the engine of a result database: a SQLite file, or a server that SQLAlchemy knows by a URL."""
+"""Creates the engine of a result database: a SQLite file, or a server that SQLAlchemy addresses by a URL."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 from modular_framework_benchmark.results.errors import DatabaseMissingError, ResultsError
 
 BUSY_TIMEOUT_S = 30.0
-"""How long a write waits for another process: far longer than a report takes to read 100,000 episodes."""
-BEGIN = "sqlite_begin"
+"""Wait of a write for another process: far longer than a report needs to read 100,000 episodes."""
+BEGIN_OPTION = "sqlite_begin"
 PIP_NAMES = {"psycopg": "psycopg[binary]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
-"""What pip calls drivers that are imported by another name."""
+"""Package names on PyPI of drivers whose module has a different name."""
 
 
 @dataclass(frozen=True, slots=True)
 class DatabaseAddress:
-    """Where a result database is.
+    """Address of a result database.
 
     Attributes:
-        label: How to name it to a user, without a password.
-        path: The SQLite file; None for a server.
+        label: Name of the database in messages, without password.
+        path: SQLite file; None for a server.
         url: URL of a server; None for a SQLite file.
     """
 
@@ -37,7 +37,7 @@ class DatabaseAddress:
 
     @property
     def identity(self) -> str:
-        """Returns a text that is the same for every spelling of a database: through links, by any driver or user."""
+        """Returns a text that identifies the database regardless of links, driver and user."""
         if self.url is None:
             return os.path.realpath(self.label)
         server = self.url.host or self.url.query.get("host") or "localhost"
@@ -45,13 +45,13 @@ class DatabaseAddress:
 
 
 def parse_address(target: str | Path) -> DatabaseAddress:
-    """Reads what a user names as database.
+    """Parses the address of a database.
 
     Args:
-        target: Path of a SQLite file, or a URL of SQLAlchemy, such as `postgresql+psycopg://user@host/name`.
+        target: Path of a SQLite file, or SQLAlchemy URL such as `postgresql+psycopg://user@host/name`.
 
     Raises:
-        ResultsError: It is a URL that SQLAlchemy cannot read, or a database in memory.
+        ResultsError: The URL is invalid, or names a database in memory.
     """
     if "://" not in str(target):
         path = Path(target).expanduser().absolute()
@@ -60,7 +60,7 @@ def parse_address(target: str | Path) -> DatabaseAddress:
         url = make_url(str(target))
     except ArgumentError as error:
         raise ResultsError(
-            f"{target}: no URL of a database ({error}); name a file, or DIALECT://USER@HOST/NAME"
+            f"{target}: not a URL of a database ({error}); name a file, or DIALECT://USER@HOST/NAME"
         ) from error
     if url.get_backend_name() != "sqlite":
         return DatabaseAddress(url.render_as_string(hide_password=True), None, url)
@@ -71,21 +71,21 @@ def parse_address(target: str | Path) -> DatabaseAddress:
 
 
 def shown_target(target: str | Path) -> str:
-    """Returns what a user named as database, without a password."""
+    """Returns the address as the user gave it, without password."""
     return parse_address(target).label if "://" in str(target) else str(target)
 
 
 def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool, busy_timeout_s: float) -> Engine:
-    """Makes the engine; connects to nothing yet.
+    """Creates the engine without connecting.
 
     Args:
-        address: Where the database is.
-        create: Makes the SQLite file if there is none.
-        read_only: Refuses every write.
-        busy_timeout_s: How long to wait for another process that writes the SQLite file [s].
+        address: Address of the database.
+        create: Whether to create a missing SQLite file.
+        read_only: Whether to refuse writes.
+        busy_timeout_s: Maximum wait for another process that writes the SQLite file [s].
 
     Raises:
-        DatabaseMissingError: The SQLite file, or the folder it would be made in, is not there.
+        DatabaseMissingError: The SQLite file or its folder does not exist.
         ResultsError: The driver of the server's database is not installed.
     """
     if address.path is None:
@@ -113,9 +113,9 @@ def make_engine(address: DatabaseAddress, *, create: bool, read_only: bool, busy
 
 
 def _sqlite_engine(path: Path, create: bool, read_only: bool, busy_timeout_s: float) -> Engine:
-    """Connections are opened for each use, so that no file handle is shared by threads or forked processes.
+    """Returns an engine that opens a connection per use, so that threads and forked processes share no file handle.
 
-    A reader too opens the file for writing where it may, for only so is a write undone that a killed process left.
+    Readers open the file for writing too if permitted, because only writers roll back the write of a killed process.
     """
     uri = f"file:{urllib.parse.quote(str(path))}?mode={'rwc' if create else 'rw'}"
 
@@ -133,6 +133,6 @@ def _sqlite_engine(path: Path, create: bool, read_only: bool, busy_timeout_s: fl
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
-        connection.exec_driver_sql(connection.get_execution_options().get(BEGIN, "BEGIN"))
+        connection.exec_driver_sql(connection.get_execution_options().get(BEGIN_OPTION, "BEGIN"))
 
     return engine

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The database of results: one SQLite file by default, any server of SQLAlchemy for a team.
+"""Database of results: a SQLite file by default, or a server that SQLAlchemy supports.
 
-Each finished episode is written in one transaction, exactly once. A killed run loses no finished episode: what the
-database holds is enough to resume it.
+Each finished episode is written exactly once, in one transaction. A killed run loses no finished episode and can be
+resumed from the database.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.results import result_tables
 from modular_framework_benchmark.results.connection import (
-    BEGIN,
+    BEGIN_OPTION,
     BUSY_TIMEOUT_S,
     DatabaseAddress,
     make_engine,
@@ -65,11 +65,11 @@ class StoredExperiment:
     """An experiment of a database.
 
     Attributes:
-        id: Its identifier in this database.
-        description: What it compares.
-        planned: Number of its episodes, finished or not.
-        finished: Number of those that have a record.
-        added: When it was added [s since 1970].
+        id: Identifier in the database.
+        description: Description of the experiment.
+        planned: Number of episodes.
+        finished: Number of episodes with a record.
+        added: Time of insertion [s since 1970].
     """
 
     id: int
@@ -82,17 +82,17 @@ class StoredExperiment:
 def open_database(
     target: str | Path, *, create: bool = False, read_only: bool = False, busy_timeout_s: float = BUSY_TIMEOUT_S
 ) -> ResultDatabase:
-    """Opens a result database, checks it, upgrades an older one, and takes in the records that wait beside it.
+    """Opens, checks and upgrades a result database, and imports the records that wait beside the database.
 
     Args:
-        target: Path of a SQLite file, or a URL of SQLAlchemy.
-        create: Makes the database if there is none.
-        read_only: Writes nothing, unless the tables are older than this release.
-        busy_timeout_s: How long to wait for another process that writes the SQLite file [s].
+        target: Path of a SQLite file, or SQLAlchemy URL.
+        create: Whether to create a missing database.
+        read_only: Whether to refuse writes, except an upgrade of older tables.
+        busy_timeout_s: Maximum wait for another process that writes the SQLite file [s].
 
     Raises:
-        StorageError: It is not there, damaged, locked or cannot be written.
-        SchemaVersionError: Its tables are those of a newer version, or of another program.
+        StorageError: The database is missing, damaged, locked or not writable.
+        SchemaVersionError: The tables belong to a newer version or to another program.
     """
     address = parse_address(target)
     engine = make_engine(address, create=create, read_only=read_only, busy_timeout_s=busy_timeout_s)
@@ -107,10 +107,10 @@ def open_database(
 
 
 class ResultDatabase:
-    """An open result database; made by `open_database`. Each process opens its own."""
+    """An open result database, created by `open_database`; each process opens its own."""
 
     def __init__(self, address: DatabaseAddress, engine: Engine) -> None:
-        """Stores the arguments; connects to nothing."""
+        """Stores the arguments without connecting."""
         self._address = address
         self._engine = engine
         self._descriptions: dict[int, ExperimentDescription] = {}
@@ -124,7 +124,7 @@ class ResultDatabase:
         self.close()
 
     def close(self) -> None:
-        """Closes the connections; may be called twice."""
+        """Closes the connections; repeated calls are allowed."""
         self._engine.dispose()
 
     @property
@@ -134,14 +134,14 @@ class ResultDatabase:
 
     @property
     def folder(self) -> Path:
-        """Returns the folder that the folders of episodes are relative to: the file's, or the working folder."""
+        """Returns the base of the episodes' folders: the folder of the SQLite file, or the working directory."""
         return self._address.path.parent if self._address.path else Path.cwd()
 
     def prepare(self, *, read_only: bool) -> bool:
-        """Checks the database, makes its tables if it is new, and takes in waiting records; see `open_database`.
+        """Checks the database, creates the tables of a new one, and imports waiting records; see `open_database`.
 
         Returns:
-            Whether its tables are those of this release now; those that are only read may be older.
+            Whether the tables have this release's version; tables opened read-only may be older.
         """
         self._check_integrity()
         if read_only:
@@ -159,31 +159,31 @@ class ResultDatabase:
                     ],
                 )
             upgrade(connection, self._address)
-            connection.execute(update(SCHEMA).values(version=SCHEMA_VERSION))  # fails now if it cannot be written
-        self._take_in_waiting()
+            connection.execute(update(SCHEMA).values(version=SCHEMA_VERSION))  # fails early if not writable
+        self._import_waiting()
         return True
 
     def add_experiment(self, description: ExperimentDescription, episodes: Sequence[EpisodeSpec]) -> int:
-        """Adds an experiment, or finds it there: then the run resumes, and episodes that are new are added.
+        """Adds an experiment, or the new episodes of an experiment to resume.
 
         Args:
-            description: What it compares.
-            episodes: All its episodes.
+            description: Description of the experiment.
+            episodes: All episodes of the experiment.
 
         Returns:
-            Its identifier in this database.
+            Identifier of the experiment in the database.
 
         Raises:
-            DescriptionError: A name cannot be a column, or the episodes do not fit the description.
-            ExperimentChangedError: An experiment of this name is there, and its episodes are others.
-            StorageError: It cannot be written.
+            DescriptionError: A name is not a valid column, or the episodes do not fit the description.
+            ExperimentChangedError: The database has a different experiment of this name.
+            StorageError: The database is not writable.
         """
         number = self._transact(lambda connection: store_experiment(connection, description, episodes))
         self._descriptions.pop(number, None)
         return number
 
     def experiments(self) -> list[StoredExperiment]:
-        """Returns the experiments in the order in which they were added."""
+        """Returns the experiments in the order of their insertion."""
         with self._reading() as connection:
             counts: dict[int, int] = dict(
                 connection.execute(
@@ -209,7 +209,7 @@ class ResultDatabase:
         """Returns the identifier of an experiment.
 
         Raises:
-            UnknownExperimentError: There is none of this name; names those there are.
+            UnknownExperimentError: The database has no experiment of this name; the error lists the known names.
         """
         with self._reading() as connection:
             known = dict(connection.execute(select(DESCRIPTIONS.c.name, DESCRIPTIONS.c.id)).all())
@@ -235,7 +235,7 @@ class ResultDatabase:
             check_resumed(self._description(connection, number), ran_with)
 
     def pending(self, number: int) -> list[EpisodeSpec]:
-        """Returns the episodes of an experiment that are not finished, in the order of the run."""
+        """Returns the unfinished episodes of an experiment in the order of the run."""
         with self._reading() as connection:
             self._description(connection, number)
             statement = (
@@ -247,20 +247,20 @@ class ResultDatabase:
             return [read_spec(row) for row in connection.execute(statement)]
 
     def write(self, number: int, record: EpisodeRecord) -> bool:
-        """Writes what an episode gave, in one transaction.
+        """Writes the record of an episode in one transaction.
 
         Args:
             number: Identifier of the experiment.
-            record: The record.
+            record: Record of the episode.
 
         Returns:
-            True if it was stored; False if the episode had a record already, which stays, whoever wrote it.
+            True if the record was stored; False if the episode had a record, which is kept.
 
         Raises:
-            RecordNotStoredError: The database could not be written; the record is kept in a file that is taken in when
-                the database is opened next.
+            RecordNotStoredError: The database is not writable; the record is saved in a file, which is imported when
+                the database is next opened.
             RecordRefusedError: The record does not fit the experiment.
-            UnknownExperimentError: There is no such experiment.
+            UnknownExperimentError: The database lacks the experiment.
         """
         try:
             content = record_to_json(record)
@@ -275,15 +275,15 @@ class ResultDatabase:
             raise RecordNotStoredError(error, record.spec.key, saved, content) from error
 
     def record(self, number: int, episode: int) -> EpisodeRecord:
-        """Returns the whole record of an episode.
+        """Returns the complete record of an episode.
 
         Args:
             number: Identifier of the experiment.
-            episode: Number of the episode in it.
+            episode: Number of the episode in the experiment.
 
         Raises:
-            UnknownExperimentError: There is no such experiment.
-            ResultsError: There is no such episode, or it is not finished.
+            UnknownExperimentError: The database lacks the experiment.
+            ResultsError: The episode does not exist, or is not finished.
         """
         with self._reading() as connection:
             description = self._description(connection, number)
@@ -292,42 +292,42 @@ class ResultDatabase:
             ).one_or_none()
             record = None if row is None else read_record(connection, row, description)
         if record is None:
-            state = "is not finished" if row is not None else "is none of its episodes"
+            state = "is not finished" if row is not None else "does not exist"
             raise ResultsError(f"{self.label}: episode {episode} of {description.name!r} {state}; name a finished one")
         return record
 
     def load(self, number: int, *, spans: bool = True) -> ExperimentResults:
-        """Reads the finished episodes of an experiment, also while it runs.
+        """Returns the finished episodes of an experiment, which may still be running.
 
         Args:
             number: Identifier of the experiment.
-            spans: Whether to read the spans too; without, their table is empty.
+            spans: Whether to read the spans; otherwise their table is empty.
 
         Raises:
-            UnknownExperimentError: There is no such experiment.
+            UnknownExperimentError: The database lacks the experiment.
         """
         with self._reading() as connection:
             return result_tables.load_results(connection, number, self._description(connection, number), spans=spans)
 
     def spans(self, number: int, episodes: Collection[int]) -> pd.DataFrame:
-        """Reads the spans of some episodes, by their numbers; the columns are those of `ExperimentResults.spans`."""
+        """Returns the spans of the given episodes with the columns of `ExperimentResults.spans`."""
         with self._reading() as connection:
             self._description(connection, number)
             return result_tables.load_spans(connection, number, episodes)
 
     def span_totals(self, number: int) -> pd.DataFrame:
-        """Adds up the spans of an experiment by kind, name and method; see `result_tables.span_totals`."""
+        """Returns the sums of an experiment's spans by kind, name and method; see `result_tables.span_totals`."""
         with self._reading() as connection:
             return result_tables.span_totals(connection, number, self._description(connection, number))
 
     def snapshot_values(self, number: int, leave_out: Collection[str] = ()) -> dict[str, list[tuple[Any, int]]]:
-        """Returns the different values of each part of the snapshots, with the number of episodes that had each."""
+        """Returns the distinct values of each part of the snapshots, with their numbers of episodes."""
         with self._reading() as connection:
             self._description(connection, number)
             return result_tables.snapshot_values(connection, number, leave_out)
 
     def flagged_episodes(self, number: int, name: str) -> frozenset[int]:
-        """Returns the numbers of the episodes whose snapshots have a part of a name that is true."""
+        """Returns the numbers of the episodes in whose snapshots the named part is true."""
         with self._reading() as connection:
             self._description(connection, number)
             return result_tables.flagged_episodes(connection, number, name)
@@ -341,7 +341,7 @@ class ResultDatabase:
         return self._descriptions[number]
 
     def _transact(self, action: Callable[[Connection], _Result]) -> _Result:
-        """Runs an action in a transaction, again if another process wrote the same row at the same moment."""
+        """Runs an action in a transaction; repeats it if another process wrote the same row simultaneously."""
         for attempt in range(_ATTEMPTS):
             try:
                 with self._writing() as connection:
@@ -354,7 +354,7 @@ class ResultDatabase:
     @contextlib.contextmanager
     def _writing(self) -> Iterator[Connection]:
         with self._translating(), self._engine.connect() as connection:
-            writer = connection.execution_options(**{BEGIN: "BEGIN IMMEDIATE"})
+            writer = connection.execution_options(**{BEGIN_OPTION: "BEGIN IMMEDIATE"})
             with writer.begin():
                 yield writer
 
@@ -379,15 +379,15 @@ class ResultDatabase:
             found = " ".join(connection.exec_driver_sql("PRAGMA quick_check(1)").scalar_one().split())
         if found != "ok":
             raise DatabaseCorruptError(
-                f"{self.label}: it is damaged ({found}); restore a copy, or save what can be read with sqlite3 .recover"
+                f"{self.label}: it is damaged ({found}); restore a copy, or recover its data with sqlite3 .recover"
             )
 
-    def _take_in_waiting(self) -> None:
+    def _import_waiting(self) -> None:
         for waiting in waiting_records(self._address):
             try:
                 self.write(waiting.experiment, waiting.record)
             except (UnknownExperimentError, RecordRefusedError) as error:
-                _LOG.warning("%s: the record waits on: %s", waiting.path, error)
+                _LOG.warning("%s: the record remains unimported: %s", waiting.path, error)
                 continue
             waiting.path.unlink(missing_ok=True)
-            _LOG.info("%s: its record is in %s now", waiting.path, self.label)
+            _LOG.info("%s: its record was imported into %s", waiting.path, self.label)

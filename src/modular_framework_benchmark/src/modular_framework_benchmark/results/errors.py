@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors of the result database: each says which file, what was found, what is allowed and what to do."""
+"""Errors of the result database; each message names the file, the fault, the allowed values and the remedy."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ from sqlalchemy.exc import DBAPIError
 
 
 class ResultsError(Exception):
-    """Base of the errors of this room."""
+    """Base class of the errors of results."""
 
 
 class StorageError(ResultsError):
-    """The database cannot be reached, read or written; an episode that could not be written is kept beside it."""
+    """The database is unreachable, unreadable or not writable; the record of an episode is saved in a file."""
 
 
 class DatabaseMissingError(StorageError):
-    """There is no such file or folder."""
+    """The file or folder does not exist."""
 
 
 class DatabaseFullError(StorageError):
-    """The disk is full, or the file reached its largest size."""
+    """The disk is full, or the file has reached its maximum size."""
 
 
 class DatabaseReadOnlyError(StorageError):
-    """The file, its folder or its file system may not be written."""
+    """The file, its folder or its file system is not writable."""
 
 
 class DatabaseLockedError(StorageError):
-    """Another process kept it locked."""
+    """Another process holds the lock of the database."""
 
 
 class DatabaseCorruptError(StorageError):
-    """The file is damaged, or no SQLite file."""
+    """The file is damaged, or is not a SQLite file."""
 
 
 class SchemaVersionError(ResultsError):
-    """The database has the tables of a newer version, or of another program."""
+    """The tables belong to a newer version or to another program."""
 
 
 class UnknownExperimentError(ResultsError):
-    """The database has no such experiment."""
+    """The database lacks the experiment."""
 
 
 class ExperimentChangedError(ResultsError):
-    """An experiment of this name is in the database already, and it was another one."""
+    """The database has a different experiment of this name."""
 
 
 class DescriptionError(ResultsError):
@@ -57,22 +57,22 @@ class RecordRefusedError(ResultsError):
 
 
 class ExportError(ResultsError):
-    """Results cannot be exported."""
+    """The results cannot be exported."""
 
 
 class RecordNotStoredError(ResultsError):
-    """The database could not be written; the record is kept in a file.
+    """The database is not writable; the record is saved in a file.
 
     Attributes:
-        saved_to: The file with the record; None if no file could be written either.
-        record_json: The record as JSON.
+        saved_to: File with the record; None if no file could be written.
+        record_json: Record as JSON.
     """
 
     def __init__(self, cause: StorageError, key: str, saved_to: Path | None, record_json: str) -> None:
         kept = (
-            f"the record of the episode is kept in {saved_to} and taken in when the database is next opened for writing"
+            f"its record is saved in {saved_to} and will be imported when the database is next opened for writing"
             if saved_to
-            else f"no folder could take the record either, so here it is: {record_json}"
+            else f"no folder could store the record, which is: {record_json}"
         )
         super().__init__(f"{cause}; episode {key!r} is finished: {kept}")
         self.saved_to = saved_to
@@ -85,33 +85,35 @@ _ADVICE: dict[str, tuple[type[StorageError], str]] = {
         DatabaseReadOnlyError,
         "it cannot be written; give write permission to the file and its folder, or name another file",
     ),
-    "SQLITE_BUSY": (DatabaseLockedError, "another process keeps it locked; end that process, then resume"),
-    "SQLITE_LOCKED": (DatabaseLockedError, "another process keeps it locked; end that process, then resume"),
+    "SQLITE_BUSY": (DatabaseLockedError, "another process holds its lock; end that process, then resume"),
+    "SQLITE_LOCKED": (DatabaseLockedError, "another process holds its lock; end that process, then resume"),
     "SQLITE_CORRUPT": (
         DatabaseCorruptError,
-        "it is damaged; restore a copy, or save what can be read with sqlite3 .recover",
+        "it is damaged; restore a copy, or recover its data with sqlite3 .recover",
     ),
-    "SQLITE_NOTADB": (DatabaseCorruptError, "it is no SQLite file; name a result database"),
+    "SQLITE_NOTADB": (DatabaseCorruptError, "it is not a SQLite file; name a result database"),
     "SQLITE_CANTOPEN": (
         DatabaseMissingError,
-        "it cannot be opened; its folder must be there, and the file readable: make the folder, or name another file",
+        "it cannot be opened; create its folder, make the file readable, or name another file",
     ),
     "SQLITE_IOERR": (
         DatabaseFullError,
-        "reading or writing failed; look for a full disk, a quota, a limit of the size of files or a failing disk",
+        "reading or writing failed; check for a full disk, a quota, a file size limit or a failing disk",
     ),
 }
 
 
 def storage_error(error: DBAPIError, where: str) -> StorageError:
-    """Returns the error of this room that stands for an error of the database.
+    """Returns the storage error that corresponds to an error of the database.
 
     Args:
-        error: What SQLAlchemy raised.
-        where: The database, as the user named it.
+        error: Error from SQLAlchemy.
+        where: Label of the database.
     """
     name = str(getattr(error.orig, "sqlite_errorname", ""))
     for prefix, (kind, advice) in _ADVICE.items():
         if name.startswith(prefix):
             return kind(f"{where}: {advice} ({error.orig})")
-    return StorageError(f"{where}: the database refused ({error.orig}); see that it runs and may be used, then resume")
+    return StorageError(
+        f"{where}: the database refused ({error.orig}); check that it runs and permits access, then resume"
+    )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Exports results as CSV or Parquet files, for other programs."""
+"""Exports results as CSV or Parquet files."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from modular_framework_benchmark.results.errors import ExportError
 from modular_framework_benchmark.results.json_records import description_to_json
 
 DESCRIPTION_KEY = b"modular_framework_benchmark.experiment"
-"""Key of the metadata of a Parquet file with the description of the experiment, as JSON."""
+"""Metadata key of a Parquet file for the description of the experiment as JSON."""
 
 
 class TableFormat(Enum):
-    """The kinds of files that tables are exported as; the value is their ending."""
+    """File format of exported tables; the value is the file extension."""
 
     CSV = "csv"
     PARQUET = "parquet"
 
 
 def export_tables(results: ExperimentResults, folder: Path, table_format: TableFormat) -> list[Path]:
-    """Writes the tables of an experiment: a file for its episodes and one for their spans.
+    """Writes the episodes and the spans of an experiment to one file each.
 
-    Missing values are empty in CSV and null in Parquet. A Parquet file has the description of the experiment in its
-    metadata; with CSV it is a file of its own.
+    Missing values are empty in CSV and null in Parquet. The description of the experiment is in the metadata of a
+    Parquet file, and in a separate file for CSV.
 
     Args:
-        results: The results.
-        folder: Where the files are made; made itself if it is not there.
-        table_format: What files.
+        results: Results of the experiment.
+        folder: Folder of the files, created if missing.
+        table_format: Format of the files.
 
     Returns:
-        The files.
+        Paths of the files.
 
     Raises:
-        ExportError: A file is there already, or cannot be written.
+        ExportError: A file exists already, or is not writable.
     """
     stem = file_stem(results.description.name)
     description = description_to_json(results.description)
@@ -62,19 +62,19 @@ def export_tables(results: ExperimentResults, folder: Path, table_format: TableF
 
 
 def file_stem(name: str) -> str:
-    """Returns the name of an experiment as part of a file's name."""
+    """Returns the name of an experiment in a form that is valid in file names."""
     return re.sub(r"[^\w.-]+", "_", name).strip(".") or "experiment"
 
 
 def refuse_present(paths: list[Path]) -> None:
-    """Refuses to overwrite.
+    """Refuses to overwrite files.
 
     Raises:
-        ExportError: Names the files that are there.
+        ExportError: Files exist already; the error lists them.
     """
     present = [str(path) for path in paths if path.exists()]
     if present:
-        raise ExportError(f"{', '.join(present)}: there already; remove what is there, or name another folder")
+        raise ExportError(f"{', '.join(present)}: already exists; remove it, or name another folder")
 
 
 def _write(frame: pd.DataFrame, path: Path, table_format: TableFormat, description: str) -> None:

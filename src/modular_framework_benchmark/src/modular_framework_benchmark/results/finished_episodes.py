@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stores what a finished episode gave, exactly once, and reads it again."""
+"""Stores the record of a finished episode exactly once, and reads it."""
 
 from __future__ import annotations
 
@@ -19,24 +19,30 @@ from modular_framework_benchmark.results.planned_episodes import UNKNOWN_VERSION
 from modular_framework_benchmark.results.schema import EPISODES, EXPERIMENTS, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
 
 STATUS_VALUES = {status: value for value, status in enumerate(EpisodeStatus)}
-"""How Planner Arena's `enums` number the statuses."""
+"""Numbers of the statuses in the table `enums` of Planner Arena."""
 
 
 def store_record(
     connection: Connection, number: int, description: ExperimentDescription, record: EpisodeRecord
 ) -> bool:
-    """Stores the record of an episode, unless it has one.
+    """Stores the record of an episode unless one is stored already.
+
+    Args:
+        connection: Connection to the database.
+        number: Identifier of the experiment.
+        description: Description of the experiment.
+        record: Record of the episode.
 
     Returns:
-        Whether it was stored; False: the episode had a record already, which stays.
+        Whether the record was stored; otherwise the existing record is kept.
 
     Raises:
-        RecordRefusedError: The experiment has no such episode, or a value cannot be stored.
+        RecordRefusedError: The experiment lacks the episode, or a value is invalid.
     """
     episode = find_episode(connection, number, record.spec.key)
     if episode is None:
         raise RecordRefusedError(
-            f"episode {record.spec.key!r} is none of experiment {description.name!r}; add it with add_experiment first"
+            f"experiment {description.name!r} has no episode {record.spec.key!r}; add it with add_experiment first"
         )
     if connection.execute(select(RUNS.c.id).where(RUNS.c.id == episode.id)).one_or_none() is not None:
         return False
@@ -58,36 +64,42 @@ def store_record(
     )
     if record.spans:
         connection.execute(
-            insert(SPANS), [_span_row(episode.id, place, span) for place, span in enumerate(record.spans)]
+            insert(SPANS), [_span_row(episode.id, index, span) for index, span in enumerate(record.spans)]
         )
     _update_condition(connection, episode.experimentid, record)
     return True
 
 
 def find_episode(connection: Connection, number: int, key: str) -> Row[Any] | None:
-    """Finds the row of a planned episode; None if there is none."""
+    """Returns the row of a planned episode, or None if there is none.
+
+    Args:
+        connection: Connection to the database.
+        number: Identifier of the experiment.
+        key: Key of the episode.
+    """
     return connection.execute(
         select(EPISODES).where(EPISODES.c.descriptionid == number, EPISODES.c.key == key)
     ).one_or_none()
 
 
 def metric_values(description: ExperimentDescription, record: EpisodeRecord) -> dict[str, float | bool | None]:
-    """Returns the metrics of a record as `runs` keeps them.
+    """Returns the metrics of a record as stored in `runs`.
 
     Raises:
-        RecordRefusedError: A metric is none of the experiment's, or a rate is neither true nor false.
+        RecordRefusedError: The experiment lacks a metric, or a rate is neither true nor false.
     """
     kinds = {metric.name: metric.kind for metric in description.metrics}
     unknown = sorted(set(record.metrics) - set(kinds) - {SUCCESS})
     if unknown:
         raise RecordRefusedError(
             f"episode {record.spec.key!r} has the metrics {', '.join(unknown)}, which experiment {description.name!r} "
-            f"has not; allowed: {', '.join(sorted(kinds))}; add them to the experiment"
+            f"lacks; allowed: {', '.join(sorted(kinds))}; add them to the experiment"
         )
     values: dict[str, float | bool | None] = {}
     for name, value in record.metrics.items():
         if name == SUCCESS:
-            continue  # the status says it
+            continue  # stored as the status
         values[name] = _number(value)
         if kinds[name] is MetricKind.RATE and values[name] is not None:
             if values[name] not in (0.0, 1.0):
@@ -103,10 +115,10 @@ def _number(value: float | None) -> float | None:
     return None if value is None or math.isnan(value) else float(value)
 
 
-def _span_row(run: int, place: int, span: Span) -> dict[str, Any]:
+def _span_row(run: int, index: int, span: Span) -> dict[str, Any]:
     return {
         "runid": run,
-        "place": place,
+        "place": index,
         "kind": span.kind,
         "name": span.name,
         "started_s": float(span.started_s),
@@ -118,7 +130,7 @@ def _span_row(run: int, place: int, span: Span) -> dict[str, Any]:
 
 
 def _snapshot_value(connection: Connection, name: str, value: Any) -> int:
-    """Returns the row of a value of a snapshot; equal values of all episodes share one."""
+    """Returns the row id of a snapshot value; episodes with equal values share a row."""
     text = to_json(value)
     digest = hashlib.sha256(text.encode()).hexdigest()
     columns = SNAPSHOT_VALUES.c
@@ -132,7 +144,7 @@ def _snapshot_value(connection: Connection, name: str, value: Any) -> int:
 
 
 def _update_condition(connection: Connection, experiment: int, record: EpisodeRecord) -> None:
-    """Adds the episode's time to Planner Arena's experiment, and its version to the first that has one."""
+    """Adds the episode's wall time to the experiment of Planner Arena, and sets the version if unknown."""
     columns = EXPERIMENTS.c
     row = update(EXPERIMENTS).where(columns.id == experiment)
     connection.execute(row.values(totaltime=columns.totaltime + float(record.wall_s)))
@@ -147,12 +159,12 @@ def read_spec(row: Row[Any]) -> EpisodeSpec:
 
 
 def read_record(connection: Connection, row: Row[Any], description: ExperimentDescription) -> EpisodeRecord | None:
-    """Returns what a planned episode gave; None when it is not finished.
+    """Returns the record of a planned episode, or None if the episode is not finished.
 
     Args:
-        connection: The database.
+        connection: Connection to the database.
         row: Row of `episodes`.
-        description: Its experiment.
+        description: Description of the experiment.
     """
     names = [metric.name for metric in description.metrics]
     runs = table(RUNS.name, *map(column, dict.fromkeys([*RUNS.columns.keys(), *names])))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Descriptions and records as JSON text and back."""
+"""Converts descriptions and records to JSON text and back."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from modular_framework_ros.reported_figures import Clock, Source
 
 
 def to_json(value: Any) -> str:
-    """Writes a value as JSON with sorted keys, so that equal values have equal texts.
+    """Returns a value as JSON with sorted keys, so that equal values give equal texts.
 
     Raises:
-        TypeError: A value in it is none of JSON's, of NumPy's, an enumeration or a path.
+        TypeError: The value contains something other than JSON and NumPy values, enumerations and paths.
     """
     return json.dumps(value, sort_keys=True, default=_plain, separators=(",", ":"))
 
@@ -39,12 +39,12 @@ def _plain(value: Any) -> Any:
 
 
 def description_to_json(description: ExperimentDescription) -> str:
-    """Writes a description as JSON."""
+    """Returns a description as JSON."""
     return to_json(asdict(description))
 
 
 def description_from_json(text: str) -> ExperimentDescription:
-    """Reads what `description_to_json` wrote."""
+    """Returns the description from the text of `description_to_json`."""
     content = json.loads(text)
     factors = tuple(Factor(each["name"], tuple(each["levels"])) for each in content.pop("factors"))
     metrics = tuple(
@@ -63,7 +63,7 @@ def description_from_json(text: str) -> ExperimentDescription:
 
 
 def record_to_json(record: EpisodeRecord) -> str:
-    """Writes a record, with what was run, as JSON."""
+    """Returns a record and its episode's specification as JSON."""
     spec = record.spec
     return to_json(
         {
@@ -84,10 +84,10 @@ def record_to_json(record: EpisodeRecord) -> str:
 
 
 def record_from_json(text: str) -> EpisodeRecord:
-    """Reads what `record_to_json` wrote.
+    """Returns the record from the text of `record_to_json`.
 
     Raises:
-        ValueError: It is no JSON, or a status is unknown.
+        ValueError: The text is not JSON, or a status is unknown.
         KeyError, TypeError: A field is missing or unknown.
     """
     content = json.loads(text)

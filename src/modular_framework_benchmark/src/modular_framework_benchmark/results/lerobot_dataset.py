@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes a dataset in the layout of LeRobotDataset v3.0, which learners read.
+"""Writes a dataset in the layout of LeRobotDataset v3.0 for imitation learning.
 
 Layout: `meta/info.json` (features, rate, path patterns), `meta/stats.json`, `meta/tasks.parquet`, `meta/episodes/` (a
-row an episode: length, tasks, where its frames and videos are), `data/` (a row a frame, many episodes a file) and
+row per episode: length, tasks, locations of frames and videos), `data/` (a row per frame, many episodes per file) and
 `videos/`.
 """
 
@@ -29,8 +29,8 @@ from modular_framework_benchmark.results.lerobot_statistics import (
 )
 from modular_framework_benchmark.results.lerobot_videos import (
     CODEC,
-    FILES_A_CHUNK,
-    LARGEST_FILE_MB,
+    FILES_PER_CHUNK,
+    MAX_FILE_MB,
     VIDEO_PATH,
     CameraVideos,
 )
@@ -38,7 +38,7 @@ from modular_framework_benchmark.results.lerobot_videos import (
 FORMAT_VERSION = "v3.0"
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-LARGEST_DATA_FILE_MB = 100
+MAX_DATA_FILE_MB = 100
 IMAGES = "observation.images."
 _SCALARS: dict[str, Any] = {
     "next.done": pa.bool_(),
@@ -52,15 +52,15 @@ _SCALARS: dict[str, Any] = {
 
 
 class LeRobotWriter:
-    """Writes episodes one after another; `close` writes what describes them."""
+    """Writes episodes one after another; `close` writes the metadata."""
 
     def __init__(self, root: Path, frames_per_second: int, robot_type: str) -> None:
-        """Stores the arguments; the first episode decides the features.
+        """Stores the arguments; the first episode determines the features.
 
         Args:
             root: Folder of the dataset.
-            frames_per_second: Rate of the frames.
-            robot_type: What robot, in the dataset's description.
+            frames_per_second: Frame rate [Hz].
+            robot_type: Robot name in the metadata.
         """
         self._root = root
         self._rate = frames_per_second
@@ -89,27 +89,27 @@ class LeRobotWriter:
         """Appends an episode.
 
         Args:
-            frames: What was observed and commanded.
-            videos: Its videos by camera.
-            task: The task in words.
-            succeeded: Whether it succeeded.
+            frames: Observations and actions.
+            videos: Video files, keyed by camera.
+            task: Description of the task.
+            succeeded: Whether the episode succeeded.
 
         Raises:
-            ExportError: Its features are not those of the first episode, or a video cannot be read.
+            ExportError: The features differ from those of the first episode, or a video is unreadable.
         """
         self._check_features(frames, videos)
         row: dict[str, Any] = {"episode_index": self.episodes, "tasks": [task], "length": frames.count}
         found: dict[str, FeatureStatistics] = {}
         for camera, path in videos.items():
             key = f"{IMAGES}{camera}"
-            place = self._cameras[key].add(path, frames.started_s, frames.count)
-            found[key] = image_statistics(place.samples)
-            row |= {f"videos/{key}/chunk_index": place.chunk, f"videos/{key}/file_index": place.file}
-            row |= {f"videos/{key}/from_timestamp": place.from_s, f"videos/{key}/to_timestamp": place.to_s}
+            location = self._cameras[key].add(path, frames.started_s, frames.count)
+            found[key] = image_statistics(location.samples)
+            row |= {f"videos/{key}/chunk_index": location.chunk, f"videos/{key}/file_index": location.file}
+            row |= {f"videos/{key}/from_timestamp": location.from_s, f"videos/{key}/to_timestamp": location.to_s}
         scalars = self._scalars(frames.count, self._tasks.setdefault(task, len(self._tasks)), succeeded)
         found |= {name: feature_statistics(values) for name, values in (frames.values | scalars).items()}
         self._write_data(frames, scalars)
-        row |= {"data/chunk_index": self._file // FILES_A_CHUNK, "data/file_index": self._file % FILES_A_CHUNK}
+        row |= {"data/chunk_index": self._file // FILES_PER_CHUNK, "data/file_index": self._file % FILES_PER_CHUNK}
         row |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + frames.count}
         row |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
         for feature, values in found.items():
@@ -119,7 +119,7 @@ class LeRobotWriter:
         self._frames += frames.count
 
     def close(self) -> None:
-        """Finishes the files and writes the dataset's description."""
+        """Closes the files and writes the metadata."""
         for camera in self._cameras.values():
             camera.close()
         if self._data is not None:
@@ -145,24 +145,24 @@ class LeRobotWriter:
         if frames.names != self._names or cameras != set(self._cameras):
             raise ExportError(
                 f"it has {_listed(frames.names, cameras)}; allowed, as in the first episode: "
-                f"{_listed(self._names, set(self._cameras))}; export the episodes of each robot and camera apart"
+                f"{_listed(self._names, set(self._cameras))}; export the episodes of each robot and camera separately"
             )
 
     def _scalars(self, count: int, task: int, succeeded: bool) -> dict[str, NDArray[Any]]:
-        places = np.arange(count)
-        last = places == count - 1
+        indices = np.arange(count)
+        last = indices == count - 1
         return {
             "next.done": last,
             "next.success": last & succeeded,
-            "timestamp": (places / self._rate).astype(np.float32),
-            "frame_index": places,
+            "timestamp": (indices / self._rate).astype(np.float32),
+            "frame_index": indices,
             "episode_index": np.full(count, self.episodes),
-            "index": self._frames + places,
+            "index": self._frames + indices,
             "task_index": np.full(count, task),
         }
 
     def _write_data(self, frames: EpisodeFrames, scalars: dict[str, NDArray[Any]]) -> None:
-        """Appends the frames as a row group, so that an episode is read without the others."""
+        """Appends the frames as a row group, so that an episode can be read alone."""
         columns = {
             name: pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
             if values.shape[1] > 1
@@ -171,12 +171,12 @@ class LeRobotWriter:
         }
         columns |= {name: pa.array(scalars[name], type=kind) for name, kind in _SCALARS.items()}
         table = pa.table(columns)
-        if self._data is None or self._path.stat().st_size >= LARGEST_DATA_FILE_MB * 2**20:
+        if self._data is None or self._path.stat().st_size >= MAX_DATA_FILE_MB * 2**20:
             if self._data is not None:
                 self._data.close()
             self._file += 1
-            place = {"chunk_index": self._file // FILES_A_CHUNK, "file_index": self._file % FILES_A_CHUNK}
-            self._path = self._root / DATA_PATH.format(**place)
+            location = {"chunk_index": self._file // FILES_PER_CHUNK, "file_index": self._file % FILES_PER_CHUNK}
+            self._path = self._root / DATA_PATH.format(**location)
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._data = pyarrow.parquet.ParquetWriter(self._path, table.schema)
         self._data.write_table(table)
@@ -188,9 +188,9 @@ class LeRobotWriter:
             "total_episodes": self.episodes,
             "total_frames": self.frames,
             "total_tasks": len(self._tasks),
-            "chunks_size": FILES_A_CHUNK,
-            "data_files_size_in_mb": LARGEST_DATA_FILE_MB,
-            "video_files_size_in_mb": LARGEST_FILE_MB,
+            "chunks_size": FILES_PER_CHUNK,
+            "data_files_size_in_mb": MAX_DATA_FILE_MB,
+            "video_files_size_in_mb": MAX_FILE_MB,
             "fps": self._rate,
             "splits": {"train": f"0:{self.episodes}"},
             "data_path": DATA_PATH,
@@ -221,7 +221,7 @@ class LeRobotWriter:
                 },
             }
         scalars = {name: {"dtype": str(kind), "shape": [1], "names": None} for name, kind in _SCALARS.items()}
-        scalars["timestamp"]["dtype"] = "float32"  # Arrow calls it float
+        scalars["timestamp"]["dtype"] = "float32"  # pyarrow prints float32 as float
         return features | scalars
 
     def _write_json(self, name: str, content: object) -> None:

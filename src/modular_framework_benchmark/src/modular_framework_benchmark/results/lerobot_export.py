@@ -21,12 +21,12 @@ DEFAULT_RATE = 30
 
 @dataclass(frozen=True, slots=True)
 class LeRobotSummary:
-    """What an export gave.
+    """Summary of an export.
 
     Attributes:
         episodes: Number of episodes in the dataset.
-        frames: Number of frames in it.
-        skipped: Why episodes are not in it, by their numbers.
+        frames: Number of frames in the dataset.
+        skipped: Reasons of omitted episodes, keyed by episode number.
     """
 
     episodes: int
@@ -42,27 +42,25 @@ def export_lerobot(
     frames_per_second: int = DEFAULT_RATE,
     chosen: Callable[[EpisodeRecord], bool] = lambda record: True,
 ) -> LeRobotSummary:
-    """Writes the episodes that have a recorded trajectory as a LeRobot dataset.
+    """Writes the episodes with a recorded trajectory as a LeRobot dataset.
 
     Args:
-        database: The database; the episodes' files lie beside it.
+        database: Database, whose folder contains the episodes' files.
         number: Identifier of the experiment.
-        folder: The new dataset; not there yet, or empty.
-        frames_per_second: Rate of its frames.
-        chosen: Says which episodes are wanted.
+        folder: Folder of the new dataset; missing or empty.
+        frames_per_second: Frame rate of the dataset [Hz].
+        chosen: Predicate that selects episodes.
 
     Returns:
-        What is in the dataset, and what is not and why.
+        Summary of the dataset with the omitted episodes.
 
     Raises:
-        ExportError: The folder is not empty, the rate is not positive, or no episode can be exported; says why not.
+        ExportError: The folder is not empty, the rate is not positive, or no episode can be exported.
     """
     if frames_per_second < 1:
-        raise ExportError(
-            f"{frames_per_second} frames a second: allowed are whole numbers from 1 on; name another rate"
-        )
+        raise ExportError(f"{frames_per_second} frames a second: allowed are whole numbers from 1; name another rate")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ExportError(f"{folder}: there already; remove what is there, or name another folder")
+        raise ExportError(f"{folder}: already exists; remove it, or name another folder")
     skipped: dict[int, str] = {}
     writer: LeRobotWriter | None = None
     try:
@@ -81,27 +79,27 @@ def export_lerobot(
         if writer is not None:
             writer.close()
     if writer is None or not writer.episodes:
-        reason = next(iter(skipped.values()), "the experiment has no finished episode that was chosen")
+        reason = next(iter(skipped.values()), "no finished episode of the experiment was selected")
         raise ExportError(f"{database.label}: no episode can be exported ({len(skipped)} skipped; first: {reason})")
     return LeRobotSummary(writer.episodes, writer.frames, skipped)
 
 
 def _add(writer: LeRobotWriter, database: ResultDatabase, record: EpisodeRecord, frames_per_second: int) -> None:
     if not record.folder:
-        raise ExportError("it was run without recording its files; run it with them")
+        raise ExportError("its files were not recorded; run it with recording")
     folder = database.folder / record.folder
     frames = read_frames(folder / TRAJECTORY_FILE, frames_per_second)
     writer.add(frames, find_videos(folder), task_of(record), succeeded=record.succeeded)
 
 
 def robot_of(database: ResultDatabase, record: EpisodeRecord) -> str:
-    """Returns the name of the robot of an episode: that of its recorded description, else `unknown`."""
+    """Returns the robot name from the recorded description of an episode, or `unknown`."""
     urdf, _ = read_descriptions(database.folder / record.folder)
     return (urdf and xml_text.parse(urdf, "the recorded robot description").get("name")) or "unknown"
 
 
 def task_of(record: EpisodeRecord) -> str:
-    """Returns the task of an episode in words: what its snapshot says, else the levels of its factors."""
+    """Returns the task of an episode from its snapshot, or the levels of its factors."""
     task = record.snapshot.get("task")
     if isinstance(task, str) and task:
         return task

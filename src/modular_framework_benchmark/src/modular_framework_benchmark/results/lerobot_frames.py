@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the recorded trajectory of an episode as frames of a learner: what was observed and what was commanded.
+"""Reads the recorded trajectory of an episode as frames for imitation learning: observations and actions.
 
-The trajectory file has a row a sample: `time_s`, and `<joint>/position`, `<joint>/velocity`, `<joint>/effort` and
-`<joint>/command` for each joint, and `<object>/x`, `y`, `z`, `qx`, `qy`, `qz`, `qw` for the pose of an object in the
+The trajectory file has a row per sample: `time_s`; `<joint>/position`, `<joint>/velocity`, `<joint>/effort` and
+`<joint>/command` for each joint; `<object>/x`, `y`, `z`, `qx`, `qy`, `qz`, `qw` for the pose of each object in the
 world.
 """
 
@@ -33,12 +33,12 @@ _JOINT_FEATURES = {"position": STATE, "velocity": VELOCITY, "effort": EFFORT, "c
 
 @dataclass(frozen=True, slots=True)
 class EpisodeFrames:
-    """An episode at a constant rate.
+    """An episode sampled at a constant rate.
 
     Attributes:
-        started_s: Time of the first frame [s since the episode began].
-        values: Arrays of shape (frames, width) by the feature's name, such as `observation.state`.
-        names: What the columns of each array are: joints, or `<object>/x`.
+        started_s: Time of the first frame [s since the start of the episode].
+        values: Arrays of shape (frames, width), keyed by feature such as `observation.state`.
+        names: Names of the columns of each array: joints, or `<object>/x`.
     """
 
     started_s: float
@@ -52,26 +52,24 @@ class EpisodeFrames:
 
 
 def read_frames(path: Path, frames_per_second: int) -> EpisodeFrames:
-    """Reads a trajectory file at a constant rate.
+    """Returns the frames of a trajectory file, resampled at a constant rate.
 
-    Measured values are interpolated linearly between samples; a command holds until the next one, and before the first
-    command it is the measured position.
+    Measured values are interpolated linearly between samples. A command is held until the next command; before the
+    first command, the measured position is used.
 
     Args:
-        path: The trajectory file.
-        frames_per_second: Rate of the frames.
+        path: Trajectory file.
+        frames_per_second: Frame rate [Hz].
 
     Raises:
-        ExportError: There is no such file, or it lacks what frames need; says what.
+        ExportError: The file is missing, or lacks data for frames; the error names the data.
     """
     columns = _read_columns(path)
     times = columns.pop(TIME_COLUMN)
     if not np.all(np.diff(times) > 0.0) or not np.all(np.isfinite(times)):
-        raise ExportError(
-            f"{path}: its times do not increase; allowed: each later than the one before; record it again"
-        )
+        raise ExportError(f"{path}: its times do not increase; allowed: strictly increasing times; record it again")
     count = int(np.floor((times[-1] - times[0]) * frames_per_second + 1e-6)) + 1
-    moments = times[0] + np.arange(count) / frames_per_second
+    times_s = times[0] + np.arange(count) / frames_per_second
     values: dict[str, list[NDArray[np.float64]]] = {}
     names: dict[str, list[str]] = {}
     for name, samples in columns.items():
@@ -80,16 +78,16 @@ def read_frames(path: Path, frames_per_second: int) -> EpisodeFrames:
         if not feature or not known.any():
             continue
         if feature == ACTION:
-            frames = _held(times, samples, columns.get(f"{part}/position"), moments)
+            frames = _held_commands(times, samples, columns.get(f"{part}/position"), times_s)
         else:
-            frames = np.interp(moments, times[known], samples[known])
+            frames = np.interp(times_s, times[known], samples[known])
         values.setdefault(feature, []).append(frames)
         names.setdefault(feature, []).append(part)
     missing = {STATE, ACTION} - set(values)
     if missing:
         raise ExportError(
-            f"{path}: has no values for {', '.join(sorted(missing))}; allowed: columns <joint>/position and "
-            "<joint>/command with numbers, as episodes of the mode task record them"
+            f"{path}: has no values for {', '.join(sorted(missing))}; allowed: numeric columns <joint>/position and "
+            "<joint>/command, as recorded in the mode task"
         )
     arrays = {name: np.stack(parts, axis=1).astype(np.float32) for name, parts in values.items()}
     return EpisodeFrames(float(times[0]), arrays, {name: tuple(parts) for name, parts in names.items()})
@@ -97,11 +95,11 @@ def read_frames(path: Path, frames_per_second: int) -> EpisodeFrames:
 
 def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
     if not path.is_file():
-        raise ExportError(f"{path}: there is no such file; the episode was run without recording its trajectory")
+        raise ExportError(f"{path}: there is no such file; the trajectory was not recorded")
     try:
         table = pyarrow.parquet.read_table(path)
     except (OSError, pa.ArrowException) as error:
-        raise ExportError(f"{path}: no Parquet file ({error}); record the episode again") from error
+        raise ExportError(f"{path}: not a Parquet file ({error}); record the episode again") from error
     if TIME_COLUMN not in table.column_names or not table.num_rows:
         raise ExportError(f"{path}: has no samples with {TIME_COLUMN}; record the episode again")
     return {name: _numbers(table[name]) for name in table.column_names if pa.types.is_floating(table[name].type)}
@@ -113,7 +111,7 @@ def _numbers(column: Any) -> NDArray[np.float64]:
 
 
 def _feature_of(column: str) -> tuple[str, str]:
-    """Returns the feature that a column belongs to and its name there; ("", "") for a column of neither kind."""
+    """Returns the feature and the name of a column; ("", "") for a column of no feature."""
     subject, _, part = column.rpartition("/")
     if subject and part in _JOINT_FEATURES:
         return _JOINT_FEATURES[part], subject
@@ -122,11 +120,11 @@ def _feature_of(column: str) -> tuple[str, str]:
     return "", ""
 
 
-def _held(
+def _held_commands(
     times: NDArray[np.float64],
     commands: NDArray[np.float64],
     positions: NDArray[np.float64] | None,
-    moments: NDArray[np.float64],
+    times_s: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     known = np.isfinite(commands)
     first = int(np.argmax(known))
@@ -135,4 +133,4 @@ def _held(
     if positions is not None:
         held[:first] = positions[:first]
     held[:first] = np.where(np.isfinite(held[:first]), held[:first], commands[first])
-    return held[np.clip(np.searchsorted(times, moments + 1e-9, side="right") - 1, 0, len(times) - 1)]
+    return held[np.clip(np.searchsorted(times, times_s + 1e-9, side="right") - 1, 0, len(times) - 1)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Statistics of the features of a LeRobot dataset, by which learners normalise them."""
+"""Statistics of the features of a LeRobot dataset, used for normalisation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def feature_statistics(values: NDArray[np.generic]) -> FeatureStatistics:
     """Returns the statistics of a feature over the frames of an episode.
 
     Args:
-        values: Shape (frames,) or (frames, width).
+        values: Values of the feature, shape (frames,) or (frames, width).
 
     Returns:
         `min`, `max`, `mean`, `std` and quantiles of shape (width,), and `count` of shape (1,).
@@ -28,18 +28,18 @@ def feature_statistics(values: NDArray[np.generic]) -> FeatureStatistics:
         "mean": rows.mean(axis=0),
         "std": rows.std(axis=0),
         "count": np.array([len(rows)]),
-        **{name: np.quantile(rows, share, axis=0) for name, share in QUANTILES.items()},
+        **{name: np.quantile(rows, level, axis=0) for name, level in QUANTILES.items()},
     }
 
 
 def image_statistics(images: NDArray[np.uint8]) -> FeatureStatistics:
-    """Returns the statistics of images by colour, of values from 0 to 1.
+    """Returns the statistics of images per colour channel, with values scaled to [0, 1].
 
     Args:
-        images: Some frames of an episode, of shape (images, height, width, 3).
+        images: Sampled frames of an episode, shape (images, height, width, 3).
 
     Returns:
-        As `feature_statistics`, each of shape (3, 1, 1); `count` is the number of images.
+        Statistics as in `feature_statistics`, of shape (3, 1, 1); `count` is the number of images.
     """
     found = feature_statistics(images.reshape(-1, 3) / 255.0)
     shaped = {name: value.reshape(3, 1, 1) for name, value in found.items() if name != "count"}
@@ -47,10 +47,10 @@ def image_statistics(images: NDArray[np.uint8]) -> FeatureStatistics:
 
 
 def joined_statistics(parts: Sequence[FeatureStatistics]) -> FeatureStatistics:
-    """Joins the statistics of episodes into those of the dataset.
+    """Returns the statistics of the dataset from those of its episodes.
 
-    Mean and deviation are exact (Chan et al., parallel variance). Quantiles cannot be had from quantiles: as LeRobot
-    does it, the lower ones are the smallest and the upper ones the largest of the episodes'.
+    Mean and deviation are exact (Chan et al., parallel variance). Quantiles cannot be combined exactly: as in LeRobot,
+    lower quantiles are the minimum and upper quantiles the maximum over the episodes.
     """
     counts = np.stack([part["count"] for part in parts]).astype(np.float64)
     means = np.stack([part["mean"] for part in parts])
@@ -64,9 +64,9 @@ def joined_statistics(parts: Sequence[FeatureStatistics]) -> FeatureStatistics:
         "std": np.sqrt((variances * weights).sum(axis=0)),
         "count": counts.sum(axis=0).astype(np.int64),
     }
-    for name, share in QUANTILES.items():
+    for name, level in QUANTILES.items():
         stacked = np.stack([part[name] for part in parts])
-        joined[name] = stacked.min(axis=0) if share <= 0.5 else stacked.max(axis=0)
+        joined[name] = stacked.min(axis=0) if level <= 0.5 else stacked.max(axis=0)
     return joined
 
 

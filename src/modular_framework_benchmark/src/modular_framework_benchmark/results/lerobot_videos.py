@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the videos of episodes into the video files of a LeRobot dataset: many episodes a file, one file a camera."""
+"""Writes videos into the files of a LeRobot dataset: one sequence of files per camera, many episodes per file."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from modular_framework_benchmark.results.errors import ExportError
 
 VIDEO_PATTERN = "video*.mp4"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
-LARGEST_FILE_MB = 200
-FILES_A_CHUNK = 1000
+MAX_FILE_MB = 200
+FILES_PER_CHUNK = 1000
 CODEC = "libx264"
-PIXELS = "yuv420p"
-PIXELS_OF_ODD_SIZES = "yuv444p"
+EVEN_SIZE_PIXELS = "yuv420p"
+ODD_SIZE_PIXELS = "yuv444p"
 _SAMPLED_IMAGES = 20
 
 
 @dataclass(frozen=True, slots=True)
-class VideoPlace:
-    """Where the frames of an episode are.
+class VideoLocation:
+    """Location of the frames of an episode.
 
     Attributes:
         chunk: Index of the folder.
-        file: Index of the file in it.
-        from_s: Start in the file [s].
-        to_s: End in the file [s].
-        samples: Some of the frames, of shape (images, height, width, 3).
+        file: Index of the file in the folder.
+        from_s: Start time in the file [s].
+        to_s: End time in the file [s].
+        samples: Sampled frames, shape (images, height, width, 3).
     """
 
     chunk: int
@@ -46,15 +46,21 @@ class VideoPlace:
 
 
 def find_videos(folder: Path) -> dict[str, Path]:
-    """Returns the videos of an episode by camera: `video.mp4` is that of `scene`, `video_NAME.mp4` that of NAME."""
+    """Returns the videos of an episode by camera: `video.mp4` shows `scene`, `video_NAME.mp4` shows NAME."""
     return {path.stem.removeprefix("video").lstrip("_") or "scene": path for path in sorted(folder.glob(VIDEO_PATTERN))}
 
 
 class CameraVideos:
-    """Writes the videos of one camera; `close` finishes the file."""
+    """Writes the videos of a camera; `close` finishes the file."""
 
     def __init__(self, root: Path, key: str, frames_per_second: int) -> None:
-        """Stores the arguments: folder of the dataset, feature of the camera, and rate."""
+        """Stores the arguments.
+
+        Args:
+            root: Folder of the dataset.
+            key: Feature name of the camera.
+            frames_per_second: Frame rate of the dataset [Hz].
+        """
         self._root = root
         self._key = key
         self._rate = frames_per_second
@@ -64,38 +70,38 @@ class CameraVideos:
         self._stream: Any = None
         self._path = root
         self.shape: tuple[int, int] | None = None
-        self.pixels = PIXELS
+        self.pixels = EVEN_SIZE_PIXELS
 
-    def add(self, source: Path, started_s: float, count: int) -> VideoPlace:
-        """Appends the frames of an episode, at the rate of the dataset.
+    def add(self, source: Path, started_s: float, count: int) -> VideoLocation:
+        """Appends the frames of an episode at the rate of the dataset.
 
         Args:
-            source: The episode's video, whose first frame is the beginning of the episode.
-            started_s: Time of the first frame of the dataset's episode [s since the episode began].
+            source: Video of the episode, which begins at the start of the episode.
+            started_s: Time of the first frame to append [s since the start of the episode].
             count: Number of frames.
 
         Raises:
-            ExportError: The video cannot be read, has no frames, or another size than those before.
+            ExportError: The video is unreadable, has no frames, or differs in size from the previous videos.
         """
-        if self._container is None or self._path.stat().st_size >= LARGEST_FILE_MB * 2**20:
+        if self._container is None or self._path.stat().st_size >= MAX_FILE_MB * 2**20:
             self._open_next()
         begin = self._frames
-        every = max(1, count // _SAMPLED_IMAGES)
+        stride = max(1, count // _SAMPLED_IMAGES)
         samples = []
-        for place, image in enumerate(frames_at(source, started_s + np.arange(count) / self._rate)):
+        for index, image in enumerate(frames_at(source, started_s + np.arange(count) / self._rate)):
             self._encode(image, source)
-            if place % every == 0:
+            if index % stride == 0:
                 samples.append(image)
-        return VideoPlace(
-            self._index // FILES_A_CHUNK,
-            self._index % FILES_A_CHUNK,
+        return VideoLocation(
+            self._index // FILES_PER_CHUNK,
+            self._index % FILES_PER_CHUNK,
             begin / self._rate,
             self._frames / self._rate,
             np.stack(samples),
         )
 
     def close(self) -> None:
-        """Finishes the file; may be called twice."""
+        """Finishes the file; repeated calls are allowed."""
         if self._container is not None:
             for packet in self._stream.encode() if self._stream is not None else ():
                 self._container.mux(packet)
@@ -107,7 +113,7 @@ class CameraVideos:
         self._index += 1
         self._frames = 0
         self._path = self._root / VIDEO_PATH.format(
-            video_key=self._key, chunk_index=self._index // FILES_A_CHUNK, file_index=self._index % FILES_A_CHUNK
+            video_key=self._key, chunk_index=self._index // FILES_PER_CHUNK, file_index=self._index % FILES_PER_CHUNK
         )
         self._path.parent.mkdir(parents=True, exist_ok=True)
         self._container = av.open(str(self._path), "w")
@@ -118,12 +124,12 @@ class CameraVideos:
             self.shape = shape
         if shape != self.shape:
             raise ExportError(
-                f"{source}: its size is {shape}, allowed is {self.shape}, that of the first; export it apart"
+                f"{source}: its size is {shape}; allowed: {self.shape}, the size of the first; export it separately"
             )
         if self._stream is None:
             self._stream = self._container.add_stream(CODEC, rate=self._rate)
             self._stream.height, self._stream.width = shape
-            self.pixels = PIXELS if not (shape[0] % 2 or shape[1] % 2) else PIXELS_OF_ODD_SIZES
+            self.pixels = EVEN_SIZE_PIXELS if not (shape[0] % 2 or shape[1] % 2) else ODD_SIZE_PIXELS
             self._stream.pix_fmt = self.pixels
             self._stream.gop_size = 2  # learners seek single frames
         frame = av.VideoFrame.from_ndarray(image, format="rgb24")
@@ -134,18 +140,18 @@ class CameraVideos:
             self._container.mux(packet)
 
 
-def frames_at(source: Path, moments: NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
-    """Reads the frames that a video shows at given moments; before its first frame that, after its last the last.
+def frames_at(source: Path, times_s: NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
+    """Yields the frame that a video shows at each of the given times.
 
     Args:
-        source: The video.
-        moments: Times in it, increasing [s], of shape (n,).
+        source: Video file.
+        times_s: Increasing times in the video [s], shape (n,). Times outside the video give its first or last frame.
 
     Yields:
         Images of shape (height, width, 3).
 
     Raises:
-        ExportError: It cannot be read, or has no frames.
+        ExportError: The video is unreadable, or has no frames.
     """
     try:
         with av.open(str(source)) as container:
@@ -153,10 +159,10 @@ def frames_at(source: Path, moments: NDArray[np.float64]) -> Iterator[NDArray[np
             shown = next(decoded, None)
             if shown is None:
                 raise ExportError(f"{source}: has no frames; record the episode again")
-            coming = next(decoded, None)
-            for moment in moments:
-                while coming is not None and float(coming.time or 0.0) <= moment + 1e-6:
-                    shown, coming = coming, next(decoded, None)
+            following = next(decoded, None)
+            for moment in times_s:
+                while following is not None and float(following.time or 0.0) <= moment + 1e-6:
+                    shown, following = following, next(decoded, None)
                 yield np.asarray(shown.to_ndarray(format="rgb24"), dtype=np.uint8)
     except (FFmpegError, IndexError) as error:
-        raise ExportError(f"{source}: no video that can be read ({error}); record the episode again") from error
+        raise ExportError(f"{source}: not a readable video ({error}); record the episode again") from error

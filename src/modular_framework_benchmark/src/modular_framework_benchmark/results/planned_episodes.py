@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stores the episodes that an experiment plans, and checks that a resumed experiment is still the same."""
+"""Stores the planned episodes of an experiment, and checks that a resumed experiment is unchanged."""
 
 from __future__ import annotations
 
@@ -27,19 +27,24 @@ from modular_framework_benchmark.results.errors import DescriptionError, Experim
 from modular_framework_benchmark.results.json_records import description_from_json, description_to_json, to_json
 from modular_framework_benchmark.results.schema import DESCRIPTIONS, EPISODES, EXPERIMENTS, PLANNER_CONFIGS, RUNS
 
-MOST_NAMED = 6
+MAX_LISTED = 6
 UNKNOWN_VERSION = "0.0.0"
-"""What Planner Arena is shown until the first episode says its version."""
+"""Version in Planner Arena until the first episode reports its version."""
 
 
 def store_experiment(
     connection: Connection, description: ExperimentDescription, episodes: Sequence[EpisodeSpec]
 ) -> int:
-    """Stores an experiment and its episodes, or finds it there and adds the episodes that are new.
+    """Stores a new experiment with its episodes, or the new episodes of a stored experiment.
+
+    Args:
+        connection: Connection to the database.
+        description: Description of the experiment.
+        episodes: All episodes of the experiment.
 
     Raises:
-        DescriptionError: A name cannot be a column, two episodes are the same, or settings are no JSON values.
-        ExperimentChangedError: An experiment of this name is there, and is another one.
+        DescriptionError: A name is not a valid column, an episode occurs twice, or settings are not JSON values.
+        ExperimentChangedError: The database has a different experiment of this name.
     """
     check_names(description)
     specs = _by_key(description, episodes)
@@ -53,13 +58,13 @@ def store_experiment(
         old = description_from_json(stored.content)
         _check_ran_with(old, description)
         new = {} if stored.digest == description.digest else _new_episodes(connection, number, old, description, specs)
-        looked = bool(new) or (old.sequential and not description.sequential)
-        description = replace(description, extended=old.extended or (looked and _any_finished(connection, number)))
+        analysed = bool(new) or (old.sequential and not description.sequential)
+        description = replace(description, extended=old.extended or (analysed and _any_finished(connection, number)))
     content = {"digest": description.digest, "content": description_to_json(description)}
     connection.execute(update(DESCRIPTIONS).where(DESCRIPTIONS.c.id == number).values(content))
     add_metric_columns(connection, description)
     if new:
-        _insert_episodes(connection, number, description, new, whole=specs)
+        _insert_episodes(connection, number, description, new, all_specs=specs)
     return number
 
 
@@ -84,17 +89,17 @@ def _by_key(description: ExperimentDescription, episodes: Sequence[EpisodeSpec])
 
 
 def _check_ran_with(old: ExperimentDescription, new: ExperimentDescription) -> None:
-    """Refuses to go on with other files, packages or parameters; further levels may bring further ones."""
+    """Refuses changed files, packages or parameters; new levels may add new ones."""
     if new.ran_with:
         _refuse_changed(new.name, [name for name, digests in old.ran_with.items() if _beyond(digests, new, name)])
 
 
 def check_resumed(stored: ExperimentDescription, ran_with: Mapping[str, str]) -> None:
-    """Checks that the remaining episodes of an experiment run with what its first episodes ran with.
+    """Checks that the remaining episodes of an experiment use the same files, packages and parameters as the first.
 
     Args:
         stored: Description of the experiment in the database.
-        ran_with: Digests of what the remaining episodes will run with, see `run_digests`.
+        ran_with: Digests for the remaining episodes, see `run_digests`.
 
     Raises:
         ExperimentChangedError: A file, a package or a parameter is different.
@@ -105,10 +110,10 @@ def check_resumed(stored: ExperimentDescription, ran_with: Mapping[str, str]) ->
 
 def _refuse_changed(experiment: str, changed: list[str]) -> None:
     if changed:
-        names = ", ".join(sorted(changed)[:MOST_NAMED]) + (" and others" if len(changed) > MOST_NAMED else "")
+        names = ", ".join(sorted(changed)[:MAX_LISTED]) + (" and others" if len(changed) > MAX_LISTED else "")
         raise ExperimentChangedError(
             f"the database has episodes of {experiment!r} that ran with another state of {names}; allowed: the same "
-            "as then; restore it, or give the experiment another name, or use another database"
+            "state; restore it, or give the experiment another name, or use another database"
         )
 
 
@@ -124,12 +129,12 @@ def _new_episodes(
     new: ExperimentDescription,
     specs: Mapping[str, EpisodeSpec],
 ) -> dict[str, EpisodeSpec]:
-    """Returns what a larger design adds; every stored episode must be part of it, unchanged."""
+    """Returns the episodes that a larger design adds; it must contain every stored episode unchanged."""
     stored = _stored_episodes(connection, number)
     difference = _difference(old, new) or _first_difference(stored, specs)
     added = {key: spec for key, spec in specs.items() if key not in stored}
     if not difference and not added:
-        difference = "what its methods run with differs, though the episodes have the same names and settings"
+        difference = "the software of its methods differs, while episodes and settings are the same"
     if difference:
         raise ExperimentChangedError(
             f"the database has another experiment called {new.name!r}: {difference}; allowed: the same experiment, or "
@@ -179,24 +184,24 @@ def _insert_episodes(
     number: int,
     description: ExperimentDescription,
     new: Mapping[str, EpisodeSpec],
-    whole: Mapping[str, EpisodeSpec],
+    all_specs: Mapping[str, EpisodeSpec],
 ) -> None:
-    """Numbers keep the order of the design; those of a later extension follow the stored ones."""
+    """Inserts new episodes in the order of the design; the numbers of an extension follow the stored numbers."""
     last = connection.execute(
         select(func.max(EPISODES.c.number)).where(EPISODES.c.descriptionid == number)
     ).scalar_one_or_none()
     settings = {key: _settings_text(spec) for key, spec in new.items()}
     methods, conditions = _known_rows(connection, number, description)
-    _insert_methods(connection, description, whole, methods)
-    _insert_conditions(connection, description, whole, conditions)
+    _insert_methods(connection, description, all_specs, methods)
+    _insert_conditions(connection, description, all_specs, conditions)
     rows = []
-    for place, spec in enumerate(new.values()):
+    for index, spec in enumerate(new.values()):
         rows.append(
             {
                 "descriptionid": number,
                 "experimentid": conditions[_condition(description, spec.configuration)],
                 "plannerid": methods[spec.configuration[description.compared]],
-                "number": spec.number if last is None else last + 1 + place,
+                "number": spec.number if last is None else last + 1 + index,
                 "key": spec.key,
                 "trial": spec.trial,
                 "seed": spec.seed,
@@ -239,12 +244,12 @@ def _known_rows(
 def _insert_methods(
     connection: Connection,
     description: ExperimentDescription,
-    whole: Mapping[str, EpisodeSpec],
+    all_specs: Mapping[str, EpisodeSpec],
     methods: dict[str, int],
 ) -> None:
-    """Each method is a planner of Planner Arena; its settings are those that all its episodes share."""
+    """Inserts each method as a planner of Planner Arena, with the settings that all its episodes share."""
     shared: dict[str, dict[str, Any]] = {}
-    for spec in whole.values():
+    for spec in all_specs.values():
         known = shared.setdefault(spec.configuration[description.compared], dict(spec.settings))
         for name in [each for each, value in known.items() if spec.settings.get(each) != value]:
             del known[name]
@@ -260,15 +265,15 @@ def _insert_methods(
 def _insert_conditions(
     connection: Connection,
     description: ExperimentDescription,
-    whole: Mapping[str, EpisodeSpec],
+    all_specs: Mapping[str, EpisodeSpec],
     conditions: dict[tuple[str, ...], int],
 ) -> None:
-    """Each combination of the other factors' levels is an experiment of Planner Arena, its levels parameters."""
+    """Inserts each combination of the other factors' levels as an experiment of Planner Arena with parameters."""
     names = factor_columns(connection, description)
     others = [factor for factor in description.factors if factor.name != description.compared]
-    wanted = {_condition(description, spec.configuration): 0 for spec in whole.values()}
+    wanted = {_condition(description, spec.configuration): 0 for spec in all_specs.values()}
     per_method: dict[tuple[str, tuple[str, ...]], int] = {}
-    for spec in whole.values():
+    for spec in all_specs.values():
         pair = (spec.configuration[description.compared], _condition(description, spec.configuration))
         per_method[pair] = per_method.get(pair, 0) + 1
     for (_, condition), count in per_method.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the finished episodes of an experiment into tables, a column at a time."""
+"""Reads the finished episodes of an experiment into tables, column by column."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ SPAN_COLUMNS = ("number", "kind", "name", "started_s", "ended_s", "outcome", "fa
 def load_results(
     connection: Connection, number: int, description: ExperimentDescription, *, spans: bool = True
 ) -> ExperimentResults:
-    """Reads an experiment's finished episodes.
+    """Returns the finished episodes of an experiment.
 
     Args:
-        connection: The database.
+        connection: Connection to the database.
         number: Identifier of the experiment.
-        description: Its description.
-        spans: Whether to read the spans too; an empty table otherwise.
+        description: Description of the experiment.
+        spans: Whether to read the spans; otherwise their table is empty.
     """
     planned = connection.execute(select(func.count()).where(EPISODES.c.descriptionid == number)).scalar_one()
     episodes = load_episodes(connection, number, description)
@@ -36,7 +36,13 @@ def load_results(
 
 
 def load_episodes(connection: Connection, number: int, description: ExperimentDescription) -> pd.DataFrame:
-    """Reads the table of episodes that `ExperimentResults` describes."""
+    """Returns the table of episodes that `ExperimentResults` describes.
+
+    Args:
+        connection: Connection to the database.
+        number: Identifier of the experiment.
+        description: Description of the experiment.
+    """
     metrics = [metric.name for metric in description.metrics if metric.name != SUCCESS]
     runs = table(RUNS.name, *map(column, [*RUNS.columns.keys(), *metrics]))
     planned = EPISODES.c
@@ -68,10 +74,10 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
 
 
 def load_spans(connection: Connection, number: int, numbers: Collection[int] | None = None) -> pd.DataFrame:
-    """Reads the table of spans that `ExperimentResults` describes.
+    """Returns the table of spans that `ExperimentResults` describes.
 
     Args:
-        connection: The database.
+        connection: Connection to the database.
         number: Identifier of the experiment.
         numbers: Numbers of the episodes whose spans are read; None for all.
     """
@@ -89,12 +95,17 @@ def load_spans(connection: Connection, number: int, numbers: Collection[int] | N
 
 
 def span_totals(connection: Connection, number: int, description: ExperimentDescription) -> pd.DataFrame:
-    """Adds the spans up in the database, for experiments whose spans are too many to read.
+    """Returns sums over the spans, computed in the database because spans can be too many to read.
+
+    Args:
+        connection: Connection to the database.
+        number: Identifier of the experiment.
+        description: Description of the experiment.
 
     Returns:
-        A row for each kind, name and method, with the columns `kind`, `name`, the compared factor's name, `count`,
-        `ended` (how many have an end), `failed`, `total_s` (sum of the durations of those that ended) and `covered_s`
-        (time in which at least one of them ran: spans of an episode that overlap count once).
+        A row per kind, name and method with the columns `kind`, `name`, the compared factor's name, `count`,
+        `ended` (number of ended spans), `failed`, `total_s` (sum of the durations of ended spans) and `covered_s`
+        (time with at least one span running: overlapping spans of an episode count once).
     """
     one_kind = (SPANS.c.runid, SPANS.c.kind, SPANS.c.name)
     order = (SPANS.c.started_s, SPANS.c.place)
@@ -111,7 +122,7 @@ def span_totals(connection: Connection, number: int, description: ExperimentDesc
         select(spans.c.kind, spans.c.name, spans.c.configuration)
         .add_columns(func.count().label("count"), func.count(spans.c.ended_s).label("ended"))
         .add_columns(func.count().filter(spans.c.failed).label("failed"))
-        .add_columns(func.sum(spans.c.ended_s - spans.c.started_s).label("total_s"))  # without those that did not end
+        .add_columns(func.sum(spans.c.ended_s - spans.c.started_s).label("total_s"))  # unended spans have no duration
         .add_columns(func.sum(spans.c.alone_s).label("covered_s"))
         .group_by(spans.c.kind, spans.c.name, spans.c.configuration)
     )
@@ -126,16 +137,15 @@ def span_totals(connection: Connection, number: int, description: ExperimentDesc
 def snapshot_values(
     connection: Connection, number: int, leave_out: Collection[str] = ()
 ) -> dict[str, list[tuple[Any, int]]]:
-    """Reads what the episodes ran with.
+    """Returns the distinct values of the episodes' snapshots.
 
     Args:
-        connection: The database.
+        connection: Connection to the database.
         number: Identifier of the experiment.
-        leave_out: Names of the snapshots that are not read.
+        leave_out: Names of the parts to skip.
 
     Returns:
-        For each name of the snapshots, its different values, each with the number of episodes that had it, the most
-        frequent first.
+        Distinct values of each part with their numbers of episodes, most frequent first, keyed by part name.
     """
     rows = connection.execute(
         select(RECORDS.c.snapshot, func.count())
@@ -158,10 +168,10 @@ def snapshot_values(
 
 
 def flagged_episodes(connection: Connection, number: int, name: str) -> frozenset[int]:
-    """Returns the numbers of the episodes whose snapshots have a part that is true.
+    """Returns the numbers of the episodes in whose snapshots a part is true.
 
     Args:
-        connection: The database.
+        connection: Connection to the database.
         number: Identifier of the experiment.
         name: Name of the part.
     """
@@ -186,7 +196,7 @@ def _read_columns(connection: Connection, statement: Select[Any]) -> dict[str, A
 
 
 def _problem(settings: str) -> str:
-    """Returns what the settings of an episode say of the problem that was drawn for its trial."""
+    """Returns the problem in the settings of an episode as canonical JSON."""
     return json.dumps(json.loads(settings).get("problem"), sort_keys=True)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of a result database: those of OMPL's Planner Arena, and those it lacks.
+"""Tables of a result database: those of OMPL's Planner Arena, and additional ones.
 
-Planner Arena shows every column of `runs` from the fourth on as an attribute, and every column of `experiments` from
-the thirteenth on as a filter. So metrics are columns of `runs`, factors are columns of `experiments`, and whatever
-else is kept of an episode lies in tables that Planner Arena does not read.
+Planner Arena shows every column of `runs` from the fourth as an attribute, and every column of `experiments` from the
+thirteenth as a filter. Metrics are therefore columns of `runs` and factors are columns of `experiments`; all other data
+of an episode is in tables that Planner Arena does not read.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from sqlalchemy import (
 from sqlalchemy.types import TypeEngine
 
 SCHEMA_VERSION = 2
-"""Raised, with a migration in `schema_upgrade`, whenever older programs could not read or write the tables."""
+"""Version of the tables, incremented with a migration in `schema_upgrade` when older programs become incompatible."""
 
 METADATA = MetaData()
 REAL_NUMBER: TypeEngine[float] = Double().with_variant(REAL(), "sqlite")
@@ -146,6 +146,6 @@ SCHEMA = Table("schema_version", METADATA, Column("version", Integer, nullable=F
 RESULT_COLUMNS = frozenset(
     "number trial seed status outcome cause begun wall_s simulated_s folder worker drawn_problem".split()
 )
-"""Columns of the table of results that every experiment has: no factor and no metric may have these names."""
+"""Columns of the result table that every experiment has; factors and metrics must not use these names."""
 ARENA_COLUMNS = frozenset({"id", "experimentid", "plannerid", "experiment", "planner", "version"})
-"""Columns that Planner Arena joins to every run: no metric may have these names."""
+"""Columns that Planner Arena joins to every run; metrics must not use these names."""

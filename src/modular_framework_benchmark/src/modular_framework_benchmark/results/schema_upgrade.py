@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Brings the tables of an older release to those of this one, version by version, and keeps a copy of the database.
+"""Upgrades the tables of an older release version by version, and keeps a copy of the database.
 
-A SQLite file is copied as a whole beside itself. On a server each table that changes is copied within the database.
-Copy and upgrade are one transaction: an upgrade that fails or is killed leaves the old tables.
+A SQLite file is copied beside the original. On a server, each changed table is copied within the database. Copy and
+upgrade are one transaction: an upgrade that fails or is killed leaves the old tables.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Migration:
-    """What brings the tables of a version to the next one.
+    """Upgrade of the tables from one version to the next.
 
     Attributes:
-        changed: Tables whose rows or columns it changes.
-        apply: Changes them.
+        changed: Tables whose rows or columns change.
+        apply: Function that performs the change.
     """
 
     changed: tuple[Table, ...]
@@ -42,12 +42,12 @@ def stored_version(connection: Connection, label: str) -> int:
     """Returns the version of the tables.
 
     Raises:
-        SchemaVersionError: It is another program's database, or this release cannot read its version.
+        SchemaVersionError: The database belongs to another program, or has an unsupported version.
     """
     tables = inspect(connection).get_table_names()
     if SCHEMA.name not in tables:
         raise SchemaVersionError(
-            f"{label} is no result database: its tables are {', '.join(tables) or 'none'}; name another file"
+            f"{label} is not a result database: its tables are {', '.join(tables) or 'none'}; name another file"
         )
     version = int(connection.execute(select(SCHEMA.c.version)).scalar_one())
     if version > SCHEMA_VERSION:
@@ -64,15 +64,15 @@ def stored_version(connection: Connection, label: str) -> int:
 
 
 def upgrade(connection: Connection, address: DatabaseAddress) -> None:
-    """Brings the tables to this release's version; does nothing if they have it.
+    """Upgrades the tables to this release's version if they are older.
 
     Args:
-        connection: Within a transaction that other writers wait for.
-        address: Where the database is.
+        connection: Connection in a transaction that blocks other writers.
+        address: Address of the database.
 
     Raises:
         SchemaVersionError: See `stored_version`.
-        DatabaseFullError: There is no space for the copy.
+        DatabaseFullError: The copy does not fit on the disk.
     """
     version = stored_version(connection, address.label)
     if version == SCHEMA_VERSION:
@@ -94,10 +94,10 @@ def _copy_file(path: Path, version: int) -> str:
     except sqlite3.Error as error:
         copy.unlink(missing_ok=True)
         raise DatabaseFullError(
-            f"{path}: version {version} needs an upgrade, and no copy of it could be made as {copy} ({error}); free "
+            f"{path}: version {version} needs an upgrade, but its copy {copy} could not be written ({error}); free "
             "space and give write permission to the folder"
         ) from error
-    return f"the database as it was is {copy}"
+    return f"the original database is {copy}"
 
 
 def _copy_tables(connection: Connection, steps: list[Migration], version: int) -> str:
@@ -106,30 +106,30 @@ def _copy_tables(connection: Connection, steps: list[Migration], version: int) -
     for name in names:
         copy = quote(f"{name}_version_{version}")
         connection.exec_driver_sql(f"CREATE TABLE {copy} AS SELECT * FROM {quote(name)}")
-    return f"the tables as they were are {', '.join(f'{name}_version_{version}' for name in names)}"
+    return f"the original tables are {', '.join(f'{name}_version_{version}' for name in names)}"
 
 
-_CLOCKS_OF_1 = {
+_CLOCKS_OF_VERSION_1 = {
     "simulated time": ("task_time", "motion_duration", "execution_time", "grasp_time", "hold_time"),
     "real time": ("task_wall_time", "generation_time", "planning_time", "search_time", "solving_time"),
 }
 
 
-def _say_clocks(connection: Connection) -> None:
-    """Version 1 to 2: descriptions say by which clock a metric is measured, and by whom; episodes may be invalid."""
+def _add_clocks(connection: Connection) -> None:
+    """Upgrades version 1 to 2: descriptions name the clock and source of each metric; episodes may be invalid."""
     connection.execute(insert(ENUMS).values(name="status", value=4, description="invalid"))
-    clocks = {name: clock for clock, names in _CLOCKS_OF_1.items() for name in names}
+    clocks = {name: clock for clock, names in _CLOCKS_OF_VERSION_1.items() for name in names}
     for row in connection.execute(select(DESCRIPTIONS.c.id, DESCRIPTIONS.c.content)).all():
         content: Mapping[str, Any] = json.loads(row.content)
         for metric in content["metrics"]:
-            said = content["mode"] == "task" and metric["component"] == "generation"
+            by_method = content["mode"] == "task" and metric["component"] == "generation"
             metric |= {
                 "clock": clocks.get(metric["name"]) if metric["component"] != "own" else None,
-                "source": "said by the method" if said else "measured",
+                "source": "said by the method" if by_method else "measured",
             }
         text = json.dumps(content, sort_keys=True, separators=(",", ":"))
         connection.execute(update(DESCRIPTIONS).where(DESCRIPTIONS.c.id == row.id).values(content=text))
 
 
-MIGRATIONS: Mapping[int, Migration] = {1: Migration((DESCRIPTIONS, ENUMS), _say_clocks)}
-"""By the version that they begin with."""
+MIGRATIONS: Mapping[int, Migration] = {1: Migration((DESCRIPTIONS, ENUMS), _add_clocks)}
+"""Migrations, keyed by the version they start from."""

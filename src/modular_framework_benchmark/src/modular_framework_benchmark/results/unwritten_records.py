@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps records that the database could not take as JSON files, until it can."""
+"""Saves records that the database cannot store as JSON files, for a later import."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class UnwrittenRecord:
-    """A record that waits in a file.
+    """A record that waits in a file for its import.
 
     Attributes:
-        path: The file.
+        path: File of the record.
         experiment: Identifier of the experiment in the database.
-        record: What the episode gave.
+        record: Record of the episode.
     """
 
     path: Path
@@ -38,10 +38,10 @@ class UnwrittenRecord:
 
 
 def waiting_folders(address: DatabaseAddress) -> list[Path]:
-    """Returns the folders where records of a database may wait, the preferred one first.
+    """Returns the folders for waiting records of a database, the preferred folder first.
 
-    Beside the database; where ROS keeps its files; in the system's folder for temporary files: they lie on other file
-    systems, as a rule, when the first one is full or read-only.
+    The folders are beside the database, in the ROS home and in the temporary folder. The latter two are usually on
+    other file systems, which helps if the first is full or read-only.
     """
     mark = hashlib.sha256(address.identity.encode()).hexdigest()[:16]
     ros_home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
@@ -51,10 +51,15 @@ def waiting_folders(address: DatabaseAddress) -> list[Path]:
 
 
 def keep_record(address: DatabaseAddress, experiment: int, record: EpisodeRecord) -> Path | None:
-    """Writes a record into the first folder that takes it.
+    """Writes a record into the first writable folder.
+
+    Args:
+        address: Address of the database.
+        experiment: Identifier of the experiment.
+        record: Record of the episode.
 
     Returns:
-        The file; None if no folder took it.
+        Path of the file, or None without a writable folder.
     """
     content = to_json(
         {"database": address.label, "experiment": experiment, "record": json.loads(record_to_json(record))}
@@ -66,25 +71,25 @@ def keep_record(address: DatabaseAddress, experiment: int, record: EpisodeRecord
             _require_own(folder)
             write_atomically(folder / f"{name}.json", content)
         except OSError as error:
-            _LOG.warning("%s takes no record: %s", folder, error)
+            _LOG.warning("%s cannot store a record: %s", folder, error)
             continue
         return folder / f"{name}.json"
     return None
 
 
 def _require_own(path: Path) -> None:
-    """Raises PermissionError unless a file or folder is the user's own and nobody else may write it."""
+    """Raises PermissionError unless the user owns the path and no other user may write it."""
     found = path.lstat()
     if stat.S_ISLNK(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o022:
         raise PermissionError(
-            errno.EPERM, f"others could have filled it ({stat.filemode(found.st_mode)}, user {found.st_uid})", str(path)
+            errno.EPERM, f"other users may write it ({stat.filemode(found.st_mode)}, user {found.st_uid})", str(path)
         )
 
 
 def waiting_records(address: DatabaseAddress) -> Iterator[UnwrittenRecord]:
-    """Reads the records that wait for a database; a file that cannot be read stays, with a warning.
+    """Yields the records that wait for a database; an unreadable file is kept, with a warning.
 
-    Only files and folders count that belong to the user and that nobody else may write.
+    Files and folders that another user owns or may write are ignored.
     """
     for folder in waiting_folders(address):
         try:
@@ -94,7 +99,7 @@ def waiting_records(address: DatabaseAddress) -> Iterator[UnwrittenRecord]:
             paths = sorted(folder.glob("*.json"))
         except OSError as error:
             _LOG.warning(
-                "records in %s are not taken in: %s; remove it, or make it your own (chmod 700)", folder, error
+                "records in %s are not imported: %s; remove it, or make it your own (chmod 700)", folder, error
             )
             continue
         for path in paths:
@@ -103,4 +108,4 @@ def waiting_records(address: DatabaseAddress) -> Iterator[UnwrittenRecord]:
                 content = json.loads(read_text(path))
                 yield UnwrittenRecord(path, int(content["experiment"]), record_from_json(json.dumps(content["record"])))
             except (OSError, ValueError, KeyError, TypeError) as error:
-                _LOG.warning("%s: no record of an episode (%s); it is left there: repair or remove it", path, error)
+                _LOG.warning("%s: not a record of an episode (%s); it is kept: repair or remove it", path, error)

@@ -61,7 +61,7 @@ def summarise(results: ExperimentResults, levels: str = "") -> tuple[MethodSumma
     """
     table = EpisodeTable(results)
     return tuple(
-        dataclasses.replace(summary, levels=levels, sentence=sentences.join(levels, summary.sentence))
+        dataclasses.replace(summary, levels=levels, sentence=sentences.with_levels(levels, summary.sentence))
         for metric in metrics_of(results)
         for method in methods_of(results)
         for summary in [summarise_method(table, metric, method)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Looks up in the ROS packages what an experiment file refers to."""
+"""Looks up the references of an experiment file in the ROS packages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import roslaunch.core
 import roslaunch.substitution_args
 import rospkg
 
-from modular_framework_benchmark.experiments.surroundings import NotThere
+from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.launch_arguments import (
@@ -23,8 +23,8 @@ from modular_framework_core.launching.launch_arguments import (
 from modular_framework_core.launching.launch_values import file_faults
 
 
-class RosSurroundings:
-    """Looks things up by ROS_PACKAGE_PATH; implements `Surroundings`."""
+class RosResourceLookup:
+    """Lookup through ROS_PACKAGE_PATH; implements `ResourceLookup`."""
 
     def __init__(self) -> None:
         self._packages = rospkg.RosPack()
@@ -35,40 +35,40 @@ class RosSurroundings:
             return Path(self._packages.get_path(name))
         except rospkg.ResourceNotFound as error:
             hint = nearest(name, self._packages.list())
-            raise NotThere(
+            raise UnresolvedReference(
                 f"there is no package '{name}'{hint}; build and source the workspace that has it, or correct the name"
             ) from error
 
     def launch_file(self, name: str) -> Path:
-        """Returns the path of PACKAGE/FILE, or of a file from /."""
+        """Returns the path of a launch file from PACKAGE/FILE or an absolute path."""
         if name.startswith("/"):
             if Path(name).is_file():
                 return Path(name)
-            raise NotThere(f"there is no launch file {name}; allowed: PACKAGE/FILE, or a path from /")
+            raise UnresolvedReference(f"there is no launch file {name}; allowed: PACKAGE/FILE, or a path from /")
         package, _, file = name.partition("/")
         if not file:
-            raise NotThere(
-                f"'{name}' is no launch file; allowed: PACKAGE/FILE such as {API_PACKAGE}/start_framework.launch"
+            raise UnresolvedReference(
+                f"'{name}' is not a launch file; allowed: PACKAGE/FILE such as {API_PACKAGE}/start_framework.launch"
             )
         folder = self.package(package) / "launch"
         if (folder / file).is_file():
             return folder / file
         files = sorted(found.name for found in folder.glob("*.launch"))
-        raise NotThere(
+        raise UnresolvedReference(
             f"package {package} has no launch file '{file}'; {listing(files, 'it has none')}{nearest(file, files)}"
         )
 
     def launch_arguments(self, launch: str) -> Mapping[str, str | None]:
-        """Returns the arguments of a launch file, with their defaults."""
+        """Returns the arguments of a launch file with their defaults."""
         return _known(str(self.launch_file(launch)))
 
     def launch_faults(self, launch: str, arguments: Mapping[str, str]) -> Sequence[str]:
-        """Returns what is wrong with the values of arguments."""
+        """Returns the errors in the values of launch arguments."""
         path = str(self.launch_file(launch))
         return _argument_faults(path, tuple(f"{name}:={value}" for name, value in arguments.items()))
 
     def task(self, name: str, folder: Path) -> str:
-        """Returns the path of a task of the API package, or of one's own."""
+        """Returns the path of a task of the API package or of the user."""
         own = (folder / Path(name).expanduser()).resolve()
         if own.is_file():
             return str(own)
@@ -76,28 +76,37 @@ class RosSurroundings:
         if name == Path(name).name and (scripts / name).is_file():
             return str(scripts / name)
         there = sorted(found.name for found in scripts.glob("*.yaml"))
-        raise NotThere(f"there is no task '{name}'; {listing(there)}, or the path of a file{nearest(name, there)}")
+        raise UnresolvedReference(
+            f"there is no task '{name}'; {listing(there)}, or the path of a file{nearest(name, there)}"
+        )
 
     def model(self, name: str, launch: str, arguments: Mapping[str, str], folder: Path) -> Path:
-        """Returns the .sdf file of a model."""
+        """Returns the SDF file of a model.
+
+        Args:
+            name: Name of a model in the description package, or path of an .sdf file.
+            launch: Launch file that names the description package.
+            arguments: Arguments of the launch file.
+            folder: Base of relative paths.
+        """
         if "/" in name or name.endswith(".sdf"):
             own = (folder / Path(name).expanduser()).resolve()
             if own.is_file():
                 return own
-            raise NotThere(f"there is no model file {own}; give the path of an .sdf file")
+            raise UnresolvedReference(f"there is no model file {own}; give the path of an .sdf file")
         models = self._description(launch, arguments) / "models"
         if (models / name / "model.sdf").is_file():
             return models / name / "model.sdf"
         there = sorted(found.parent.name for found in models.glob("*/model.sdf"))
-        raise NotThere(f"there is no model '{name}'; {listing(there)}{nearest(name, there)}")
+        raise UnresolvedReference(f"there is no model '{name}'; {listing(there)}{nearest(name, there)}")
 
     def _description(self, launch: str, arguments: Mapping[str, str]) -> Path:
         path = str(self.launch_file(launch))
         values = _values(path, tuple(f"{name}:={value}" for name, value in arguments.items() if ":=" not in value))
         package = values.get("description_package", "")
         if not package:
-            raise NotThere(
-                f"{launch} has no argument description_package, so models are not found by name; give a path"
+            raise UnresolvedReference(
+                f"{launch} has no argument description_package to find models by name; give the path of the model"
             )
         return self.package(package)
 
@@ -107,7 +116,7 @@ def _known(path: str) -> dict[str, str | None]:
     try:
         return {name: default for name, (_, default) in known_arguments(path).items()}
     except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException) as error:
-        raise NotThere(f"{path} is no launch file that can be used: {error}") from error
+        raise UnresolvedReference(f"{path} is not a valid launch file: {error}") from error
 
 
 @lru_cache(maxsize=4096)
@@ -126,4 +135,4 @@ def _values(path: str, arguments: tuple[str, ...]) -> dict[str, str]:
     try:
         return argument_values(path, list(arguments))
     except (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, ValueError) as error:
-        raise NotThere(f"{path} cannot be read with these arguments: {error}") from error
+        raise UnresolvedReference(f"{path} cannot be read with these arguments: {error}") from error
