@@ -13,7 +13,11 @@ from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import Point, Pose
 from sensor_msgs.msg import JointState
 
-from modular_framework_benchmark.episodes.ros_recording import joint_states_in_turn, missing_turns, write_recording
+from modular_framework_benchmark.episodes.ros_recording import (
+    count_missing_samples,
+    periodic_joint_states,
+    write_recording,
+)
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.results.lerobot_frames import ACTION, read_frames
 
@@ -38,21 +42,21 @@ def test_states_of_moments_when_time_stood_still_are_left_out() -> None:
     in_turn = published(4.0)
     stood_still = [round(time_s / STEP_S) * STEP_S + 2 * STEP_S for time_s in (0.5, 0.52, 1.234, 3.0)]
     mixed = states(sorted(in_turn + stood_still))
-    kept = joint_states_in_turn(mixed, RATE)
+    kept = periodic_joint_states(mixed, RATE)
     assert [state.position[0] for state in kept] == in_turn
 
 
 def test_controllers_of_different_joints_have_a_state_each() -> None:
     times_s = published(1.0)
     mixed = [*states(times_s, ("pan",)), *states(times_s, ("finger", "thumb"))]
-    assert len(joint_states_in_turn(mixed, RATE)) == 2 * len(times_s)
+    assert len(periodic_joint_states(mixed, RATE)) == 2 * len(times_s)
 
 
 def test_lost_states_are_counted() -> None:
     times_s = np.array(published(2.0))
-    assert missing_turns(times_s, RATE) == 0
-    assert missing_turns(np.delete(times_s, [10, 11, 40]), RATE) == 3
-    assert missing_turns(times_s[:0], RATE) == 0
+    assert count_missing_samples(times_s, RATE) == 0
+    assert count_missing_samples(np.delete(times_s, [10, 11, 40]), RATE) == 3
+    assert count_missing_samples(times_s[:0], RATE) == 0
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ def test_a_task_is_an_argument_and_truths_are_written_as_roslaunch_reads_them() 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"launch": "nothing"}, "'launch' is 'nothing'; allowed is PACKAGE/FILE.launch"),
+        ({"launch": "nothing"}, "'launch' is 'nothing'; allowed: PACKAGE/FILE.launch"),
         ({"objects": [{"model": "can", "x": 0}]}, "number 0: y, z is missing"),
         ({"objects": [{"model": "can", "x": 0, "y": "a", "z": 0}]}, "could not convert"),
         ({"success": {"lifted": 0.1}}, "names no object"),

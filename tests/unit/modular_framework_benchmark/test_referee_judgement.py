@@ -26,20 +26,19 @@ JUMP = {"number": 7, "time_s": 3.0, "what": "a jump of 'cube' by 0.500 m", "call
         ([RESTART, RESET], ""),
         (
             [RESTART, PUT],
-            "the world was changed beside its physics by '/method', as it calls itself: /gazebo/set_model_state at "
-            "2.500 s",
+            "the world was changed outside its physics by a node named '/method': /gazebo/set_model_state at 2.500 s",
         ),
-        ([RESTART, JUMP], "the world was changed beside its physics: a jump of 'cube' by 0.500 m at 3.000 s"),
+        ([RESTART, JUMP], "the world was changed outside its physics: a jump of 'cube' by 0.500 m at 3.000 s"),
         (
             [RESTART, JUMP, PUT],
-            "the world was changed beside its physics: a jump of 'cube' by 0.500 m at 3.000 s, and 1 more",
+            "the world was changed outside its physics: a jump of 'cube' by 0.500 m at 3.000 s, and 1 more",
         ),
     ],
 )
 def test_changes_since_the_objects_were_placed_are_foul_unless_the_task_made_them(
     interventions: list[dict[str, Any]], foul: str
 ) -> None:
-    assert Judgement((), {}, interventions).foul(since=4) == foul
+    assert Judgement((), {}, interventions).interference(since=4) == foul
 
 
 def test_the_latest_intervention_is_where_the_episode_begins() -> None:
@@ -80,16 +79,15 @@ def test_messages_of_another_node_than_the_topics_own_are_dropped_and_named(monk
     WireFake.send(GRASPED, "/gazebo", "cube")
     WireFake.send(REPORTS, "/move_group", '{"kind": "plan"}')
     WireFake.send(TASK_STATUS, "/task", '{"event": "task_end", "succeeded": false}')
-    assert samples.foul() == ""
+    assert samples.interference() == ""
 
     WireFake.send(REPORTS, "/viewer", '{"kind": "plan"}')  # of no consequence, and not counted either
-    assert samples.foul() == "" and len(samples.planning) == 1
+    assert samples.interference() == "" and len(samples.planning) == 1
     WireFake.send(GRASPED, "/method", "cube")
     WireFake.send(TASK_STATUS, "/method", '{"event": "task_end", "succeeded": true}')
-    assert samples.foul() == (
-        "'/method', as it calls itself, publishes /gazebo/grasped_object; "
-        "'/method', as it calls itself, publishes task_status"
+    assert samples.interference() == (
+        "a node named '/method' publishes /gazebo/grasped_object; a node named '/method' publishes task_status"
     )
     assert [end["succeeded"] for end in samples.ends] == [False]
     samples.clear()
-    assert samples.foul() == "" and samples.ends == []
+    assert samples.interference() == "" and samples.ends == []

@@ -75,7 +75,7 @@ def test_a_documented_substitution_is_recorded_and_the_episode_counts(tmp_path: 
 def test_an_episode_in_which_another_planner_ran_is_invalid_and_says_which(tmp_path: Path) -> None:
     record = record_of(tmp_path, stack(tmp_path, plan("RRTConnect", "compiled", replaced="BKPIECEE")))
     assert record.status is EpisodeStatus.BROKEN
-    assert record.cause == ("what ran is not what was named: planner 'BKPIECEE' was named, and RRTConnect planned")
+    assert record.cause == ("the named software did not run: planner 'BKPIECEE' was named, and RRTConnect planned")
 
 
 def test_a_sequence_that_failed_says_what_planned_its_motions(tmp_path: Path) -> None:
@@ -83,7 +83,7 @@ def test_a_sequence_that_failed_says_what_planned_its_motions(tmp_path: Path) ->
     record = record_of(tmp_path, stack(tmp_path, {"kind": "sequence", "error_code": -1, "runs": runs}))
     assert set(record.snapshot["planners"]) == {"LIN of ompl", "RRTConnect of ompl"}
     assert record.status is EpisodeStatus.BROKEN
-    assert record.cause == "what ran is not what was named: planner 'BKPIECEE' was named, and RRTConnect planned"
+    assert record.cause == "the named software did not run: planner 'BKPIECEE' was named, and RRTConnect planned"
 
 
 def test_the_digest_of_a_method_changes_with_its_sources_and_not_with_caches(tmp_path: Path) -> None:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs an episode on the real stack and records it."""
+"""Runs and records episodes on the real stack."""

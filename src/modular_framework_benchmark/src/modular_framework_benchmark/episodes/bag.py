@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Records all topics of a ROS master to a bag, with rosbag, as long as an episode lasts."""
+"""Records all topics of a ROS master to a bag during an episode."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ END_TIMEOUT_S = 30.0
 
 
 class BagRecording:
-    """A process that records, on the master that the environment names."""
+    """A rosbag process on the master of the environment."""
 
     def __init__(self, folder: Path) -> None:
-        """Starts it.
+        """Starts the recording.
 
         Args:
-            folder: Where `episode.bag` goes, and `bag.txt`, what rosbag printed.
+            folder: Folder of `episode.bag` and of `bag.txt`, the output of rosbag.
         """
         self.path, self._log_path = folder / BAG, folder / BAG_LOG
         command = ["rosrun", "rosbag", "record", "--all", "-O", str(self.path), f"__name:={NODE}"]
@@ -31,16 +31,16 @@ class BagRecording:
             self._process = subprocess.Popen(command, stdout=log_file, stderr=log_file, start_new_session=True)
 
     def check(self) -> None:
-        """Raises BagError when the process has ended."""
+        """Raises BagError if the process has ended."""
         if self._process.poll() is not None:
             lines = self._log_path.read_text(errors="replace").strip().splitlines()
             raise BagError(
                 f"{self.path} is not recorded: rosbag {lines[-1] if lines else f'exited with {self._process.poll()}'}; "
-                "install python3-rosbag, or leave out `record: {bag: true}`"
+                "install python3-rosbag, or remove `record: {bag: true}`"
             )
 
     def close(self) -> None:
-        """Ends the recording and waits until the file is complete. May be called twice."""
+        """Ends the recording and waits until the file is complete; repeated calls are allowed."""
         self._signal(signal.SIGINT)
         try:
             self._process.wait(END_TIMEOUT_S)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the record of an episode from how it ended and from the files it left."""
+"""Creates the record of an episode from its end and its files."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from modular_framework_benchmark.records.what_ran import WhatRan
 
 TASK_RECORDS = "task_records"
 PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
-"""Parts of an episode in their order, and the moment at which each ends."""
-KEPT_OF_ANSWER = ("shake_fault", "video_fault", "recording_fault", "world_digest", COLD_START)
+"""Parts of an episode in their order, with the moment that ends each."""
+SNAPSHOT_KEYS = ("shake_fault", "video_fault", "recording_fault", "world_digest", COLD_START)
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeEnd:
-    """How an episode ended.
+    """End of an episode.
 
     Attributes:
-        spec: What was run.
-        folder: Folder with its files.
-        begun: When it started [s since 1970].
-        begun_monotonic: The same by the machine's monotonic clock [s].
-        load: Load of the machine at its start.
-        status: How it ended.
-        cause: Why it did not succeed.
-        answer: What the recorder answered.
-        stop_s: How long it took to stop the stack [s].
-        target: Name of the object that success is about; "" for none.
+        spec: Specification of the episode.
+        folder: Folder of the episode's files.
+        begun: Start time [s since 1970].
+        begun_monotonic: Start time by the machine's monotonic clock [s].
+        load: Load of the machine at the start.
+        status: Final status.
+        cause: Cause of a failure.
+        answer: Answer of the recorder.
+        stop_s: Duration of the shutdown of the stack [s].
+        target: Name of the object in the success criteria; "" for none.
     """
 
     spec: EpisodeSpec
@@ -60,34 +60,40 @@ class EpisodeEnd:
     target: str = ""
 
     def broken(self, cause: str) -> EpisodeEnd:
-        """Returns the end of an episode that could not be run."""
+        """Returns the end of an episode that could not run."""
         return replace(self, status=EpisodeStatus.BROKEN, cause=cause)
 
     def ended(self, status: EpisodeStatus, cause: str, answer: Mapping[str, Any]) -> EpisodeEnd:
-        """Returns the end of an episode that ran."""
+        """Returns the end of an episode that ran.
+
+        Args:
+            status: Final status.
+            cause: Cause of a failure.
+            answer: Answer of the recorder.
+        """
         return replace(self, status=status, cause=cause, answer=answer)
 
     def with_target(self, target: str) -> EpisodeEnd:
-        """Returns it with the name of the object that success is about."""
+        """Returns this end with the name of the object in the success criteria."""
         return replace(self, target=target)
 
     def with_video_fault(self, fault: str) -> EpisodeEnd:
-        """Returns it with the reason why there is no video; "" if there is one."""
+        """Returns this end with the reason for a missing video; "" if there is a video."""
         return replace(self, answer={**self.answer, "video_fault": fault})
 
     def stopped(self, stop_s: float) -> EpisodeEnd:
-        """Returns it with the time that stopping took [s]."""
+        """Returns this end with the duration of the shutdown [s]."""
         return replace(self, stop_s=stop_s)
 
 
 def make_record(end: EpisodeEnd) -> EpisodeRecord:
-    """Returns the record of an episode; to be called when nothing of it runs any more."""
+    """Returns the record of an episode whose processes have all ended."""
     wall_s = time.monotonic() - end.begun_monotonic
-    ran = WhatRan.from_parts(end.answer.get("ran", {}))
-    if ran.replaced:
-        end = end.broken(f"what ran is not what was named: {'; '.join(ran.replaced)}")
+    software = WhatRan.from_parts(end.answer.get("ran", {}))
+    if software.replaced:
+        end = end.broken(f"the named software did not run: {'; '.join(software.replaced)}")
     recording = read_recording(end.folder)
-    states = _states(end)
+    states = _state_spans(end)
     answer = end.answer
     joints = read_joints(end.folder)
     measurements = EpisodeMeasurements(
@@ -113,7 +119,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
     )
     measured = measure(end.spec.settings.get("metrics") or (), measurements)
     invalid = end.status is EpisodeStatus.INVALID
-    spans = (*_parts(end, wall_s), *states, *_components(end, recording))
+    spans = (*_part_spans(end, wall_s), *states, *_component_spans(end, recording))
     return EpisodeRecord(
         spec=end.spec,
         status=end.status,
@@ -124,7 +130,7 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
         simulated_s=answer.get("simulated_s"),
         metrics={name: None if invalid else value for name, value in measured.values.items()},
         spans=tuple(sorted(spans, key=lambda span: span.started_s)),
-        snapshot=_snapshot(end, measured.faults) | ran.as_json(),
+        snapshot=_snapshot(end, measured.faults) | software.as_json(),
         folder=str(end.folder),
     )
 
@@ -145,25 +151,25 @@ def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
         "settings": dict(end.spec.settings),
         "parameters": end.answer.get("parameters_digest", ""),
         "final_objects": end.answer.get("final", {}),
-        **{key: end.answer[key] for key in KEPT_OF_ANSWER if end.answer.get(key)},
+        **{key: end.answer[key] for key in SNAPSHOT_KEYS if end.answer.get(key)},
         **({"metric_faults": dict(faults)} if faults else {}),
     }
 
 
-def _parts(end: EpisodeEnd, wall_s: float) -> list[Span]:
-    """Returns the parts of the episode: start of the stack, task, check and recording, stop."""
-    moments, spans, since = end.answer.get("parts", {}), [], 0.0
+def _part_spans(end: EpisodeEnd, wall_s: float) -> list[Span]:
+    """Returns the spans of the episode's parts: start of the stack, task, check and recording, stop."""
+    moments, spans, start_s = end.answer.get("parts", {}), [], 0.0
     for name, moment in PARTS:
         if moment in moments:
-            spans.append(Span("episode", name, since, float(moments[moment])))
-            since = float(moments[moment])
+            spans.append(Span("episode", name, start_s, float(moments[moment])))
+            start_s = float(moments[moment])
     if end.stop_s:
         spans.append(Span("episode", "stop", max(wall_s - end.stop_s, 0.0), wall_s))
     return spans
 
 
-def _states(end: EpisodeEnd) -> tuple[Span, ...]:
-    """Returns what the states of the task did, from the record that the task's node writes."""
+def _state_spans(end: EpisodeEnd) -> tuple[Span, ...]:
+    """Returns the spans of the task's states from the record of the task's node."""
     files = sorted((end.folder / TASK_RECORDS).glob("*.json"))
     if not files:
         return ()
@@ -183,17 +189,17 @@ def _states(end: EpisodeEnd) -> tuple[Span, ...]:
     )
 
 
-def _components(end: EpisodeEnd, recording: Mapping[str, Any]) -> list[Span]:
-    """Returns what the components did; the generation before the task as it was measured, not as the method says."""
-    begun, answer, found = end.begun_monotonic, end.answer, []
-    generated_s = answer.get("requested_wall", 0.0) + answer.get("generation_s", 0.0)
+def _component_spans(end: EpisodeEnd, recording: Mapping[str, Any]) -> list[Span]:
+    """Returns the spans of the components; the measured time replaces the reported time of the first generation."""
+    begun, answer, spans = end.begun_monotonic, end.answer, []
+    generation_end_s = answer.get("requested_wall", 0.0) + answer.get("generation_s", 0.0)
     for entry in recording.get("reports", ()):
         begin, wall_s = entry["wall_begin"], entry["wall_s"]
-        if entry["component"] == "generation" and begin < generated_s:
+        if entry["component"] == "generation" and begin < generation_end_s:
             begin, wall_s = answer["requested_wall"], answer.get("generation_s", wall_s)
-            generated_s = 0.0  # there is one request
+            generation_end_s = 0.0  # only one generation precedes the task
         ended_s = begin - begun + wall_s
-        found.append(
+        spans.append(
             Span("component", entry["component"], begin - begun, ended_s, "", not entry["succeeded"], entry["reason"])
         )
-    return found
+    return spans

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes a video of an episode from what was recorded of it, when it has ended: it costs the episode no time.
+"""Renders a video of an episode from its recording after the episode has ended, which costs the episode no time.
 
     python3 -m modular_framework_benchmark.episodes.episode_video EPISODE_FOLDER
 
-The world is built again from the recorded parameters; joints and objects are put where they were at each frame.
+The world is rebuilt from the recorded parameters. Each frame sets joints and objects to their recorded states.
 """
 
 from __future__ import annotations
@@ -44,24 +44,24 @@ TIMEOUT_S = 600.0
 CODEC, PIXELS = "libx264", "yuv420p"
 FIELD_OF_VIEW_DEG, NEAR_M, FAR_M = 50.0, 0.05, 10.0
 CAMERA_M, CAMERA_YAW_DEG, CAMERA_PITCH_DEG = 1.6, 130.0, -25.0
-"""The camera looks at the mean place of the objects, or at the robot's root, from this far, and these angles."""
+"""The camera looks at the mean position of the objects, or at the robot's root, with this distance and these angles."""
 CAMERA_ABOVE_M = 0.15
 
 Image = NDArray[np.uint8]
 
 
 class RecordedScene:
-    """The world of a recorded episode, with its robot and its objects."""
+    """World of a recorded episode with its robot and objects."""
 
     def __init__(self, folder: Path) -> None:
-        """Builds it.
+        """Builds the world.
 
         Args:
-            folder: Files of the episode.
+            folder: Folder of the episode's files.
 
         Raises:
-            VideoError: Something needed was not recorded.
-            SimulationError: The world cannot be built again.
+            VideoError: The recording is incomplete.
+            SimulationError: The world cannot be rebuilt.
         """
         recording, path = read_recording(folder), folder / PARAMETERS
         joints = read_joints(folder)
@@ -95,11 +95,11 @@ class RecordedScene:
 
     @property
     def end_s(self) -> float:
-        """Time of the last sample [s since the recording began]."""
+        """Time of the last sample [s since the start of the recording]."""
         return float(self._joints.times_s[-1])
 
     def show(self, time_s: float) -> None:
-        """Puts joints and objects where they were at a time [s since the recording began]."""
+        """Sets joints and objects to their states at a time [s since the start of the recording]."""
         row = _latest(self._joints.times_s, time_s)
         positions = dict(zip(self._joints.joints, self._joints.positions[row].tolist(), strict=True))
         known = self._robot.body.joint_indices
@@ -110,10 +110,10 @@ class RecordedScene:
                 self._world.body(name).set_state(BodyState(_pose(track, time_s), Twist()))
 
     def image(self) -> Image:
-        """Returns a picture of shape (HEIGHT, WIDTH, 3)."""
+        """Returns a rendered image of shape (HEIGHT, WIDTH, 3)."""
         api, client = self._world.engine.api, self._world.engine.client
         view = api.computeViewMatrixFromYawPitchRoll(
-            self._looked_at(), CAMERA_M, CAMERA_YAW_DEG, CAMERA_PITCH_DEG, 0.0, 2, physicsClientId=client
+            self._camera_target(), CAMERA_M, CAMERA_YAW_DEG, CAMERA_PITCH_DEG, 0.0, 2, physicsClientId=client
         )
         lens = api.computeProjectionMatrixFOV(FIELD_OF_VIEW_DEG, WIDTH / HEIGHT, NEAR_M, FAR_M, physicsClientId=client)
         _, _, pixels, _, _ = api.getCameraImage(
@@ -121,13 +121,13 @@ class RecordedScene:
         )
         return np.ascontiguousarray(np.asarray(pixels, dtype=np.uint8).reshape(HEIGHT, WIDTH, 4)[:, :, :3])
 
-    def _looked_at(self) -> list[float]:
-        places = [track.positions[0] for track in self._tracks.values() if len(track.times_s) > 1]
-        place = np.mean(places, axis=0) if places else np.zeros(3)
-        return [float(place[0]), float(place[1]), float(place[2]) + CAMERA_ABOVE_M]
+    def _camera_target(self) -> list[float]:
+        positions = [track.positions[0] for track in self._tracks.values() if len(track.times_s) > 1]
+        position = np.mean(positions, axis=0) if positions else np.zeros(3)
+        return [float(position[0]), float(position[1]), float(position[2]) + CAMERA_ABOVE_M]
 
     def close(self) -> None:
-        """Ends the physics engine."""
+        """Disconnects the physics engine."""
         self._world.close()
 
 
@@ -143,17 +143,17 @@ def _pose(track: ObjectTrack, time_s: float) -> Pose:
 
 
 def make_video(folder: Path) -> Path:
-    """Makes the video of a recorded episode; its first frame is the begin of the recording.
+    """Renders the video of a recorded episode; the first frame is the start of the recording.
 
     Args:
-        folder: Files of the episode.
+        folder: Folder of the episode's files.
 
     Returns:
-        The file, `video.mp4` in that folder.
+        Path of `video.mp4` in the folder.
 
     Raises:
-        VideoError: Something needed was not recorded.
-        SimulationError: The world cannot be built again.
+        VideoError: The recording is incomplete.
+        SimulationError: The world cannot be rebuilt.
     """
     scene, path = RecordedScene(folder), folder / VIDEO
     try:
@@ -170,26 +170,26 @@ def make_video(folder: Path) -> Path:
 
 
 def make_video_apart(folder: Path) -> str:
-    """Makes the video in a process of its own, which the physics engine has to itself; returns why there is none.
+    """Renders the video in a separate process, because the physics engine is global to a process.
 
     Args:
-        folder: Files of the episode.
+        folder: Folder of the episode's files.
 
     Returns:
-        The reason; "" where there is a video.
+        The reason for a missing video; "" if there is a video.
     """
     command = [sys.executable, "-m", __name__, str(folder)]
     try:
         made = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
-        return f"the video was not made within {TIMEOUT_S:g} s"
+        return f"the video was not finished within {TIMEOUT_S:g} s"
     if made.returncode == 0:
         return ""
     return (made.stderr.strip().splitlines() or [f"exit code {made.returncode}"])[-1]
 
 
 def main(arguments: list[str]) -> int:
-    """Makes the video of the episode whose folder is named."""
+    """Renders the video of the episode in the given folder."""
     try:
         print(make_video(Path(arguments[0])))
     except (VideoError, SimulationError, OSError, rospkg.ResourceNotFound) as error:

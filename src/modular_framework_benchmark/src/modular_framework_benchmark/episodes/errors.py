@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What keeps an episode of mode `task` from running to its end."""
+"""Errors of episodes of mode `task`."""
 
 
 class SettingsError(ValueError):
-    """A setting of an episode has a wrong type or value; the text names it."""
+    """A setting of an episode has a wrong type or value; the message names the setting."""
 
 
 class EpisodeAbortedError(RuntimeError):
-    """The episode was ended from outside."""
+    """The episode was aborted from outside."""
 
 
 class BagError(RuntimeError):
-    """A bag is not recorded; the text says why."""
+    """A bag is not recorded; the message gives the reason."""
 
 
 class VideoError(RuntimeError):
-    """No video can be made of an episode; the text says why."""
+    """The video of an episode cannot be rendered; the message gives the reason."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the hand was during an episode, from the measured joints and the robot's description."""
+"""Poses of the hand during an episode, from the measured joints and the robot's description."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from modular_framework_urdf.srdf_reader import read_srdf
 
 
 def hand_link(srdf: str) -> str:
-    """Returns the link that the first end effector of a robot is fixed to; "" if it has none.
+    """Returns the parent link of a robot's first end effector; "" without end effectors.
 
     Args:
-        srdf: Semantic description, text.
+        srdf: Semantic description (SRDF text).
     """
     effectors = read_srdf(srdf, "the parameter /robot_description_semantic").end_effectors
     return effectors[0].parent_link if effectors else ""
 
 
 def hand_track(urdf: str, link: str, joints: JointSamples) -> ObjectTrack:
-    """Returns the poses of a link in the root frame of the robot's description, which is the world in simulation.
+    """Returns the poses of a link in the robot's root frame, which coincides with the simulation's world frame.
 
     Args:
-        urdf: Description of the robot, text.
-        link: The link.
-        joints: Measured joints; those that are not measured stay at 0.
+        urdf: Robot description (URDF text).
+        link: Name of the link.
+        joints: Measured joint positions; joints without measurements are at 0.
     """
     model = pinocchio.buildModelFromXML(urdf)
     data, frame = model.createData(), model.getFrameId(link)
@@ -41,7 +41,7 @@ def hand_track(urdf: str, link: str, joints: JointSamples) -> ObjectTrack:
     for row, positions in enumerate(joints.positions):
         for number, joint in columns:
             angle = positions[number]
-            # a joint without ends is stored as cosine and sine
+            # Pinocchio stores a continuous joint as cosine and sine.
             configuration[joint.idx_q : joint.idx_q + joint.nq] = (
                 angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
             )

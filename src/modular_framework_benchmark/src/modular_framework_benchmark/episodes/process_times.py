@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Measures the processor time of ROS nodes from outside: what they say of themselves is not asked for."""
+"""Measures the processor time of ROS nodes through /proc, without relying on the nodes' own reports."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from modular_framework_core.launching.launch_session import processes_with
 
 
 def processor_time_s(nodes: Collection[str]) -> float:
-    """Returns the processor time that nodes of this process's ROS session have used until now [s].
+    """Returns the processor time that nodes of this process's ROS session have used so far [s].
 
-    Their process trees count whole: children, those that ended and were waited for, and processes that left their
-    parent but not its Unix session, which roslaunch opens for each node.
+    The process trees count completely: children, ended children that were waited for, and processes that left their
+    parent but not the Unix session that roslaunch opens for each node.
 
     Args:
         nodes: Absolute names of the nodes.
@@ -22,12 +22,12 @@ def processor_time_s(nodes: Collection[str]) -> float:
     marks = {f"__name:={name.rpartition('/')[2]}".encode() for name in nodes}
     trees: set[int] = set()
     ticks = 0
-    for process in sorted(processes_with("ROS_HOME", os.environ["ROS_HOME"])) if nodes else ():  # parents come first
+    for process in sorted(processes_with("ROS_HOME", os.environ["ROS_HOME"])) if nodes else ():  # parents first
         folder = Path("/proc", str(process))
         try:
             words = set((folder / "cmdline").read_bytes().split(b"\0"))
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()  # from the third one, see proc(5)
-        except OSError:  # ended meanwhile
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()  # starts at the third field, see proc(5)
+        except OSError:  # the process has ended
             continue
         parent, session = int(fields[1]), int(fields[3])
         if marks & words or trees & {parent, session}:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process beside a stack that runs episodes on it: sets the scene, starts the task, records, looks at the end.
+"""Process beside a stack that runs its episodes: spawns the objects, starts the task, records, checks the result.
 
-It takes requests from its standard input and writes its answers to its standard output, a line of JSON each:
-`{"folder": ..., "objects": [...], ...}` runs an episode, see `EpisodeRequest`; `{"abort": true}` ends it.
+Standard input carries requests and standard output carries answers, one line of JSON each.
+`{"folder": ..., "objects": [...], ...}` runs an episode, see `EpisodeRequest`; `{"abort": true}` aborts the episode.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from modular_framework_benchmark.episodes.ros_recording import model_samples, wr
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
-from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, FoulError, WorldError, judge, spawn
+from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, InterferenceError, WorldError, judge, spawn
 from modular_framework_benchmark.episodes.snapshot import COLD_START
 from modular_framework_core.task_runner.ros_episode import (
     GENERATE_SERVICE,
@@ -47,10 +47,10 @@ from modular_framework_ros.stop_requests import stoppable
 
 LIST_CONTROLLERS = "/controller_manager/list_controllers"
 JOINT_STATE_CONTROLLER, JOINT_STATE_RATE = "joint_state_controller/JointStateController", 50.0
-"""Its type, and its rate where no parameter says another one [1/s]."""
+"""Controller type, and its default publish rate [Hz]."""
 GENERATION_SIGNAL = "/grasp_generated"
 GENERATION_SERVICE_S = 30.0
-"""How long after the signal a method's service is waited for [s]: on a busy machine it connects for seconds."""
+"""Wait for a method's service after its signal [s]; on a busy machine the connection takes seconds."""
 POLL_S = 0.02
 SETTLE_S = 0.5
 SAMPLE_S, SAMPLES_TIMEOUT_S = 0.02, 2.0
@@ -60,19 +60,19 @@ START_SERVICE, STOP_SERVICE = "/task/start", "/task/stop"
 
 @dataclass(frozen=True, slots=True)
 class EpisodeRequest:
-    """What the recorder is asked to run.
+    """Request to run an episode.
 
     Attributes:
-        folder: Where to write the recording.
-        objects: What to put into the world: `name`, `model`, `position`, `rpy`.
-        target: Object that success is about; "" for none.
-        hold_s: Simulated time after the end of the task when the world is looked at [s].
-        shake_s: Simulated time for which the object is shaken after that [s].
-        bag: Whether all topics are recorded to a bag.
-        method_nodes: Absolute names of the nodes of the method that generates grasps; none without a method.
+        folder: Folder of the recording.
+        objects: Objects to spawn: `name`, `model`, `position`, `rpy`.
+        target: Name of the object in the success criteria; "" for none.
+        hold_s: Simulated time between the end of the task and the check [s].
+        shake_s: Simulated duration of the shake after the check [s].
+        bag: Whether to record all topics to a bag.
+        method_nodes: Absolute names of the grasp generation method's nodes; empty without a method.
         controllers: Names of the controllers that must run before the task starts.
-        parameters: ROS parameters to set before.
-        begun: When the episode began, by the machine's monotonic clock [s].
+        parameters: ROS parameters to set before the episode.
+        begun: Start time of the episode by the machine's monotonic clock [s].
     """
 
     folder: str
@@ -88,13 +88,13 @@ class EpisodeRequest:
 
 
 class EpisodeRecorder:
-    """Runs the episodes of one stack."""
+    """Runs the episodes of a stack."""
 
     def __init__(self, aborted: threading.Event) -> None:
-        """Connects to nothing yet.
+        """Stores the arguments without connecting.
 
         Args:
-            aborted: Set when the episode is to end.
+            aborted: Event that aborts the episode.
         """
         self._aborted = aborted
         self._samples = Samples()
@@ -102,18 +102,18 @@ class EpisodeRecorder:
         self._warm = False
 
     def connect(self) -> None:
-        """Waits for the master and becomes a node on it."""
+        """Waits for the master and registers a node."""
         self._wait(lambda: rosgraph.is_master_online() and _has_clock_parameter())
         rospy.init_node("episode_recorder", anonymous=True, disable_signals=True)
 
     def run(self, request: EpisodeRequest) -> dict[str, Any]:
-        """Runs an episode, and returns how the task ended and what became of the object."""
+        """Runs an episode and returns the outcome of the task and the state of the object."""
         answer: dict[str, Any] = {"parts": {}, "zero": 0.0, "outcome": "", "reason": ""}
         for name, value in request.parameters.items():
             rospy.set_param(name, value)
         self._wait_for_stack(request)
-        self._reached(request, answer, "up")
-        turns = _joint_state_rate() if self._time.enabled and request.controllers else None
+        self._store_part_end(request, answer, "up")
+        rate_hz = _joint_state_rate_hz() if self._time.enabled and request.controllers else None
         self._samples.connect()
         folder = Path(request.folder)
         answer[COLD_START] = not self._warm
@@ -128,22 +128,22 @@ class EpisodeRecorder:
                     raise
                 answer["aborted"] = True
                 self._stop_task()
-            except FoulError as error:
+            except InterferenceError as error:
                 answer["foul"] = str(error)
                 if not self._samples.ends:
                     self._stop_task()
             spawned = {entry["name"]: entry["model"] for entry in request.objects}
-            answer |= write_recording(folder, self._samples, spawned, answer, turns)
+            answer |= write_recording(folder, self._samples, spawned, answer, rate_hz)
         parameters, answer["parameters_digest"] = write_parameters(folder)
         controllers = _running_controllers() if request.controllers else {}
         plans = [report for _, report in self._samples.planning]
         answer["ran"] = asdict(running_stack(parameters, controllers, _publishers(GENERATION_SIGNAL), plans))
-        self._reached(request, answer, "recorded")
+        self._store_part_end(request, answer, "recorded")
         return answer
 
     @contextlib.contextmanager
     def _bag(self, folder: Path, wanted: bool) -> Iterator[None]:
-        """Records a bag as long as the context lasts, once rosbag has subscribed to the topics."""
+        """Records a bag within the context, which starts once rosbag has subscribed to the topics."""
         if not wanted:
             yield
             return
@@ -158,12 +158,12 @@ class EpisodeRecorder:
             bag.check()
 
     @staticmethod
-    def _reached(request: EpisodeRequest, answer: dict[str, Any], part: str) -> None:
-        """Notes when a part of the episode ended [s since it began]."""
+    def _store_part_end(request: EpisodeRequest, answer: dict[str, Any], part: str) -> None:
+        """Stores the end time of a part of the episode [s since the start of the episode]."""
         answer["parts"][part] = time.monotonic() - request.begun
 
     def _begin(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
-        """Puts the objects into the world, which begins again where its time can be held, and asks for grasps there."""
+        """Spawns the objects, after a reset if simulated time can be held, and requests grasps."""
 
         def spawn_all() -> None:
             self._samples.clear()
@@ -173,7 +173,7 @@ class EpisodeRecorder:
             answer["interventions"] = judge().number
 
         if self._time.enabled and not self._warm:
-            begin_episode(spawn_all, SETTLE_S)  # what a node loads at its first request is no part of an episode
+            begin_episode(spawn_all, SETTLE_S)  # excludes the one-time loading of nodes from the episode
             generate_grasps()
             self._warm = True
         answer["processor_before_s"] = processor_time_s(request.method_nodes)
@@ -185,10 +185,10 @@ class EpisodeRecorder:
         answer["requested_s"], answer["requested_wall"] = self._now() - answer["zero"], time.monotonic()
         if self._time.enabled and generate_grasps():
             answer["generation_s"] = time.monotonic() - answer["requested_wall"]
-        self._reached(request, answer, "ready")
+        self._store_part_end(request, answer, "ready")
 
     def _run_task(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
-        """Runs the task to its end."""
+        """Runs the task until its end."""
         self._samples.ends.clear()
         answer["begin_poses"] = judge().poses
         answer["task_started_s"] = self._now() - answer["zero"]
@@ -198,7 +198,7 @@ class EpisodeRecorder:
         self._wait(lambda: bool(self._samples.ends))
         end = self._samples.ends[-1]
         if end["frozen"]:
-            raise FoulError(end["frozen"])
+            raise InterferenceError(end["frozen"])
         answer |= {
             "outcome": end["outcome"],
             "reason": end["reason"],
@@ -207,10 +207,10 @@ class EpisodeRecorder:
             "task_s": self._now() - answer["zero"] - answer["requested_s"],
         }
         answer["method_processor_s"] = processor_time_s(request.method_nodes) - answer["processor_before_s"]
-        self._reached(request, answer, "task")
+        self._store_part_end(request, answer, "task")
 
     def _check(self, request: EpisodeRequest, answer: dict[str, Any]) -> None:
-        """Looks what is held after the hold time, and shakes it where that was asked for."""
+        """Checks after the hold time which object is held, and shakes it if requested."""
         if request.target:
             self._time.sleep(request.hold_s)
         answer["checked_s"] = self._now() - answer["zero"]
@@ -231,18 +231,18 @@ class EpisodeRecorder:
             lambda: samples.latest_s() >= latest_s and len(samples.models) >= models and samples.actions_ended(),
             SAMPLES_TIMEOUT_S,
         )
-        answer["foul"] = judge().foul(answer["interventions"]) or self._samples.foul()
-        self._reached(request, answer, "checked")
+        answer["foul"] = judge().interference(answer["interventions"]) or self._samples.interference()
+        self._store_part_end(request, answer, "checked")
 
     def _now(self) -> float:
-        """Returns the time of the simulation; its own where it stands still, for the clock arrives later [s]."""
+        """Returns the time of the simulation [s]; while time is held, from a service because the clock topic lags."""
         if not self._time.enabled:
             return rospy.get_time()
         answer = request_service(ADVANCE_SERVICE, AdvanceTime, AdvanceTimeRequest(), SERVICE_TIMEOUT_S)
         return float(answer.stamp.to_sec())
 
     def _stop_task(self) -> None:
-        """Stops the task, so that it writes what its states did."""
+        """Stops the task, so that it writes the record of its states."""
         try:
             request_service(STOP_SERVICE, Trigger, Trigger._request_class(), STOP_TIMEOUT_S)
         except CallError:
@@ -250,14 +250,14 @@ class EpisodeRecorder:
         wait_until(lambda: bool(self._samples.ends), STOP_TIMEOUT_S)
 
     def _wait_for_stack(self, request: EpisodeRequest) -> None:
-        """Waits until the task can start: its node, the simulation, the controllers and the method are up."""
+        """Waits until the task can start: task node, simulation, controllers and method are available."""
         wanted = {START_SERVICE, *([SPAWN_SERVICE] if request.objects else [])}
         wanted |= {LIST_CONTROLLERS} if request.controllers else set()
         self._wait(lambda: wanted <= _services())
         self._wait(lambda: set(request.controllers) <= _running_controllers().keys())
         if request.method_nodes:
             self._wait(lambda: bool(_publishers(GENERATION_SIGNAL)))
-            # a method offers the service soon after, or it has none
+            # A method offers the service soon after its signal, or lacks it.
             until = time.monotonic() + GENERATION_SERVICE_S
             self._wait(lambda: rospy.resolve_name(GENERATE_SERVICE) in _services() or time.monotonic() > until)
 
@@ -266,7 +266,7 @@ class EpisodeRecorder:
             if self._aborted.wait(POLL_S):
                 raise EpisodeAbortedError
             if frozen := frozen_nodes():
-                raise FoulError(frozen)
+                raise InterferenceError(frozen)
 
 
 def _services() -> set[str]:
@@ -283,13 +283,13 @@ def _is_subscribed(topic: str, node: str) -> bool:
 
 
 def _running_controllers() -> dict[str, str]:
-    """Returns the types of the controllers that run, by name."""
+    """Returns the types of the running controllers, keyed by name."""
     answer = request_service(LIST_CONTROLLERS, ListControllers, ListControllers._request_class(), timeout_s=30.0)
     return {controller.name: controller.type for controller in answer.controller if controller.state == "running"}
 
 
-def _joint_state_rate() -> float | None:
-    """Returns how often the simulation publishes joint states [1/s]; None where no controller does."""
+def _joint_state_rate_hz() -> float | None:
+    """Returns the publish rate of the joint states [Hz]; None without a joint state controller."""
     names = [name for name, kind in _running_controllers().items() if kind == JOINT_STATE_CONTROLLER]
     return float(rospy.get_param(f"/{names[0]}/publish_rate", JOINT_STATE_RATE)) if names else None
 
@@ -302,7 +302,7 @@ def _has_clock_parameter() -> bool:
 
 
 def main() -> int:
-    """Serves requests until the standard input ends."""
+    """Serves requests until standard input ends."""
     aborted, requests = threading.Event(), queue.Queue[dict[str, Any] | None]()
 
     def read() -> None:

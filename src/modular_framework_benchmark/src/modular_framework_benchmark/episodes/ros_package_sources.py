@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Versions and digests of the source trees of packages: what methods and nodes are made of."""
+"""Versions and digests of the sources of packages, which identify methods and nodes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pathlib import Path
 
 import rospkg
 
-NO_SOURCES = {".git", "__pycache__", ".pytest_cache", ".mypy_cache", "tests"}
+EXCLUDED_NAMES = {".git", "__pycache__", ".pytest_cache", ".mypy_cache", "tests"}
 
 
 @functools.lru_cache(maxsize=256)
 def package_source(package: str) -> tuple[str, str]:
-    """Returns the version of a ROS package or Python module, and SHA-256 of its files; empty texts for neither."""
+    """Returns the version of a ROS package or Python module and the SHA-256 of its files; empty texts if unknown."""
     folders, version = _module_folders(package), ""
     try:
         packages = rospkg.RosPack()
@@ -29,17 +29,17 @@ def package_source(package: str) -> tuple[str, str]:
 
 
 def _module_folders(name: str) -> list[Path]:
-    """Returns where the Python module of a package is: in an install space not in the package's folder."""
+    """Returns the folders of a Python module, which an install space keeps outside the ROS package's folder."""
     try:
         found = importlib.util.find_spec(name)
     except (ImportError, ValueError):
         return []
-    # the modules that catkin makes in the devel space lead to the sources
+    # Modules in the devel space only forward to the sources.
     return [Path(path) for path in (found.submodule_search_locations or ()) if "devel" not in path] if found else []
 
 
 def tree_digest(folders: list[Path]) -> str:
-    """Returns SHA-256 of the files below folders, by their relative paths; caches and tests do not count."""
+    """Returns the SHA-256 of the files in folders, keyed by relative path; caches and tests are excluded."""
     digest = hashlib.sha256()
     for folder in dict.fromkeys(folders):
         for path in sorted(_files(folder)):
@@ -49,5 +49,5 @@ def tree_digest(folders: list[Path]) -> str:
 
 def _files(folder: Path) -> Iterator[Path]:
     for path in folder.rglob("*"):
-        if path.is_file() and not NO_SOURCES.intersection(path.relative_to(folder).parts) and path.suffix != ".pyc":
+        if path.is_file() and not EXCLUDED_NAMES.intersection(path.relative_to(folder).parts) and path.suffix != ".pyc":
             yield path

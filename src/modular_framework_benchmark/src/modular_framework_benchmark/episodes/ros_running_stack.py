@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds out what a running stack consists of, from its nodes, its parameters and its planning reports."""
+"""Identifies the software of a running stack from its nodes, parameters and planning reports."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from modular_framework_benchmark.records.what_ran import (
 from modular_framework_planning.plan_statistics import PlannerRun
 from modular_framework_ros.ros_node_calls import NodeCallError, node_address, process_id
 
-FILES = {
+FILE_PARAMETERS = {
     "world": "/gazebo/world_file",
     "task": "/task/task_constructor_script",
     "state machine": "/task/state_machine_to_load",
 }
-"""Parameters of nodes that name files, by what the files are."""
+"""Parameters of nodes that name files, keyed by kind of file."""
 NODE_TIMEOUT_S = 5.0
 KINEMATICS = "/robot_description_kinematics"
 DESCRIPTIONS = ("/robot_description", "/robot_description_semantic")
@@ -37,19 +37,19 @@ def running_stack(
     generators: Iterable[str],
     plans: Iterable[Mapping[str, Any]],
 ) -> WhatRan:
-    """Returns what a stack consists of, and what planned.
+    """Returns the software of a stack, including the planners that ran.
 
     Args:
-        parameters: All of the parameter server.
-        controllers: Types of the controllers that run, by name.
+        parameters: All parameters of the parameter server.
+        controllers: Types of the running controllers, keyed by name.
         generators: Names of the nodes that generate grasps.
         plans: Planning reports of move_group.
     """
-    files = {what: Path(str(_value(parameters, name))) for what, name in FILES.items()}
+    files = {what: Path(str(_value(parameters, name))) for what, name in FILE_PARAMETERS.items()}
     described = description_digests(*(str(_value(parameters, name)) for name in DESCRIPTIONS))
     digests = {what: hashlib.sha256(path.read_bytes()).hexdigest() for what, path in files.items() if path.is_file()}
     methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
-    found = WhatRan(
+    software = WhatRan(
         methods={name: RanMethod(version, digest) for name, (version, digest) in methods.items()},
         controllers=dict(controllers),
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
@@ -57,9 +57,9 @@ def running_stack(
         digests=described | digests,
         substitutions=solver_substitutions(named_solvers(_value(parameters, KINEMATICS))),
     )
-    # a sequence has a run for each of its motions
+    # A sequence has a run for each of its motions.
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
-    return found.with_plans(PlannerRun(**run) for run in runs)
+    return software.with_plans(PlannerRun(**run) for run in runs)
 
 
 def named_solvers(kinematics: Any) -> list[str]:
@@ -69,21 +69,21 @@ def named_solvers(kinematics: Any) -> list[str]:
 
 
 def _value(parameters: Mapping[str, Any], name: str) -> Any:
-    found: Any = parameters
+    software: Any = parameters
     for part in name.strip("/").split("/"):
-        found = found.get(part, "") if isinstance(found, Mapping) else ""
-    return found
+        software = software.get(part, "") if isinstance(software, Mapping) else ""
+    return software
 
 
 def package_of(node: str) -> str:
-    """Returns the ROS package of a running node's program; "" where it cannot be found out."""
+    """Returns the ROS package of a running node's program; "" if unknown."""
     try:
         process = process_id(node_address(node), NODE_TIMEOUT_S)
-        words = Path(f"/proc/{process}/cmdline").read_bytes().decode(errors="replace").split("\0")
+        arguments = Path(f"/proc/{process}/cmdline").read_bytes().decode(errors="replace").split("\0")
     except (OSError, NodeCallError):
         return ""
-    program = next((Path(word) for word in words if word.startswith("/") and Path(word).parent.name != "bin"), None)
+    program = next((Path(word) for word in arguments if word.startswith("/") and Path(word).parent.name != "bin"), None)
     if program is None:
         return ""
-    # in devel and install spaces programs are in lib/PACKAGE
+    # Devel and install spaces keep programs in lib/PACKAGE.
     return rospkg.get_package_name(str(program)) or program.parent.name

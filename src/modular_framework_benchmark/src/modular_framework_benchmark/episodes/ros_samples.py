@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collects what the nodes of a stack say on the wire while an episode runs."""
+"""Collects the messages of a stack's nodes during an episode."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from std_msgs.msg import String
 from modular_framework_benchmark.episodes.ros_world import SIMULATION_NODE, TASK_NODE
 
 ACTIONS = {"moveit_msgs/ExecuteTrajectoryActionGoal": "execution", "modular_framework_core/GraspActionGoal": "grasp"}
-"""Component that an action belongs to, by the type of its goal."""
+"""Component of an action, keyed by the type of its goal."""
 
 CONTROLLER_STATE = "control_msgs/JointTrajectoryControllerState"
 JOINT_CONTROLLER_STATE = "control_msgs/JointControllerState"
@@ -30,31 +30,30 @@ PLANNING_NODE = "/move_group"
 MODELS, GRASPED, TASK_STATUS = "/gazebo/model_states", "/gazebo/grasped_object", "task_status"
 REPORTS, PATHS = "/move_group/planning_report", "/move_group/display_planned_path"
 SUCCEEDED = 3
-"""Number of actionlib_msgs/GoalStatus."""
+"""Status of actionlib_msgs/GoalStatus."""
 
 
 class Samples:
-    """Messages of an episode, each with the real and the simulated time at which it came.
+    """Messages of an episode with their real and simulated time of arrival.
 
     Subscribers: ``joint_states``, ``/gazebo/model_states``, ``/gazebo/grasped_object``, ``task_status``,
     ``component_reports``, ``/move_group/planning_report``, ``/move_group/display_planned_path``, the states of all
-    trajectory controllers,
-    goals and results of the actions in `ACTIONS`, the states of controllers of one joint.
+    trajectory controllers and single-joint controllers, goals and results of the actions in `ACTIONS`.
 
     Attributes:
         joints: Joint states.
         models: (simulated time [s], gazebo_msgs/ModelStates).
-        controllers: (name of the controller, its state).
-        set_points: (joint of a controller of one joint, as of a gripper, its control_msgs/JointControllerState).
+        controllers: (name of the controller, state).
+        set_points: (joint, control_msgs/JointControllerState) of single-joint controllers, such as a gripper's.
         planning: (real time [s], report of move_group).
-        paths: Motions that move_group shows.
+        paths: Motions that move_group displays.
         components: (real time [s], report of a component).
-        ends: What the task's node says of the ends of tasks.
-        forgeries: Topic and sender of the messages that came from another node than the topic's own; these are dropped.
+        ends: Statuses of the task node on the ends of tasks.
+        forgeries: (topic, sender) of messages from a node that does not own the topic; they are dropped.
     """
 
     def __init__(self) -> None:
-        """Connects to nothing yet."""
+        """Creates empty lists without connecting."""
         self._lock = threading.Lock()
         self._subscribers: dict[str, Any] = {}
         self._goals: dict[str, dict[str, Any]] = {}
@@ -62,7 +61,7 @@ class Samples:
         self.clear()
 
     def clear(self) -> None:
-        """Forgets what was collected."""
+        """Removes all collected messages."""
         with self._lock:
             self.joints: list[Any] = []
             self.models: list[tuple[float, Any]] = []
@@ -77,9 +76,9 @@ class Samples:
             self._results.clear()
 
     def actions(self) -> list[dict[str, Any]]:
-        """Returns the goals that ended, in this order, with `component`, `goal`, begin and end, `succeeded`, `reason`.
+        """Returns the ended goals in order, with `component`, `goal`, begin and end, `succeeded`, `reason`.
 
-        A goal and its result come from two nodes, so the result may come first.
+        A result may arrive before its goal, because they come from two nodes.
         """
         with self._lock:
             pairs = [(goal, self._results[number]) for number, goal in self._goals.items() if number in self._results]
@@ -87,23 +86,23 @@ class Samples:
         return sorted(ended, key=lambda each: (each["ros_end"], each["wall_end"]))
 
     def actions_ended(self) -> bool:
-        """Whether all goals have their result, and all results their goal."""
+        """Returns whether all goals have a result, and all results have a goal."""
         with self._lock:
             return self._goals.keys() == self._results.keys()
 
     def latest_s(self) -> float:
-        """Returns the stamp of the latest joint state [s]; minus infinity before the first."""
+        """Returns the stamp of the latest joint state [s]; minus infinity before the first one."""
         return float(self.joints[-1].header.stamp.to_sec()) if self.joints else -math.inf
 
     def connect(self) -> None:
-        """Subscribes to everything that is there now; may be called again."""
+        """Subscribes to all present topics; repeated calls add new topics."""
         for topic, kind, owner, callback in (
             ("joint_states", JointState, SIMULATION_NODE, lambda message: self.joints.append(message)),
             (MODELS, ModelStates, SIMULATION_NODE, lambda message: self.models.append((rospy.get_time(), message))),
-            (GRASPED, String, SIMULATION_NODE, lambda _: None),  # only to see who else publishes it
+            (GRASPED, String, SIMULATION_NODE, lambda _: None),  # only to detect other publishers
             (TASK_STATUS, String, TASK_NODE, self._on_status),
-            ("component_reports", String, "", lambda message: self.components.append(_report(message))),
-            (REPORTS, String, PLANNING_NODE, lambda message: self.planning.append(_report(message))),
+            ("component_reports", String, "", lambda message: self.components.append(_timed_report(message))),
+            (REPORTS, String, PLANNING_NODE, lambda message: self.planning.append(_timed_report(message))),
             (PATHS, DisplayTrajectory, PLANNING_NODE, lambda message: self.paths.append(message)),
         ):
             self._subscribe(topic, kind, callback, owner)
@@ -112,12 +111,19 @@ class Samples:
                 name = topic.strip("/").rpartition("/")[0]
                 self._subscribe(topic, JointTrajectoryControllerState, self._controller(name), SIMULATION_NODE)
             elif type_name == JOINT_CONTROLLER_STATE:
-                self._subscribe_joint(topic)
+                self._subscribe_joint_state(topic)
             elif type_name in ACTIONS:
                 self._subscribe_action(topic, type_name)
 
     def _subscribe(self, topic: str, kind: Any, callback: Callable[[Any], None], owner: str = "") -> None:
-        """Subscribes to a topic; with an owner, messages of other nodes are dropped, and their senders noted."""
+        """Subscribes to a topic.
+
+        Args:
+            topic: Name of the topic.
+            kind: Message class.
+            callback: Receiver of the messages.
+            owner: Only allowed sender; messages of other nodes are dropped and their senders noted. "" for any sender.
+        """
 
         def receive(message: Any) -> None:
             sender = message._connection_header["callerid"]
@@ -129,10 +135,10 @@ class Samples:
         if topic not in self._subscribers:
             self._subscribers[topic] = rospy.Subscriber(topic, kind, receive, tcp_nodelay=True)
 
-    def foul(self) -> str:
-        """Returns who publishes what the world and the task's node publish themselves; "" for nobody."""
+    def interference(self) -> str:
+        """Returns the nodes that publish on topics of the simulation and the task node; "" for none."""
         return "; ".join(
-            f"'{sender}', as it calls itself, publishes {topic}"
+            f"a node named '{sender}' publishes {topic}"
             for topic, sender in sorted(self.forgeries)
             if topic in (MODELS, GRASPED, TASK_STATUS)
         )
@@ -140,8 +146,8 @@ class Samples:
     def _controller(self, name: str) -> Callable[[Any], None]:
         return lambda message: self.controllers.append((name, message))
 
-    def _subscribe_joint(self, topic: str) -> None:
-        """Subscribes to the state of a controller, CONTROLLER/state, whose parameters name its joint."""
+    def _subscribe_joint_state(self, topic: str) -> None:
+        """Subscribes to the state of a single-joint controller, CONTROLLER/state."""
         joint = rospy.get_param(f"{topic.rpartition('/')[0]}/joint", "")
         if joint:
             self._subscribe(
@@ -161,29 +167,29 @@ class Samples:
             self.ends.append(status)
 
     def add_goal(self, component: str, message: Any) -> None:
-        """Adds the goal of an action that belongs to a component."""
-        begin = {
+        """Adds a goal of a component's action."""
+        started = {
             "component": component,
             "wall": time.monotonic(),
             "ros": message.header.stamp.to_sec(),
             "goal": message.goal,
         }
         with self._lock:
-            self._goals[message.goal_id.id] = begin
+            self._goals[message.goal_id.id] = started
 
     def add_result(self, message: Any) -> None:
         """Adds the result of a goal."""
         code = getattr(getattr(message.result, "error_code", None), "val", 1)
         succeeded = message.status.status == SUCCEEDED and code == 1
-        end = {
+        ended = {
             "wall_end": time.monotonic(),
             "ros_end": message.header.stamp.to_sec(),
             "succeeded": succeeded,
             "reason": "" if succeeded else message.status.text or f"error code {code}",
         }
         with self._lock:
-            self._results[message.status.goal_id.id] = end
+            self._results[message.status.goal_id.id] = ended
 
 
-def _report(message: String) -> tuple[float, dict[str, Any]]:
+def _timed_report(message: String) -> tuple[float, dict[str, Any]]:
     return time.monotonic(), json.loads(message.data)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shakes what a robot holds, through the action of its arm's own trajectory controller."""
+"""Shakes the arm with a held object through the arm's trajectory controller."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from modular_framework_ros.calls import wait_for_action, wait_for_result
 from modular_framework_urdf.urdf_reader import read_urdf
 
 ACTION_TIMEOUT_S = 30.0
-SLOWEST_FACTOR = 0.05
-"""Simulated over real time on a busy machine."""
+MIN_REAL_TIME_FACTOR = 0.05
+"""Minimum ratio of simulated to real time, on a busy machine."""
 
 
 class ShakeError(RuntimeError):
-    """The object could not be shaken; the text says why."""
+    """The object could not be shaken; the message gives the reason."""
 
 
 def shake(samples: Samples, duration_s: float) -> float:
-    """Shakes the arm and waits until that has ended.
+    """Shakes the arm and waits for the end.
 
     Args:
-        samples: What controllers and joints said so far.
-        duration_s: For how long [s of simulated time].
+        samples: Messages collected so far.
+        duration_s: Duration [s of simulated time].
 
     Returns:
-        ROS time at which it began [s].
+        ROS time of the start [s].
 
     Raises:
-        ShakeError: There is no trajectory controller, or it refuses the motion or leaves it.
+        ShakeError: There is no trajectory controller, or the controller rejects or aborts the motion.
         CallError: The controller does not answer.
     """
     controller, joints, positions = _arm(samples)
@@ -52,16 +52,16 @@ def shake(samples: Samples, duration_s: float) -> float:
     ]
     begun = rospy.get_time()
     client.send_goal(FollowJointTrajectoryGoal(trajectory=trajectory))
-    if wait_for_result(client, ACTION_TIMEOUT_S + duration_s / SLOWEST_FACTOR) != GoalStatus.SUCCEEDED:
+    if wait_for_result(client, ACTION_TIMEOUT_S + duration_s / MIN_REAL_TIME_FACTOR) != GoalStatus.SUCCEEDED:
         raise ShakeError(f"controller '{controller}' did not shake the arm: {client.get_goal_status_text()}")
     return begun
 
 
 def _arm(samples: Samples) -> tuple[str, list[str], Any]:
-    """Returns the trajectory controller with the most joints, these, and where they are."""
+    """Returns the trajectory controller with the most joints, its joint names and their positions."""
     latest = {name: message for name, message in samples.controllers}
     if not latest:
-        raise ShakeError("no trajectory controller publishes its state; an arm is shaken through one")
+        raise ShakeError("no trajectory controller publishes its state, which a shake needs; start one")
     name = max(latest, key=lambda controller: (len(latest[controller].joint_names), controller))
     message = latest[name]
     return name, list(message.joint_names), np.array(message.desired.positions)

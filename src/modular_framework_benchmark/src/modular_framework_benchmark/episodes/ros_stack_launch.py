@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Works out from the settings of an episode what is launched, before anything is."""
+"""Resolves the settings of an episode to its launch, without launching anything."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ from modular_framework_core.launching.launch_values import METHOD, NO_METHOD, fi
 from modular_framework_core.launching.robot_controllers_spawner import ControllerFileError, read_controller_file
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, preview_launch
 
-OWN_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
-"""Launch arguments of every episode, where the launch file has them."""
+FIXED_ARGUMENTS = {"end_with_task": "false", "gui": "false", "rviz": "false"}
+"""Launch arguments of every episode whose launch file has them."""
 DEFAULT_ARGUMENTS = {"wait_for_planning": "true", "real_time_factor": "0"}
-"""Launch arguments of episodes that do not set them: simulated time waits for computations, and else runs as fast as
-it can, so that an episode does not depend on how busy the machine is."""
-TRUTHS = ("true", "1")
+"""Launch arguments of episodes that do not set them: simulated time waits for computations and otherwise runs as fast
+as possible, so that an episode does not depend on the load of the machine."""
+TRUE_VALUES = ("true", "1")
 LAUNCH_SEED = "/seed"
-"""Seed with which move_group starts its worker for seeded plans before the first one; each episode sets its own."""
+"""Seed of move_group's worker for seeded plans at the start; each episode sets its own seed."""
 
 
 def resolve_launch(settings: TaskSettings) -> StackLaunch:
-    """Returns what an episode launches.
+    """Returns the launch of an episode.
 
     Raises:
-        SettingsError: There is no such launch file, or an argument is wrong.
+        SettingsError: The launch file does not exist, or an argument is wrong.
     """
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (settings.package, settings.launch_file))])[0]
         known = known_arguments(path)
         arguments = {name: value for name, value in DEFAULT_ARGUMENTS.items() if name in known}
         arguments |= settings.arguments
-        arguments |= {name: value for name, value in OWN_ARGUMENTS.items() if name in known}
+        arguments |= {name: value for name, value in FIXED_ARGUMENTS.items() if name in known}
         given = [f"{name}:={value}" for name, value in arguments.items()]
         check_arguments(path, given, file_faults)
         values = argument_values(path, given)
@@ -68,45 +68,45 @@ def resolve_launch(settings: TaskSettings) -> StackLaunch:
         {"/task/wait_for_start": True, LAUNCH_SEED: 0, **settings.parameters},
         method_nodes,
         controllers,
-        values.get("wait_for_planning", "").lower() in TRUTHS,
+        values.get("wait_for_planning", "").lower() in TRUE_VALUES,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class StackPreview:
-    """What an episode would launch, and what that would start."""
+    """Launch of an episode, and the preview of its nodes and parameters."""
 
     launch: StackLaunch
     preview: LaunchPreview
 
 
-LAUNCHED = ("launch", "arguments", "task")
-"""Settings that decide what is launched; parameters of an episode are set over those of its launch files."""
+LAUNCH_SETTINGS = ("launch", "arguments", "task")
+"""Settings that determine the launch; an episode's parameters override those of its launch files."""
 
 
 def preview_stack(settings: Mapping[str, Any]) -> StackPreview:
-    """Returns what an episode with these settings would start; its launch files are loaded once.
+    """Returns the preview of an episode's stack; equal launches are loaded once.
 
     Raises:
-        SettingsError: As of `resolve_launch`, or the launch file cannot be loaded.
+        SettingsError: See `resolve_launch`; or the launch file is invalid.
     """
-    return loaded_stack(json.dumps({key: settings[key] for key in LAUNCHED if key in settings}, sort_keys=True))
+    return loaded_stack(json.dumps({key: settings[key] for key in LAUNCH_SETTINGS if key in settings}, sort_keys=True))
 
 
 @lru_cache(maxsize=256)
 def loaded_stack(settings: str) -> StackPreview:
-    """As `preview_stack`, of JSON; a process loads the launch files of equal settings once."""
+    """Returns the preview of a stack from settings as JSON; cached per process."""
     launch = resolve_launch(read_settings(EpisodeSpec(0, {}, 0, 1, json.loads(settings))))
     try:
         path = roslaunch.rlutil.resolve_launch_arguments([*filter(None, (launch.package, launch.launch_file))])[0]
-        found = preview_launch(path, [f"{name}:={value}" for name, value in launch.arguments.items()])
+        preview = preview_launch(path, [f"{name}:={value}" for name, value in launch.arguments.items()])
     except roslaunch.core.RLException as error:
         raise SettingsError(f"setting 'launch' {launch.package}/{launch.launch_file}: {error}") from error
-    return StackPreview(launch, found)
+    return StackPreview(launch, preview)
 
 
 def _nodes_of(method: str) -> tuple[str, ...]:
-    """Returns the names of the nodes in the launch file of a method; that of NO_METHOD has none."""
+    """Returns the names of the nodes in the launch file of a method; NO_METHOD has none."""
     if method in NO_METHOD:
         return ()
     package, _, file = method.partition("/")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Launches the stack of an episode: a launch file with parameters set over its own.
+"""Launches the stack of an episode: a launch file with overriding parameters.
 
     python3 -m modular_framework_benchmark.episodes.ros_stack_launcher PACKAGE FILE PARAMETERS_FILE [name:=value ...]
 
-It runs until it is stopped or a node dies, and says last which one and why. The process that started it kills the nodes
-that are left.
+The program runs until it is stopped or a node dies; it then prints the node and the cause. The parent process kills the
+remaining nodes.
 """
 
 from __future__ import annotations
@@ -16,6 +16,6 @@ from modular_framework_core.launching.launch_runner import run_launch_file
 
 if __name__ == "__main__":
     package, launch_file, parameters, *arguments = sys.argv[1:]
-    # the task waits for its start and does not end by itself: its end is a death like that of any node
+    # The task waits for its start and does not end, so the end of its node counts as a death.
     later_files = [Path(parameters)]
     sys.exit(run_launch_file(package, launch_file, arguments, "", later_files, leaves_nodes=True))

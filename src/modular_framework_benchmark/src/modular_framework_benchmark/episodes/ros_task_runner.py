@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs an episode of mode `task`: the whole stack by its launch file, one task, judged by what became of the world."""
+"""Runs an episode of mode `task`: the complete stack, one task, and a judgement of the world's final state."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from modular_framework_benchmark.episodes.task_settings import TaskSettings, rea
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
 
 ABORT_TIMEOUT_S = 15.0
-"""How long the recorder has to write what it has when an episode is ended [s]."""
+"""Time for the recorder to write its data when an episode is aborted [s]."""
 
 
 class TaskEpisodeRunner:
-    """Runs episodes, one after the other.
+    """Runs episodes one after another.
 
-    A stack whose world can begin again is kept for the next episode; that one starts its own where it launches
-    something else, or where the stack did not come to its end in order.
+    A stack whose world can be reset is reused by the next episode. An episode starts a new stack if it has a different
+    launch, or if the previous episode did not end normally.
     """
 
     def __init__(self) -> None:
-        """Starts nothing."""
+        """Initialises without starting a stack."""
         self._stack: Stack | None = None
         self._launched: StackLaunch | None = None
         self._resolved: dict[str, StackLaunch] = {}
@@ -40,11 +40,11 @@ class TaskEpisodeRunner:
         """Runs an episode within its time limit.
 
         Args:
-            spec: What to run.
-            folder: Empty folder for its files.
+            spec: Specification of the episode.
+            folder: Empty folder for the episode's files.
 
         Returns:
-            What it gave; a launch that dies is an episode with its cause.
+            Record of the episode; a launch that dies gives a record with the cause.
         """
         end = EpisodeEnd(spec, folder, time.time(), time.monotonic(), MachineLoad.now())
         try:
@@ -68,13 +68,13 @@ class TaskEpisodeRunner:
         return make_record(end)
 
     def close(self) -> None:
-        """Stops the stack that is kept; leaves no process. May be called twice."""
+        """Stops the reusable stack and all its processes; repeated calls are allowed."""
         if self._stack is not None:
             self._stack.stop()
         self._stack = self._launched = None
 
     def _launch_of(self, settings: TaskSettings) -> StackLaunch:
-        """Returns what an episode launches; launch files are read once, for that takes as long as a warm begin."""
+        """Returns the launch of an episode; cached, because resolving it takes as long as a warm start."""
         parts = (settings.package, settings.launch_file, dict(settings.arguments), dict(settings.parameters))
         key = json.dumps(parts, sort_keys=True)
         if key not in self._resolved:
@@ -101,19 +101,19 @@ class TaskEpisodeRunner:
             "begun": end.begun_monotonic,
         }
         end = end.with_target(settings.success.object)
-        left_s = settings.time_limit_s - (time.monotonic() - end.begun_monotonic)
+        remaining_s = settings.time_limit_s - (time.monotonic() - end.begun_monotonic)
         try:
-            answer = stack.ask(request, left_s)
+            answer = stack.request(request, remaining_s)
         except StackError as error:
             return end.broken(str(error))
         except TimeoutError:
             answer = stack.abort(ABORT_TIMEOUT_S) or {}
-            cause = f"no end within {settings.time_limit_s:g} s; {stack.last_words()}"
-            # before the world is ready, the method is asked for nothing
+            cause = f"no end within {settings.time_limit_s:g} s; {stack.last_output()}"
+            # The method is not called before the world is ready.
             status = EpisodeStatus.TIMED_OUT if "requested_s" in answer else EpisodeStatus.BROKEN
             return end.ended(status, cause, answer)
         if "fault" in answer:
-            return end.broken(stack.cause_of(str(answer["fault"])))
+            return end.broken(stack.root_cause(str(answer["fault"])))
         if answer.get("foul"):
             return end.ended(EpisodeStatus.INVALID, str(answer["foul"]), answer)
         cause = _failure(settings, answer)
@@ -121,7 +121,7 @@ class TaskEpisodeRunner:
 
 
 def _failure(settings: TaskSettings, answer: Mapping[str, Any]) -> str:
-    """Returns why an episode whose task ended is no success; "" if it is one."""
+    """Returns why an episode whose task ended did not succeed; "" after a success."""
     if not answer["task_succeeded"]:
         return str(answer["reason"]) or f"the task ended with outcome '{answer['outcome']}'"
     wanted = settings.success
@@ -129,7 +129,7 @@ def _failure(settings: TaskSettings, answer: Mapping[str, Any]) -> str:
         return ""
     lifted, held = answer["lifted"].get(wanted.object), bool(answer["held"])
     if lifted is None:
-        return f"there is no object '{wanted.object}' in the world; 'success' has to name one of the episode's objects"
+        return f"there is no object '{wanted.object}' in the world; 'success' must name an object of the episode"
     if lifted > wanted.lifted_m and held:
         return ""
     return (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts the objects of an episode into the simulated world, and has the world judge what became of them."""
+"""Spawns the objects of an episode in the simulated world, and asks the simulation for a judgement of the result."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from modular_framework_ros.calls import call_service, request_service, wait_for_
 
 SPAWN_SERVICE, REFEREE_SERVICE = "/gazebo/spawn_sdf_model", "/gazebo/referee"
 SIMULATION_NODE, TASK_NODE = "/gazebo", "/task"
-SERVICE_TIMEOUT_S = 60.0  # a mesh may have to be cut into convex parts
+SERVICE_TIMEOUT_S = 60.0  # long enough for a convex decomposition of a mesh
 
 
 class WorldError(RuntimeError):
-    """An object cannot be put into the world; the text says why."""
+    """An object cannot be spawned; the message gives the reason."""
 
 
 def spawn(entry: dict[str, Any]) -> None:
-    """Puts an object into the world.
+    """Spawns an object in the world.
 
     Args:
         entry: `name`, `model`, `position` [m] and `rpy` [rad] in the world frame, see `PlacedObject`.
 
     Raises:
-        WorldError: There is no such model, or the simulation refuses it.
+        WorldError: The model does not exist, or the simulation rejects it.
         CallError: The simulation does not answer.
     """
     proxy = rospy.ServiceProxy(SPAWN_SERVICE, SpawnModel)
@@ -44,17 +44,17 @@ def spawn(entry: dict[str, Any]) -> None:
     request = SpawnModel._request_class(entry["name"], _description(entry["model"]), "", pose, "world")
     answer = call_service(proxy, request, SERVICE_TIMEOUT_S)
     if not answer.success:
-        raise WorldError(f"object '{entry['name']}' cannot be put into the world: {answer.status_message}")
+        raise WorldError(f"object '{entry['name']}' cannot be spawned: {answer.status_message}")
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What the simulation's own process knows of the world; no topic is read for it.
+    """State of the world from the simulation's own process, independent of topics.
 
     Attributes:
         held: Names of the objects that touch two fingers of a gripper.
         poses: Position [m] and quaternion (xyzw) of each model in the world frame.
-        interventions: The latest changes of the world beside its physics, with `number`, `time_s`, `what`, `caller`.
+        interventions: Latest changes of the world outside its physics: `number`, `time_s`, `what`, `caller`.
     """
 
     held: Collection[str]
@@ -63,35 +63,35 @@ class Judgement:
 
     @property
     def number(self) -> int:
-        """The number of the latest intervention; 0 without one."""
+        """Number of the latest intervention; 0 without interventions."""
         return int(self.interventions[-1]["number"]) if self.interventions else 0
 
-    def foul(self, since: int) -> str:
-        """Returns what was changed in the world since an intervention by others than the task; "" for nothing."""
+    def interference(self, since: int) -> str:
+        """Returns the changes of the world by nodes other than the task since an intervention; "" for none."""
         foreign = [each for each in self.interventions if each["number"] > since and each["caller"] != TASK_NODE]
         if not foreign:
             return ""
         first = foreign[0]
-        caller = f" by '{first['caller']}', as it calls itself" if first["caller"] else ""
+        caller = f" by a node named '{first['caller']}'" if first["caller"] else ""
         more = f", and {len(foreign) - 1} more" if len(foreign) > 1 else ""
-        return f"the world was changed beside its physics{caller}: {first['what']} at {first['time_s']:.3f} s{more}"
+        return f"the world was changed outside its physics{caller}: {first['what']} at {first['time_s']:.3f} s{more}"
 
 
-class FoulError(WorldError):
-    """An episode is invalid: what it is judged by does not come from the simulation; the text says from where."""
+class InterferenceError(WorldError):
+    """An episode is invalid, because the basis of its judgement does not come from the simulation."""
 
 
 def judge() -> Judgement:
-    """Asks the simulation what became of the world.
+    """Requests the state of the world from the simulation.
 
     Raises:
-        FoulError: Another node offers the referee's service.
+        InterferenceError: Another node offers the referee's service.
         WorldError, CallError: The simulation does not answer.
     """
     services = rosgraph.Master(rospy.get_name()).getSystemState()[2]
     nodes = next((nodes for name, nodes in services if name == REFEREE_SERVICE), [])
     if nodes and nodes != [SIMULATION_NODE]:
-        raise FoulError(f"'{REFEREE_SERVICE}' is answered by '{', '.join(nodes)}', not by the simulation")
+        raise InterferenceError(f"'{REFEREE_SERVICE}' is answered by '{', '.join(nodes)}', not by the simulation")
     answer = request_service(REFEREE_SERVICE, Trigger, TriggerRequest(), SERVICE_TIMEOUT_S)
     if not answer.success:
         raise WorldError(f"the simulation does not judge the world: {answer.message}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an episode ran with: versions, machine, git revision."""
+"""Snapshot of an episode's environment: versions, machine, load."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 
 PACKAGES = ("coal", "numpy", "ompl", "pin", "pybullet", "scipy", "toppra")
-"""Packages whose versions change results."""
+"""Packages whose versions affect results."""
 
 COLD_START = "cold_start"
-"""Part of the snapshot of an episode that was the first one of its stack."""
-NOT_SHOWN = ("seed", "settings", "parameters", "final_objects", COLD_START)
-"""Parts of a snapshot that differ between episodes by nature."""
+"""Snapshot part that marks the first episode of a stack."""
+VARYING_PARTS = ("seed", "settings", "parameters", "final_objects", COLD_START)
+"""Snapshot parts that differ between episodes by nature."""
 RUN_MARK = "MODULAR_FRAMEWORK_RUN"
-"""Environment variable of every process that a run has started: RUN/WORKER."""
+"""Environment variable of every process of a run: RUN/WORKER."""
 
 
 @functools.cache
 def versions() -> dict[str, Any]:
-    """Returns versions and the git revision of this software, the same for all episodes of a process."""
+    """Returns the versions and the git revision of this software, constant within a process."""
     found = {}
     for name in PACKAGES:
         try:
@@ -47,7 +47,7 @@ def versions() -> dict[str, Any]:
 
 
 def _git(*arguments: str) -> str:
-    """Returns what git says of the source tree; "" outside of one, such as in an install space."""
+    """Returns the output of git for the source tree; "" outside a repository, such as in an install space."""
     try:
         done = subprocess.run(
             ["git", "-C", str(Path(__file__).resolve().parent), *arguments], capture_output=True, text=True, timeout=20
@@ -59,7 +59,7 @@ def _git(*arguments: str) -> str:
 
 @functools.cache
 def machine() -> dict[str, Any]:
-    """Returns what the machine is."""
+    """Returns the properties of the machine."""
     names = [line.partition(":")[2].strip() for line in _lines("/proc/cpuinfo") if line.startswith("model name")]
     return {
         "host": platform.node(),
@@ -72,7 +72,7 @@ def machine() -> dict[str, Any]:
 
 @functools.cache
 def reference_s() -> float:
-    """Returns the seconds of a fixed workload on this machine, the least of five: what machines are compared by."""
+    """Returns the minimum duration of a fixed workload in five runs [s], which compares the speed of machines."""
     times = []
     for _ in range(5):
         start = time.perf_counter()
@@ -86,14 +86,14 @@ def reference_s() -> float:
 
 @dataclass(frozen=True, slots=True)
 class MachineLoad:
-    """What the machine has done until a moment.
+    """Counters of the machine at a moment.
 
     Attributes:
-        time_s: The moment, by the monotonic clock [s].
-        load_1_min: Mean number of processes that ran or waited, over the last minute.
-        busy_s: Time that its processors worked [s].
-        stolen_s: Time that the hypervisor gave to others [s].
-        others_s: Processor time of each process that is not of this run, by its identifier [s].
+        time_s: Time of the monotonic clock [s].
+        load_1_min: Load average over the last minute.
+        busy_s: Busy time of the processors [s].
+        stolen_s: Processor time that the hypervisor gave to other machines [s].
+        others_s: Processor time of each process outside this run [s], keyed by process id.
     """
 
     time_s: float
@@ -104,14 +104,14 @@ class MachineLoad:
 
     @classmethod
     def now(cls) -> MachineLoad:
-        """Reads it from /proc."""
+        """Reads the counters from /proc."""
         ticks = [float(value) / _TICKS for value in _lines("/proc/stat")[0].split()[1:]]
         stolen_s = ticks[7] if len(ticks) > 7 else 0.0
         busy_s = sum(ticks[:3]) + sum(ticks[5:8])
         return cls(time.monotonic(), os.getloadavg()[0], busy_s, stolen_s, _others_s())
 
     def since(self, before: MachineLoad) -> dict[str, float]:
-        """Returns the load of an episode: `others_share` is the fraction of the machine that other processes used."""
+        """Returns the load since another moment; `others_share` is the machine fraction used by other processes."""
         others_s = sum(max(spent - before.others_s.get(pid, 0.0), 0.0) for pid, spent in self.others_s.items())
         available_s = max(self.time_s - before.time_s, 1e-3) * len(os.sched_getaffinity(0))
         return {
@@ -127,16 +127,16 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def _others_s() -> dict[int, float]:
-    own, found = {os.getpid(), os.getppid()}, {}
+    excluded, found = {os.getpid(), os.getppid()}, {}
     run = f"{RUN_MARK}={os.environ.get(RUN_MARK, '').partition('/')[0]}".encode()
     for folder in Path("/proc").iterdir():
         try:
-            if not folder.name.isdigit() or int(folder.name) in own or _is_of_run(folder, run):
+            if not folder.name.isdigit() or int(folder.name) in excluded or _is_of_run(folder, run):
                 continue
-            # the name in brackets may have spaces
+            # The name in parentheses may contain spaces.
             fields = (folder / "stat").read_text(errors="replace").rpartition(")")[2].split()
             found[int(folder.name)] = (float(fields[11]) + float(fields[12])) / _TICKS
-        except OSError:  # it has ended
+        except OSError:  # the process has ended
             continue
     return found
 
@@ -144,7 +144,7 @@ def _others_s() -> dict[int, float]:
 def _is_of_run(process: Path, run: bytes) -> bool:
     try:
         environment = (process / "environ").read_bytes()
-    except PermissionError:  # another user's
+    except PermissionError:  # a process of another user
         return False
     return any(variable.startswith(run) for variable in environment.split(b"\0"))
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The stack of an episode: launched on a ROS master of its own, watched, and stopped so that nothing of it is left.
+"""Stack of an episode: launched on a separate ROS master, supervised, and stopped completely.
 
-What runs beside the stack and records it is a process of the session, too: a ROS node belongs to one master for life.
+The recorder is a process of its own, because a ROS node belongs to one master for life.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ RECORDER = "modular_framework_benchmark.episodes.ros_episode_recorder"
 POLL_S = 0.02
 NODE_DIED, END_TIMEOUT_S = "process has died", 30.0
 SHARED_FOLDERS = ("convex_parts",)
-"""Folders of the framework's home that sessions share: what is computed once for all."""
+"""Folders of the framework's home that sessions share, as caches of computed data."""
 
 
 @dataclass(frozen=True, slots=True)
 class StackLaunch:
-    """What is launched; episodes with equal ones can have the same stack.
+    """Launch of a stack; episodes with equal launches can share a stack.
 
     Attributes:
         package: Package of the launch file.
-        launch_file: Its name.
+        launch_file: Name of the launch file.
         arguments: Launch arguments.
-        parameters: ROS parameters over those of the launch files, by absolute name.
-        method_nodes: Absolute names of the nodes of the method that generates grasps; none without a method.
-        controllers: Names of the controllers that are started.
-        can_restart: Whether its world can begin again as after a cold start.
+        parameters: ROS parameters that override those of the launch files, keyed by absolute name.
+        method_nodes: Absolute names of the grasp generation method's nodes; empty without a method.
+        controllers: Names of the controllers to start.
+        can_restart: Whether the world can be reset to its state after a cold start.
     """
 
     package: str
@@ -54,31 +54,31 @@ class StackLaunch:
 
 
 class StackError(RuntimeError):
-    """The stack died or does not answer; the text says what died, and its last words."""
+    """The stack died or does not answer; the message names the process and its last output."""
 
 
 def write_parameters(path: Path, parameters: Mapping[str, Any]) -> None:
     """Writes a launch file that sets ROS parameters.
 
     Args:
-        path: File to write.
-        parameters: JSON values by absolute name.
+        path: Path of the launch file.
+        parameters: JSON values, keyed by absolute name.
     """
     root = ElementTree.Element("launch")
     for name, value in parameters.items():
-        # JSON is YAML, and says the type: a text that looks like a number stays a text
+        # JSON is valid YAML and preserves types: a number-like text stays a text.
         ElementTree.SubElement(root, "rosparam", {"param": name}).text = json.dumps(value)
     path.write_text(ElementTree.tostring(root, encoding="unicode"))
 
 
 class Stack:
-    """A launched stack and the recorder beside it."""
+    """A launched stack with its recorder."""
 
     def __init__(self, launch: StackLaunch) -> None:
-        """Starts both; does not wait for them.
+        """Starts the stack and the recorder without waiting.
 
         Args:
-            launch: What to launch.
+            launch: Launch of the stack.
         """
         self._session = LaunchSession()
         home = Path(self._session.env["ROS_HOME"]) / "modular_framework"
@@ -99,29 +99,29 @@ class Stack:
             ]
         )
         self._recorder = Recorder(self._session.env, self._session.folder / "recorder.txt")
-        self._written = 0
+        self._log_end = 0
 
     def write_log(self, path: Path) -> None:
-        """Writes what the launch has printed since the last call."""
+        """Writes the output of the launch since the last call."""
         log = self._launch.log()
-        path.write_text(log[self._written :])
-        self._written = len(log)
+        path.write_text(log[self._log_end :])
+        self._log_end = len(log)
 
-    def last_words(self) -> str:
-        """Returns what the launch printed last, in a sentence."""
+    def last_output(self) -> str:
+        """Returns the last output of the launch as a clause."""
         lines = [line.strip() for line in self._launch.log().splitlines() if line.strip()]
         return f"the launch said last: {lines[-1]}" if lines else "the launch said nothing"
 
-    def ask(self, request: Mapping[str, Any], timeout_s: float) -> dict[str, Any]:
-        """Has the recorder do something, and returns its answer.
+    def request(self, request: Mapping[str, Any], timeout_s: float) -> dict[str, Any]:
+        """Sends a request to the recorder and returns its answer.
 
         Args:
             request: JSON values.
-            timeout_s: Longest real time for it [s].
+            timeout_s: Maximum real time [s].
 
         Raises:
             StackError: The launch or the recorder died.
-            TimeoutError: There was no answer in time.
+            TimeoutError: The answer did not arrive in time.
         """
         self._recorder.send(request)
         end = time.monotonic() + timeout_s
@@ -130,54 +130,54 @@ class Stack:
             if answer is not None:
                 return answer
             if not self._launch.alive():
-                raise StackError(self._cause())
+                raise StackError(self._launch_cause())
             if not self._recorder.alive():
-                raise StackError(self.cause_of(f"the recorder of the episode died: {self._recorder.last_words()}"))
+                raise StackError(self.root_cause(f"the recorder of the episode died: {self._recorder.last_output()}"))
         raise TimeoutError(f"no end within {timeout_s:g} s")
 
     def abort(self, timeout_s: float) -> dict[str, Any] | None:
-        """Has the recorder write what it has; returns its answer, None without one in time [s]."""
+        """Aborts the episode and returns the recorder's answer, or None after the timeout [s]."""
         self._recorder.send({"abort": True})
         return self._recorder.answer(timeout_s)
 
     def alive(self) -> bool:
-        """Returns whether the stack and the recorder run."""
+        """Returns whether the stack and the recorder are running."""
         return self._launch.alive() and self._recorder.alive()
 
-    def cause_of(self, failure: str) -> str:
-        """Returns why something failed: the death of a node where one has died, for all else follows from it.
+    def root_cause(self, failure: str) -> str:
+        """Returns the root cause of a failure: the death of a node, or else the failure itself.
 
         Args:
-            failure: What failed.
+            failure: Description of the failure.
         """
         end = time.monotonic() + END_TIMEOUT_S
         while NODE_DIED in self._launch.log() and self._launch.alive() and time.monotonic() < end:
-            time.sleep(POLL_S)  # the launch names the node a moment later
-        return failure if self._launch.alive() else self._cause()
+            time.sleep(POLL_S)  # the launch names the node shortly after
+        return failure if self._launch.alive() else self._launch_cause()
 
-    def _cause(self) -> str:
-        """Returns why the launch ended: its own last words."""
+    def _launch_cause(self) -> str:
+        """Returns the cause of the launch's death from its last output."""
         lines = [line.strip() for line in self._launch.log().splitlines() if line.strip()]
-        own = [number for number, line in enumerate(lines) if line.startswith("run_framework: ")]
-        if own:
-            return "the launch died: " + " ".join(lines[own[-1] :]).removeprefix("run_framework: ")
+        starts = [number for number, line in enumerate(lines) if line.startswith("run_framework: ")]
+        if starts:
+            return "the launch died: " + " ".join(lines[starts[-1] :]).removeprefix("run_framework: ")
         return f"the launch died: exit code {self._launch.process.poll()}, {lines[-1] if lines else 'no output'}"
 
     def stop(self) -> None:
-        """Stops everything at once and leaves no process and no file. May be called twice."""
+        """Kills all processes and removes all files; repeated calls are allowed."""
         self._session.kill()
         self._recorder.close()
 
 
 class Recorder:
-    """The recorder's process: takes requests and gives answers, a line of JSON each."""
+    """Process of the recorder, which receives requests and sends answers, one line of JSON each."""
 
     def __init__(self, env: Mapping[str, str], log_path: Path) -> None:
-        """Starts it.
+        """Starts the process.
 
         Args:
             env: Environment of the session.
-            log_path: File for what it prints beside its answers.
+            log_path: File for the standard error output.
         """
         self._log_path = log_path
         with log_path.open("w") as log_file:
@@ -200,30 +200,30 @@ class Recorder:
                 self._answers.put(json.loads(line))
 
     def send(self, request: Mapping[str, Any]) -> None:
-        """Sends a request; one to a dead recorder is lost."""
+        """Sends a request; a request to a dead recorder is lost."""
         assert self._process.stdin is not None
         with contextlib.suppress(OSError, ValueError):
             self._process.stdin.write(json.dumps(request) + "\n")
             self._process.stdin.flush()
 
     def answer(self, timeout_s: float) -> dict[str, Any] | None:
-        """Returns the next answer; None when there is none in time [s]."""
+        """Returns the next answer, or None after the timeout [s]."""
         try:
             return self._answers.get(timeout=timeout_s)
         except queue.Empty:
             return None
 
     def alive(self) -> bool:
-        """Returns whether it runs."""
+        """Returns whether the process is running."""
         return self._process.poll() is None
 
-    def last_words(self) -> str:
-        """Returns the last line it printed."""
+    def last_output(self) -> str:
+        """Returns the last line of the log."""
         lines = self._log_path.read_text(errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit code {self._process.poll()}"
 
     def close(self) -> None:
-        """Ends it. May be called twice."""
+        """Ends the process; repeated calls are allowed."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):

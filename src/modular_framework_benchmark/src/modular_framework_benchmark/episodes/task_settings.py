@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The settings of an episode of mode `task`, read from `EpisodeSpec.settings`."""
+"""Settings of an episode of mode `task`, from `EpisodeSpec.settings`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ DEFAULT_TIME_LIMIT_S = 120.0
 
 @dataclass(frozen=True, slots=True)
 class PlacedObject:
-    """An object and where it is put.
+    """An object with its initial pose.
 
     Attributes:
-        name: Its name in the simulation.
-        model: Folder in the description package's models, or the absolute path of an .sdf file.
-        position: In the world frame [m].
+        name: Name of the object in the simulation.
+        model: Folder in the description package's models, or absolute path of an .sdf file.
+        position: Position in the world frame [m].
         rpy: Roll, pitch, yaw in the world frame [rad].
     """
 
@@ -33,12 +33,12 @@ class PlacedObject:
 
 @dataclass(frozen=True, slots=True)
 class SuccessCriteria:
-    """What must hold in the world at the end.
+    """Success criteria for the final state of the world.
 
     Attributes:
-        object: Name of the object that is to be lifted and held; "": the outcome of the task is enough.
-        lifted_m: How much higher it must be than at the start [m].
-        hold_s: Simulated time after the end of the task when that is checked [s].
+        object: Name of the object to be lifted and held; "" if the outcome of the task suffices.
+        lifted_m: Minimum height above the initial height [m].
+        hold_s: Simulated time between the end of the task and the check [s].
     """
 
     object: str = ""
@@ -48,20 +48,20 @@ class SuccessCriteria:
 
 @dataclass(frozen=True, slots=True)
 class TaskSettings:
-    """What an episode of mode `task` runs.
+    """Settings of an episode of mode `task`.
 
     Attributes:
         package: Package of the launch file; empty for a path.
-        launch_file: Name of the launch file, or its path.
+        launch_file: Name or path of the launch file.
         arguments: Launch arguments.
-        parameters: ROS parameters by absolute name, set over those of the launch files.
-        objects: What is put into the world before the task starts.
-        success: What must hold at the end.
-        shake_s: Simulated time for which the object is shaken after that [s]; 0: it is not.
-        time_limit_s: Longest real time from the start to the end of the task [s].
-        record_bag: Whether all topics are recorded to a bag.
-        record_video: Whether a video is made.
-        warm: Whether the stack may be used again.
+        parameters: ROS parameters that override those of the launch files, keyed by absolute name.
+        objects: Objects to spawn before the task starts.
+        success: Success criteria.
+        shake_s: Simulated duration of the shake after the check [s]; 0 for no shake.
+        time_limit_s: Maximum real time from the start to the end of the task [s].
+        record_bag: Whether to record all topics to a bag.
+        record_video: Whether to render a video.
+        warm: Whether the stack may be reused.
     """
 
     package: str
@@ -81,13 +81,13 @@ def read_settings(spec: EpisodeSpec) -> TaskSettings:
     """Returns the settings of an episode.
 
     Raises:
-        SettingsError: One is missing or wrong.
+        SettingsError: A setting is missing or wrong.
     """
     settings = spec.settings
     launch = str(settings.get("launch", DEFAULT_LAUNCH))
     package, _, launch_file = ("", "", launch) if launch.startswith("/") else launch.partition("/")
     if not launch_file:
-        raise SettingsError(f"setting 'launch' is {settings['launch']!r}; allowed is PACKAGE/FILE.launch; correct it")
+        raise SettingsError(f"setting 'launch' is {settings['launch']!r}; allowed: PACKAGE/FILE.launch; correct it")
     arguments = {name: _text(value) for name, value in dict(settings.get("arguments") or {}).items()}
     if settings.get("task"):
         arguments["task_constructor_script"] = str(settings["task"])
@@ -116,12 +116,12 @@ def _text(value: Any) -> str:
 def _object(entry: Mapping[str, Any], number: int) -> PlacedObject:
     missing = [key for key in ("model", "x", "y", "z") if key not in entry]
     if missing:
-        raise SettingsError(f"setting 'objects', number {number}: {', '.join(missing)} is missing; give it")
+        raise SettingsError(f"setting 'objects', number {number}: {', '.join(missing)} is missing; add it")
     try:
         position = (float(entry["x"]), float(entry["y"]), float(entry["z"]))
         rpy = (float(entry.get("roll", 0.0)), float(entry.get("pitch", 0.0)), float(entry.get("yaw", 0.0)))
     except (TypeError, ValueError) as error:
-        raise SettingsError(f"setting 'objects', number {number}: {error}; give numbers [m, rad]") from error
+        raise SettingsError(f"setting 'objects', number {number}: {error}; use numbers [m, rad]") from error
     return PlacedObject(str(entry.get("name") or f"object_{number}"), str(entry["model"]), position, rpy)
 
 
@@ -131,6 +131,6 @@ def _success(given: Mapping[str, Any], objects: tuple[PlacedObject, ...]) -> Suc
     name = str(given.get("object") or (objects[0].name if objects else ""))
     if not name:
         raise SettingsError(
-            "setting 'success' names no object, and there are no objects; add 'object', or leave it out"
+            "setting 'success' names no object, and there are no objects; add 'object', or remove 'success'"
         )
     return SuccessCriteria(name, float(given.get("lifted", 0.1)), float(given.get("hold_time", 2.0)))

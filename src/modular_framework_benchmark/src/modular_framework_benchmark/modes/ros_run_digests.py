@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
-from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCHED, preview_stack
+from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCH_SETTINGS, preview_stack
 from modular_framework_benchmark.episodes.snapshot import PACKAGES
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
-LOADED = (*LAUNCHED, "robot", "method")
+LOADED = (*LAUNCH_SETTINGS, "robot", "method")
 """Settings that decide what is launched or loaded."""
 LIBRARIES = ("modular_framework_benchmark", "modular_framework_core", "modular_framework_planning")
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from modular_framework_benchmark.episodes.snapshot import COLD_START, NOT_SHOWN
+from modular_framework_benchmark.episodes.snapshot import COLD_START, VARYING_PARTS
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_content import ReportSource
@@ -33,7 +33,7 @@ class OpenedExperiment:
     @property
     def snapshots(self) -> SnapshotValues:
         """Returns what the episodes ran with: the different values of each name, each with its number of episodes."""
-        return self.database.snapshot_values(self.number, NOT_SHOWN)
+        return self.database.snapshot_values(self.number, VARYING_PARTS)
 
     @property
     def results_by_start(self) -> ExperimentResults:
