@@ -197,7 +197,7 @@ def test_a_users_metric_that_raises_costs_its_own_value_only(tmp_path: Path) -> 
         ("def a(e): pass\n", "mine.py:b", "has no function 'b'; it has a"),
         ("import nothing_at_all\n", "mine.py:b", "cannot be imported: ModuleNotFoundError"),
         ("", "other.py:b", "there is no file"),
-        ("", "mine.txt:b", "has not the form FILE.py:FUNCTION"),
+        ("", "mine.txt:b", "does not have the form FILE.py:FUNCTION"),
     ],
 )
 def test_a_users_metric_that_cannot_be_loaded_is_explained(

@@ -67,7 +67,7 @@ def test_what_stands_still_or_has_few_points_has_no_smoothness() -> None:
 
 @pytest.mark.parametrize(
     ("times", "positions", "message"),
-    [([0.0, 1.0], [[0.0]], "2 times for 1 points"), ([0.0], [0.0], "one row a point")],
+    [([0.0, 1.0], [[0.0]], "2 times for 1 points"), ([0.0], [0.0], "one row per point")],
 )
 def test_arrays_that_do_not_fit_are_refused(times: list[float], positions: list[object], message: str) -> None:
     with pytest.raises(ValueError, match=message):

@@ -84,7 +84,7 @@ def test_a_seed_repeats_a_plan_whatever_was_planned_before(
     [
         (
             {"planner": "RRTConect"},
-            "planner 'RRTConect': pipeline 'ompl' has none of that name; allowed",
+            "planner 'RRTConect': pipeline 'ompl' has no such planner; allowed",
         ),
         ({"planner_parameters": {"rage": 1.0}}, "rage"),
         ({"parameters": {"/other_node/x": 1}}, "'/other_node/x' has no effect in this mode"),
@@ -126,4 +126,4 @@ def test_reachable_poses_are_solved(tmp_path: Path) -> None:
 def test_a_group_without_a_chain_is_refused(tmp_path: Path) -> None:
     settings = {"robot": "dual_panda_moveit_config", "group": "both_arms", "poses": 1, "metrics": ["success"]}
     record = KinematicsEpisodeRunner().run(EpisodeSpec(0, {}, 0, 3, settings), tmp_path)
-    assert record.status is EpisodeStatus.BROKEN and "both_arms' is no chain" in record.cause
+    assert record.status is EpisodeStatus.BROKEN and "both_arms' is not a chain" in record.cause

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Measures an episode from what was recorded of it."""
+"""Metrics of an episode, computed from its recording."""

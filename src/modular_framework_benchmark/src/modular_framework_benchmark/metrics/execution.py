@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Metrics of the execution of motions (component `execution`, and what controllers and joints measure)."""
+"""Metrics of the execution of motions (component `execution`), from controllers and joint states."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def _within(times_s: Array, executions: list[ComponentReport]) -> npt.NDArray[np
 
 
 def execution_time(episode: EpisodeMeasurements) -> float | None:
-    """Simulated time that the successful motions took, all together [s]."""
+    """Total simulated duration of the successful motions [s]."""
     executions = _executions(episode)
     return sum(report.ended_s - report.started_s for report in executions) if executions else None
 
 
 def execution_success(episode: EpisodeMeasurements) -> float | None:
-    """Share of the motions that were executed to their end, 0 to 1."""
+    """Fraction of the motions that were executed completely, 0 to 1."""
     reports = episode.of_component("execution")
     return sum(report.succeeded for report in reports) / len(reports) if reports else None
 
@@ -48,13 +48,13 @@ def tracking_error(episode: EpisodeMeasurements) -> float | None:
 
 
 def greatest_tracking_error(episode: EpisodeMeasurements) -> float | None:
-    """Greatest distance of a joint from its desired position while a motion was executed [rad]."""
+    """Maximum deviation of a joint from its desired position during motions [rad]."""
     errors = _tracking_errors(episode)
     return float(np.abs(errors).max()) if errors.size else None
 
 
 def _over_motions(episode: EpisodeMeasurements, figure: Callable[[Array, Array], float | None]) -> list[float | None]:
-    """Returns a figure of the measured times and positions of the joints that each executed motion moves."""
+    """Returns a figure of the measured times and positions of the joints in each executed motion."""
     samples, found = episode.joints, []
     for report in _executions(episode):
         if samples is None or report.motion is None:
@@ -67,7 +67,7 @@ def _over_motions(episode: EpisodeMeasurements, figure: Callable[[Array, Array],
 
 
 def executed_length(episode: EpisodeMeasurements) -> float | None:
-    """Length of what the joints of the motions went, measured, all motions together [rad]."""
+    """Total measured length of the executed motions in joint space [rad]."""
     lengths = _over_motions(episode, lambda times, positions: motion_figures.path_length(positions))
     return sum(length for length in lengths if length is not None) if lengths else None
 
@@ -75,11 +75,11 @@ def executed_length(episode: EpisodeMeasurements) -> float | None:
 def executed_smoothness(episode: EpisodeMeasurements) -> float | None:
     """Mean log dimensionless jerk of the executed motions, as measured; nearer to 0 is smoother."""
     values = [value for value in _over_motions(episode, motion_figures.smoothness) if value is not None]
-    return math.fsum(values) / len(values) if values else None  # whatever their sequence
+    return math.fsum(values) / len(values) if values else None  # fsum does not depend on the order
 
 
 def greatest_effort(episode: EpisodeMeasurements) -> float | None:
-    """Greatest measured effort of a joint during the episode, without its sign [Nm; N for prismatic joints]."""
+    """Maximum absolute effort of a joint during the episode [Nm; N for prismatic joints]."""
     if episode.joints is None or not np.isfinite(episode.joints.efforts).any():
         return None
     return float(np.nanmax(np.abs(episode.joints.efforts)))

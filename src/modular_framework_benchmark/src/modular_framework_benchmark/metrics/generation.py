@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Metrics of the method that generates grasps, from what it reports (component `generation`)."""
+"""Metrics of the grasp generation method, from its reports (component `generation`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from modular_framework_ros.reported_figures import BEST_RANK, CANDIDATES, CHECKE
 
 
 def _first(episode: EpisodeMeasurements) -> ComponentReport | None:
-    """Returns the first report: later ones are of objects that the task moved."""
+    """Returns the first report; later reports concern objects that the task moved."""
     reports = episode.of_component("generation")
     return reports[0] if reports else None
 
@@ -16,7 +16,7 @@ def _first(episode: EpisodeMeasurements) -> ComponentReport | None:
 def generation_time(episode: EpisodeMeasurements) -> float | None:
     """Real time from the request for grasps to the answer, measured from outside [s]; None without a grasp or request.
 
-    In the mode `grasps` it is the time of the search alone.
+    In the mode `grasps`, the time of the search alone.
     """
     first = _first(episode)
     return episode.generation_s if first is not None and first.succeeded else None
@@ -28,25 +28,25 @@ def method_processor_time(episode: EpisodeMeasurements) -> float | None:
 
 
 def generation_success(episode: EpisodeMeasurements) -> float | None:
-    """Whether the first generation gave a grasp: 1 or 0."""
+    """Whether the first generation found a grasp: 1 or 0."""
     first = _first(episode)
     return None if first is None else float(first.succeeded)
 
 
 def candidates(episode: EpisodeMeasurements) -> float | None:
-    """How many grasps the first generation found before their reachability was checked."""
+    """Number of grasps found by the first generation before their reachability was checked."""
     first = _first(episode)
     return None if first is None else first.figures.get(CANDIDATES)
 
 
 def best_rank(episode: EpisodeMeasurements) -> float | None:
-    """Place of the first grasp that the arm can reach in the method's own order, 1 for the first; None without one."""
+    """Rank of the first reachable grasp in the method's order, from 1; None without a reachable grasp."""
     first = _first(episode)
     return None if first is None else first.figures.get(BEST_RANK)
 
 
 def reachable_share(episode: EpisodeMeasurements) -> float | None:
-    """Share of the grasps checked in the first generation that the arm can reach without collision, 0 to 1."""
+    """Fraction of the grasps checked in the first generation that are reachable without collision, 0 to 1."""
     first = _first(episode)
     if first is None or not first.figures.get(CHECKED):
         return None

@@ -9,46 +9,50 @@ from scipy.spatial.transform import Rotation
 from modular_framework_benchmark.metrics.measurements import Array, EpisodeMeasurements, ObjectTrack
 
 LIFTED_OFF_M = 0.005
-"""How much higher than at the start of the task an object is that has left its support [m]."""
+"""Height above the initial height at which an object has left its support [m]."""
 LOST_M = 0.03
-"""How far an object has moved in the hand that is no longer held as it was [m]: more than fingers give way."""
+"""Displacement in the hand at which an object counts as lost [m]; it exceeds the compliance of fingers."""
 
 
 def lift(episode: EpisodeMeasurements) -> float | None:
-    """How much higher the object is at the end than at the start of the task [m]."""
+    """Height of the object at the end above its height at the start of the task [m]."""
     heights = _heights(episode)
     return None if heights is None else float(heights[-1])
 
 
 def grasp_time(episode: EpisodeMeasurements) -> float | None:
-    """Simulated time from the start of the task until the object left its support by 5 mm [s]; None if it never did."""
-    lifted_off_s = _lifted_off(episode)
+    """Simulated time from the start of the task until the object was lifted by 5 mm [s]; None if it never was."""
+    lifted_off_s = _lift_off_time(episode)
     return None if lifted_off_s is None else lifted_off_s - episode.task_started_s
 
 
 def slip(episode: EpisodeMeasurements) -> float | None:
-    """How far the object moved in the hand since it left its support, at the end [m]; None if it was lost.
+    """Displacement of the object in the hand between lift-off and the end [m]; None if it was lost.
 
-    It is the distance between the object's positions in the frame of the hand at both moments.
+    The displacement is the distance between the object's positions at both moments in the frame of the hand.
     """
-    lifted_off_s = _lifted_off(episode)
-    moved = None if lifted_off_s is None else _moved_in_hand(episode, lifted_off_s)
-    if moved is None or not episode.held:
+    lifted_off_s = _lift_off_time(episode)
+    displacement = None if lifted_off_s is None else _displacement_in_hand(episode, lifted_off_s)
+    if displacement is None or not episode.held:
         return None
-    end = len(moved[0]) if episode.shake is None else int(np.searchsorted(moved[0], episode.shake.started_s, "right"))
-    return float(moved[1][max(end - 1, 0)])
+    end = (
+        len(displacement[0])
+        if episode.shake is None
+        else int(np.searchsorted(displacement[0], episode.shake.started_s, "right"))
+    )
+    return float(displacement[1][max(end - 1, 0)])
 
 
 def hold_time(episode: EpisodeMeasurements) -> float | None:
-    """How long the object stayed in the hand while it was shaken [s]; None where it was not shaken.
+    """Duration for which the object stayed in the hand during the shake [s]; None without a shake.
 
-    It is lost when it has moved by 3 cm in the frame of the hand; the time ends with the shake at the latest.
+    An object is lost when its displacement in the frame of the hand exceeds 3 cm. The duration is at most the shake's.
     """
     shake = episode.shake
-    moved = None if shake is None else _moved_in_hand(episode, shake.started_s)
-    if shake is None or moved is None:
+    displacement = None if shake is None else _displacement_in_hand(episode, shake.started_s)
+    if shake is None or displacement is None:
         return None
-    lost = moved[0][moved[1] > LOST_M]
+    lost = displacement[0][displacement[1] > LOST_M]
     return float(min(lost[0] - shake.started_s if lost.size else shake.duration_s, shake.duration_s))
 
 
@@ -58,7 +62,7 @@ def _target(episode: EpisodeMeasurements) -> ObjectTrack | None:
 
 
 def _heights(episode: EpisodeMeasurements) -> Array | None:
-    """Returns how much higher the object was than at the start of the task, at each sample [m]."""
+    """Returns the height of the object above its height at the start of the task, at each sample [m]."""
     track = _target(episode)
     if track is None:
         return None
@@ -66,7 +70,7 @@ def _heights(episode: EpisodeMeasurements) -> Array | None:
     return np.asarray(track.positions[:, 2] - track.positions[start, 2])
 
 
-def _lifted_off(episode: EpisodeMeasurements) -> float | None:
+def _lift_off_time(episode: EpisodeMeasurements) -> float | None:
     track, heights = _target(episode), _heights(episode)
     if track is None or heights is None:
         return None
@@ -74,8 +78,8 @@ def _lifted_off(episode: EpisodeMeasurements) -> float | None:
     return float(times[0]) if times.size else None
 
 
-def _moved_in_hand(episode: EpisodeMeasurements, since_s: float) -> tuple[Array, Array] | None:
-    """Returns times since a moment, and how far the object was from its place in the hand at that moment [m]."""
+def _displacement_in_hand(episode: EpisodeMeasurements, since_s: float) -> tuple[Array, Array] | None:
+    """Returns times from a given time on, and the object's displacement in the hand since then [m]."""
     hand, track = episode.hand, _target(episode)
     if hand is None or track is None or not len(hand.times_s):
         return None
@@ -84,6 +88,6 @@ def _moved_in_hand(episode: EpisodeMeasurements, since_s: float) -> tuple[Array,
     if not times.size:
         return None
     nearest = np.minimum(np.searchsorted(hand.times_s, times), len(hand.times_s) - 1)
-    turned = Rotation.from_quat(hand.quaternions[nearest]).inv()
-    in_hand = turned.apply(track.positions[chosen] - hand.positions[nearest])
+    rotation = Rotation.from_quat(hand.quaternions[nearest]).inv()
+    in_hand = rotation.apply(track.positions[chosen] - hand.positions[nearest])
     return times, np.asarray(np.linalg.norm(in_hand - in_hand[0], axis=1))

@@ -20,25 +20,25 @@ def _mean(episode: EpisodeMeasurements, figure: Figure) -> float | None:
 
 
 def solved_share(episode: EpisodeMeasurements) -> float | None:
-    """Share of the reachable poses with a solution within bounds that forward kinematics confirms, 0 to 1."""
+    """Fraction of the reachable poses with a solution within bounds that forward kinematics confirms, 0 to 1."""
     return _mean(episode, SOLVED_SHARE)
 
 
 def solving_time(episode: EpisodeMeasurements) -> float | None:
-    """Median time to solve a pose, solved or not [s]."""
+    """Median time per pose, solved or not [s]."""
     return _mean(episode, SOLVING_TIME)
 
 
 def solutions(episode: EpisodeMeasurements) -> float | None:
-    """Mean number of solutions of a pose."""
+    """Mean number of solutions per pose."""
     return _mean(episode, SOLUTIONS)
 
 
 def position_error(episode: EpisodeMeasurements) -> float | None:
-    """Greatest distance of the tip from a solved pose [m]."""
+    """Maximum position error of the tip over the solved poses [m]."""
     return _mean(episode, POSITION_ERROR)
 
 
 def rotation_error(episode: EpisodeMeasurements) -> float | None:
-    """Greatest angle of the tip from a solved pose [rad]."""
+    """Maximum rotation error of the tip over the solved poses [rad]."""
     return _mean(episode, ROTATION_ERROR)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What was recorded of an episode, for metrics: values, without files and without ROS.
+"""Measurements of an episode for metrics: values, without files and without ROS.
 
-Times are seconds of the simulated clock since the recording began, and durations called `wall` are real time.
+Times are seconds of the simulated clock since the start of the recording; durations named `wall` are real time.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ComponentReport:
-    """What a component reports of one piece of work.
+    """Report of a component on an activity.
 
     Attributes:
-        component: `generation`, `planning`, `execution`, `grasp`, or a name of a user's own.
-        name: What it was doing, such as the name of a plan.
-        succeeded: Whether it succeeded.
-        reason: Why it did not; "" on success.
-        started_s: Start, simulated time [s].
-        ended_s: End, simulated time [s].
-        wall_s: Real time it took [s].
-        figures: Its own figures, by their declarations, such as `CANDIDATES`.
-        motion: The motion it made or executed; None without one.
-        ran: What did it, in the modes without simulation.
+        component: `generation`, `planning`, `execution`, `grasp`, or a name defined by the user.
+        name: Name of the activity, such as the name of a plan.
+        succeeded: Whether the activity succeeded.
+        reason: Reason for a failure; "" on success.
+        started_s: Start in simulated time [s].
+        ended_s: End in simulated time [s].
+        wall_s: Real duration [s].
+        figures: Reported figures, keyed by declaration such as `CANDIDATES`.
+        motion: Planned or executed motion; None without a motion.
+        ran: Software that ran, in the modes without simulation.
     """
 
     component: str
@@ -56,8 +56,8 @@ class Motion:
 
     Attributes:
         joints: Names of the joints.
-        times_s: Times of the points since its start, shape (n,) [s].
-        positions: Shape (n, joints) [rad or m].
+        times_s: Times since the start of the trajectory, shape (n,) [s].
+        positions: Joint positions, shape (n, joints) [rad or m].
     """
 
     joints: tuple[str, ...]
@@ -67,12 +67,12 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class JointSamples(Motion):
-    """Measured joints; their times count from when the recording began.
+    """Measured joint states, with times since the start of the recording.
 
     Attributes:
-        velocities: [rad/s or m/s]; NaN where not measured.
-        efforts: [Nm or N]; NaN where not measured.
-        commands: Commanded positions; NaN before the first command.
+        velocities: Joint velocities [rad/s or m/s]; NaN if not measured.
+        efforts: Joint efforts [Nm or N]; NaN if not measured.
+        commands: Commanded positions [rad or m]; NaN before the first command.
     """
 
     velocities: Array
@@ -82,14 +82,14 @@ class JointSamples(Motion):
 
 @dataclass(frozen=True, slots=True)
 class TrackingSamples:
-    """What a trajectory controller wanted and what it got, at the same times.
+    """Desired and actual positions of a trajectory controller.
 
     Attributes:
-        controller: Its name.
-        joints: Names of its joints.
-        times_s: Shape (n,) [s].
-        desired: Shape (n, joints) [rad or m].
-        actual: Shape (n, joints) [rad or m].
+        controller: Name of the controller.
+        joints: Names of the joints.
+        times_s: Times, shape (n,) [s].
+        desired: Desired positions, shape (n, joints) [rad or m].
+        actual: Measured positions, shape (n, joints) [rad or m].
     """
 
     controller: str
@@ -100,7 +100,7 @@ class TrackingSamples:
 
     @property
     def errors(self) -> Array:
-        """Actual minus desired, shape (n, joints) [rad or m]."""
+        """Actual minus desired positions, shape (n, joints) [rad or m]."""
         return self.actual - self.desired
 
 
@@ -109,10 +109,10 @@ class ObjectTrack:
     """Poses of an object in the world frame.
 
     Attributes:
-        name: Its name in the simulation.
-        times_s: Shape (n,) [s].
-        positions: Shape (n, 3) [m].
-        quaternions: xyzw, shape (n, 4).
+        name: Name of the object in the simulation.
+        times_s: Times, shape (n,) [s].
+        positions: Positions, shape (n, 3) [m].
+        quaternions: Orientations (xyzw), shape (n, 4).
     """
 
     name: str
@@ -123,11 +123,11 @@ class ObjectTrack:
 
 @dataclass(frozen=True, slots=True)
 class Shake:
-    """When the object was shaken after the task.
+    """Shake of the object after the task.
 
     Attributes:
-        started_s: When that began [s].
-        duration_s: How long it was shaken [s].
+        started_s: Start time [s].
+        duration_s: Duration [s].
     """
 
     started_s: float
@@ -136,30 +136,30 @@ class Shake:
 
 @dataclass(frozen=True, slots=True)
 class EpisodeMeasurements:
-    """All that was recorded of an episode.
+    """Measurements of an episode.
 
     Attributes:
-        settings: What was run, as in `EpisodeSpec.settings`.
-        status: How it ended.
-        outcome: Outcome of the task; "" without one.
-        cause: Why it did not succeed.
-        states: What the states did, by wall time since the episode began.
-        task_started_s: When the task was started [s].
-        task_s: Simulated time from the request for grasps, or else from when the objects rest, to the end of the task
-            [s]; None if it did not end.
-        task_wall_s: The same in real time [s].
-        generation_s: Real time from the request for grasps to the answer [s]; None if nothing was requested.
-        method_processor_s: Processor time of the method's processes from before the objects were placed to the end of
-            the task [s]; None if it did not end.
-        reports: What the components reported, in the order they ended.
-        joints: Measured joints; None if none were recorded.
-        tracking: One entry a trajectory controller.
-        objects: Tracks of the objects, by name.
-        hand: Track of the link that the gripper is fixed to; None if it is not known.
-        target: Name of the object that success is about; "" without one.
-        held: Whether the target was in the gripper when success was checked.
-        shake: When it was shaken; None where that was not asked for.
-        folder: Folder with the files of the episode.
+        settings: Settings of the episode, as in `EpisodeSpec.settings`.
+        status: Final status.
+        outcome: Outcome of the task; "" without a task.
+        cause: Cause of a failure.
+        states: Spans of the states, in real time since the start of the episode.
+        task_started_s: Start time of the task [s].
+        task_s: Simulated time from the request for grasps, or else from the moment when objects rest, to the end of the
+            task [s]; None if the task did not end.
+        task_wall_s: Real time of the same period [s].
+        generation_s: Real time from the request for grasps to the answer [s]; None without a request.
+        method_processor_s: Processor time of the method's processes from before the objects were spawned to the end of
+            the task [s]; None if the task did not end.
+        reports: Reports of the components in the order of their ends.
+        joints: Measured joint states; None if not recorded.
+        tracking: Tracking samples of the trajectory controllers.
+        objects: Tracks of the objects, keyed by name.
+        hand: Track of the gripper's parent link; None if unknown.
+        target: Name of the object in the success criteria; "" for none.
+        held: Whether the target was in the gripper at the success check.
+        shake: Shake of the object; None if not requested.
+        folder: Folder of the episode's files.
     """
 
     settings: Mapping[str, Any]
@@ -183,9 +183,9 @@ class EpisodeMeasurements:
     folder: Path | None = None
 
     def values_of(self, figure: Figure) -> list[float]:
-        """Returns the values of a figure in the reports that have it, in the order the reports ended."""
+        """Returns the values of a figure in the reports that contain it, in the order of the reports."""
         return [report.figures[figure] for report in self.of_component(figure.component) if figure in report.figures]
 
     def of_component(self, component: str) -> tuple[ComponentReport, ...]:
-        """Returns the reports of a component, in the order they ended."""
+        """Returns the reports of a component in the order of their ends."""
         return tuple(report for report in self.reports if report.component == component)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Metrics of motion planning, over all plans of an episode (component `planning`)."""
+"""Metrics of motion planning over all plans of an episode (component `planning`)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from modular_framework_ros.reported_figures import CLEARANCE, CONCURRENT, PLANNI
 
 
 def _motions(episode: EpisodeMeasurements) -> list[Motion]:
-    """Returns the planned motions that were executed; all of them if none was, as when planning alone is measured.
+    """Returns the planned motions that were executed, or all planned motions if none was executed.
 
-    A plan that only checks whether there is a motion, and is made again later, counts once.
+    A plan that only tests feasibility and is repeated later counts once.
     """
     planned = [report.motion for report in episode.of_component("planning") if report.succeeded and report.motion]
     executed = {_key(report.motion) for report in episode.of_component("execution") if report.motion}
@@ -25,40 +25,40 @@ def _key(motion: Motion) -> tuple[tuple[str, ...], bytes]:
 
 
 def _mean(values: list[float]) -> float | None:
-    return math.fsum(values) / len(values) if values else None  # whatever their sequence
+    return math.fsum(values) / len(values) if values else None  # fsum does not depend on the order
 
 
 def planning_time(episode: EpisodeMeasurements) -> float | None:
     """Mean real time of a plan from request to answer, failed plans included [s].
 
-    Plans that are made at the same time wait for each other: see `concurrent_plans`.
+    Concurrent plans wait for each other: see `concurrent_plans`.
     """
     return _mean([report.figures.get(PLANNING_TIME, report.wall_s) for report in episode.of_component("planning")])
 
 
 def planning_processor_time(episode: EpisodeMeasurements) -> float | None:
-    """Mean processor time of a plan, failed plans included [s]; plans at the same time do not add to each other."""
+    """Mean processor time of a plan, failed plans included [s]; concurrent plans are measured separately."""
     return _mean(episode.values_of(PROCESSOR_TIME))
 
 
 def concurrent_plans(episode: EpisodeMeasurements) -> float | None:
-    """Greatest number of plans that were made at the same time."""
+    """Maximum number of plans that ran concurrently."""
     return max(episode.values_of(CONCURRENT), default=None)
 
 
 def search_time(episode: EpisodeMeasurements) -> float | None:
-    """Mean time until a path was found, before it was shortened, timed and checked, where the planner says so [s]."""
+    """Mean time until a path was found, before shortening, timing and checks, if the planner reports it [s]."""
     return _mean(episode.values_of(SEARCH_TIME))
 
 
 def planning_success(episode: EpisodeMeasurements) -> float | None:
-    """Share of the requests for plans that gave a motion, 0 to 1."""
+    """Fraction of the planning requests that returned a motion, 0 to 1."""
     reports = episode.of_component("planning")
     return _mean([float(report.succeeded) for report in reports])
 
 
 def path_length(episode: EpisodeMeasurements) -> float | None:
-    """Mean length of the planned paths that were executed, through joint space [rad]."""
+    """Mean length in joint space of the planned paths that were executed [rad]."""
     return _mean([motion_figures.path_length(motion.positions) for motion in _motions(episode)])
 
 
@@ -74,11 +74,11 @@ def smoothness(episode: EpisodeMeasurements) -> float | None:
 
 
 def clearance(episode: EpisodeMeasurements) -> float | None:
-    """Smallest distance between the robot and anything it may not touch along the planned motions [m]."""
+    """Minimum distance between the robot and its obstacles along the planned motions [m]."""
     return min(episode.values_of(CLEARANCE), default=None)
 
 
 def attempts(episode: EpisodeMeasurements) -> float | None:
-    """How many plans were asked for, successful or not."""
+    """Number of planning requests, successful or not."""
     reports = episode.of_component("planning")
     return float(len(reports)) if reports else None

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the files that are recorded of an episode.
+"""Reads the recorded files of an episode.
 
 | file | contents |
 |---|---|
-| `trajectory.parquet` | a row a sample: `time_s`, `<joint>/position|velocity|effort|command`, poses of moving objects |
+| `trajectory.parquet` | rows of samples: `time_s`, `<joint>/position|velocity|effort|command`, poses of moving objects |
 | `tracking.parquet` | `time_s`, `controller`, `joint`, `desired`, `actual` |
 | `parameters.json` | all parameters of the parameter server |
-| `recording.json` | objects, grasps, and what the components reported |
+| `recording.json` | objects, grasps and reports of the components |
 
-`time_s` is simulated time since the recording began.
+`time_s` is simulated time since the start of the recording.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ PARAMETERS = "parameters.json"
 
 
 def read_recording(folder: Path) -> dict[str, Any]:
-    """Returns the contents of `recording.json`; nothing if there is no such file."""
+    """Returns the contents of `recording.json`, empty without the file."""
     path = folder / RECORDING
     return dict(json.loads(path.read_text())) if path.is_file() else {}
 
 
 def read_descriptions(folder: Path) -> tuple[str, str]:
-    """Returns the robot's URDF and SRDF, texts; empty where they were not recorded."""
+    """Returns the robot's URDF and SRDF as text; "" if not recorded."""
     path = folder / PARAMETERS
     parameters = json.loads(path.read_text()) if path.is_file() else {}
     return str(parameters.get("robot_description", "")), str(parameters.get("robot_description_semantic", ""))
 
 
 def reports_of(recording: Mapping[str, Any]) -> tuple[ComponentReport, ...]:
-    """Returns what the components reported, in the order they ended."""
+    """Returns the reports of the components in the order of their ends."""
     entries = sorted(recording.get("reports", ()), key=lambda entry: entry["wall_begin"] + entry["wall_s"])
     return tuple(
         ComponentReport(
@@ -71,7 +71,7 @@ def _motion(entry: Mapping[str, Any] | None) -> Motion | None:
 
 
 def objects_of(recording: Mapping[str, Any]) -> dict[str, ObjectTrack]:
-    """Returns the tracks of the objects, by name."""
+    """Returns the tracks of the objects, keyed by name."""
     return {
         name: ObjectTrack(
             name,
@@ -84,7 +84,7 @@ def objects_of(recording: Mapping[str, Any]) -> dict[str, ObjectTrack]:
 
 
 def read_joints(folder: Path) -> JointSamples | None:
-    """Returns the measured joints; None if none were recorded."""
+    """Returns the measured joint states, or None if not recorded."""
     path = folder / TRAJECTORY
     if not path.is_file():
         return None
@@ -100,7 +100,7 @@ def read_joints(folder: Path) -> JointSamples | None:
 
 
 def read_tracking(folder: Path) -> tuple[TrackingSamples, ...]:
-    """Returns what the trajectory controllers wanted and got."""
+    """Returns the tracking samples of the trajectory controllers."""
     path = folder / TRACKING
     if not path.is_file():
         return ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one place where metrics are registered, and where a user's own are loaded."""
+"""Registry of the framework's metrics, and loader of the user's metrics."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from modular_framework_benchmark.records.experiment import Direction, Metric, Me
 from modular_framework_ros.reported_figures import Clock, Source
 
 MetricFunction = Callable[[EpisodeMeasurements], float | None]
-"""Returns the value for an episode; None where it has none."""
+"""Function that returns the value of a metric for an episode, or None without a value."""
 
 
 class MetricError(ValueError):
-    """A metric is not known, or a user's own cannot be loaded; the text says why and what to do."""
+    """A metric is unknown, or a user's metric cannot be loaded; the message gives the reason and the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
 class RegisteredMetric:
-    """A metric and the function that measures it."""
+    """A metric with the function that measures it."""
 
     metric: Metric
     measure: MetricFunction
@@ -37,8 +37,8 @@ _RATE, _VALUE, _COUNT = MetricKind.RATE, MetricKind.VALUE, MetricKind.COUNT
 _HIGHER, _LOWER = Direction.HIGHER, Direction.LOWER
 _SIMULATED, _WALL = Clock.SIMULATED, Clock.WALL
 _SAID = Source.SAID
-_SHARE = (0.0, 1.0)
-_NOT_NEGATIVE = (0.0, None)
+_FRACTION = (0.0, 1.0)
+_NONNEGATIVE = (0.0, None)
 _Bounds = tuple[float | None, float | None]
 
 
@@ -50,7 +50,16 @@ def _registered(
     bounds: _Bounds = (None, None),
     source: Source = Source.MEASURED,
 ) -> RegisteredMetric:
-    """Describes a metric by the name, the module and the first line of the docstring of its function."""
+    """Registers a function; the metric gets its name, its module as component, and its first docstring line.
+
+    Args:
+        measure: Function of the metric.
+        kind: Kind of the metric.
+        better: Direction of better values.
+        unit: Unit of the metric.
+        bounds: Smallest and largest possible value, or None.
+        source: Origin of the values.
+    """
     description = (inspect.getdoc(measure) or "").splitlines()[0]
     name, component = getattr(measure, "__name__", ""), measure.__module__.rpartition(".")[2]
     lowest, highest = bounds
@@ -63,7 +72,14 @@ def _registered(
 def _timed(
     measure: MetricFunction, better: Direction, clock: Clock, source: Source = Source.MEASURED
 ) -> RegisteredMetric:
-    """Describes a metric that is a duration by a clock."""
+    """Registers a function as the metric of a duration.
+
+    Args:
+        measure: Function of the metric.
+        better: Direction of better values.
+        clock: Clock of the duration.
+        source: Origin of the values.
+    """
     found = _registered(measure, MetricKind.TIME, better, "s", source=source)
     return replace(found, metric=replace(found.metric, clock=clock))
 
@@ -77,52 +93,52 @@ _ALL = (
     _timed(generation.method_processor_time, _LOWER, Clock.PROCESSOR),
     _registered(generation.generation_success, _RATE, _HIGHER, source=_SAID),
     _registered(generation.candidates, _COUNT, _HIGHER, source=_SAID),
-    _registered(generation.reachable_share, _VALUE, _HIGHER, bounds=_SHARE, source=_SAID),
+    _registered(generation.reachable_share, _VALUE, _HIGHER, bounds=_FRACTION, source=_SAID),
     _registered(generation.best_rank, _VALUE, _LOWER, bounds=(1.0, None), source=_SAID),
     _timed(planning.planning_time, _LOWER, _WALL),
     _timed(planning.planning_processor_time, _LOWER, Clock.PROCESSOR),
     _registered(planning.concurrent_plans, _COUNT, _LOWER),
     _timed(planning.search_time, _LOWER, _WALL),
-    _registered(planning.planning_success, _VALUE, _HIGHER, bounds=_SHARE),
-    _registered(planning.path_length, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(planning.planning_success, _VALUE, _HIGHER, bounds=_FRACTION),
+    _registered(planning.path_length, _VALUE, _LOWER, "rad", _NONNEGATIVE),
     _timed(planning.motion_duration, _LOWER, _SIMULATED),
     _registered(planning.smoothness, _VALUE, _HIGHER),
     _registered(planning.clearance, _VALUE, _HIGHER, "m"),
     _registered(planning.attempts, _COUNT, _LOWER),
-    _registered(kinematics.solved_share, _VALUE, _HIGHER, bounds=_SHARE),
+    _registered(kinematics.solved_share, _VALUE, _HIGHER, bounds=_FRACTION),
     _timed(kinematics.solving_time, _LOWER, _WALL),
     _registered(kinematics.solutions, _COUNT, _HIGHER),
-    _registered(kinematics.position_error, _VALUE, _LOWER, "m", _NOT_NEGATIVE),
-    _registered(kinematics.rotation_error, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(kinematics.position_error, _VALUE, _LOWER, "m", _NONNEGATIVE),
+    _registered(kinematics.rotation_error, _VALUE, _LOWER, "rad", _NONNEGATIVE),
     _timed(execution.execution_time, _LOWER, _SIMULATED),
-    _registered(execution.execution_success, _VALUE, _HIGHER, bounds=_SHARE),
-    _registered(execution.tracking_error, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
-    _registered(execution.greatest_tracking_error, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
-    _registered(execution.executed_length, _VALUE, _LOWER, "rad", _NOT_NEGATIVE),
+    _registered(execution.execution_success, _VALUE, _HIGHER, bounds=_FRACTION),
+    _registered(execution.tracking_error, _VALUE, _LOWER, "rad", _NONNEGATIVE),
+    _registered(execution.greatest_tracking_error, _VALUE, _LOWER, "rad", _NONNEGATIVE),
+    _registered(execution.executed_length, _VALUE, _LOWER, "rad", _NONNEGATIVE),
     _registered(execution.executed_smoothness, _VALUE, _HIGHER),
-    _registered(execution.greatest_effort, _VALUE, _LOWER, "Nm", _NOT_NEGATIVE),
+    _registered(execution.greatest_effort, _VALUE, _LOWER, "Nm", _NONNEGATIVE),
     _registered(grasp.lift, _VALUE, _HIGHER, "m"),
-    _registered(grasp.slip, _VALUE, _LOWER, "m", _NOT_NEGATIVE),
+    _registered(grasp.slip, _VALUE, _LOWER, "m", _NONNEGATIVE),
     _timed(grasp.grasp_time, _LOWER, _SIMULATED),
     _timed(grasp.hold_time, _HIGHER, _SIMULATED),
 )
 
 METRICS: Mapping[str, RegisteredMetric] = {entry.metric.name: entry for entry in _ALL}
-"""Every metric of the framework, by name."""
+"""Metrics of the framework, keyed by name."""
 
 
 def find_metric(name: str) -> RegisteredMetric:
     """Returns a metric of the framework.
 
     Raises:
-        MetricError: There is none of this name; the text has the nearest ones.
+        MetricError: The metric does not exist; the message suggests similar names.
     """
     if name in METRICS:
         return METRICS[name]
-    near = get_close_matches(name, METRICS, n=1)
+    similar = get_close_matches(name, METRICS, n=1)
     raise MetricError(
-        f"there is no metric '{name}'{f'; did you mean {near[0]!r}' if near else ''}; allowed are "
-        f"{', '.join(METRICS)}, or FILE.py:FUNCTION for one of your own"
+        f"there is no metric '{name}'{f'; did you mean {similar[0]!r}' if near else ''}; allowed: "
+        f"{', '.join(METRICS)}, or FILE.py:FUNCTION for a user's function"
     )
 
 
@@ -130,16 +146,16 @@ def load_metric(reference: str) -> MetricFunction:
     """Returns a user's function.
 
     Args:
-        reference: `FILE.py:FUNCTION`, the path of the file and a function of it that takes `EpisodeMeasurements` and
-            returns a number or None.
+        reference: `FILE.py:FUNCTION`, a file and the name of a function that takes `EpisodeMeasurements` and returns a
+            number or None.
 
     Raises:
-        MetricError: There is no such file or function, or the file cannot be imported.
+        MetricError: The file or function does not exist, or the file cannot be imported.
     """
     file, _, name = reference.rpartition(":")
     path = Path(file)
     if not file.endswith(".py") or not name.isidentifier():
-        raise MetricError(f"metric '{reference}' has not the form FILE.py:FUNCTION; correct it")
+        raise MetricError(f"metric '{reference}' does not have the form FILE.py:FUNCTION; correct it")
     if not path.is_file():
         raise MetricError(f"metric '{reference}': there is no file {path.resolve()}; correct the path")
     found = getattr(_module(path), name, None)
@@ -148,7 +164,7 @@ def load_metric(reference: str) -> MetricFunction:
         raise MetricError(
             f"metric '{reference}': {path} has no function '{name}'; it has {', '.join(defined) or 'none'}"
         )
-    return found  # type: ignore[no-any-return]  # what it returns is checked when it measures
+    return found  # type: ignore[no-any-return]  # the result is checked when the metric is measured
 
 
 def _module(path: Path) -> ModuleType:
@@ -158,18 +174,18 @@ def _module(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # the user's code may raise anything
+    except Exception as error:  # user code may raise anything
         raise MetricError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
     return module
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredMetrics:
-    """Values of metrics, and what went wrong with those that raised.
+    """Values of metrics, and the errors of metrics that raised.
 
     Attributes:
-        values: Value by name of metric; None where it has none or raised.
-        faults: Text of the exception by name of metric.
+        values: Value of each metric, keyed by name; None without a value or after an error.
+        faults: Text of the exception, keyed by metric name.
     """
 
     values: Mapping[str, float | None]
@@ -177,14 +193,14 @@ class MeasuredMetrics:
 
 
 def measure(wanted: Iterable[str | Mapping[str, Any]], episode: EpisodeMeasurements) -> MeasuredMetrics:
-    """Measures an episode.
+    """Returns the metrics of an episode.
 
     Args:
-        wanted: The entries of `metrics` of an experiment: names, or mappings with `function` and perhaps `name`.
-        episode: What was recorded.
+        wanted: Entries of `metrics` of an experiment: names, or mappings with `function` and optionally `name`.
+        episode: Measurements of the episode.
 
     Raises:
-        MetricError: A metric is not known or cannot be loaded.
+        MetricError: A metric is unknown or cannot be loaded.
     """
     values: dict[str, float | None] = {}
     faults: dict[str, str] = {}
@@ -198,6 +214,6 @@ def measure(wanted: Iterable[str | Mapping[str, Any]], episode: EpisodeMeasureme
         try:
             value = function(episode)
             values[name] = None if value is None else float(value)
-        except Exception as error:  # one metric must not cost the episode; a user's may raise anything
+        except Exception as error:  # user code may raise anything, which must not break the episode
             values[name], faults[name] = None, f"{type(error).__name__}: {error}"
     return MeasuredMetrics(values, faults)

@@ -10,7 +10,7 @@ from modular_framework_benchmark.records.episode import EpisodeStatus
 def success(episode: EpisodeMeasurements) -> float | None:
     """Whether the episode succeeded, checked in the world: 1 or 0.
 
-    An episode whose launch died has no value: it says nothing of the method.
+    An episode whose launch died has no value, because it says nothing about the method.
     """
     if episode.status is EpisodeStatus.BROKEN:
         return None
@@ -18,19 +18,19 @@ def success(episode: EpisodeMeasurements) -> float | None:
 
 
 def task_time(episode: EpisodeMeasurements) -> float | None:
-    """Simulated time from the request for grasps to the end of the task [s]; None for a task that did not succeed.
+    """Simulated time from the request for grasps to the end of the task [s]; None for an unsuccessful task.
 
-    Computing takes no simulated time where nodes hold it: see `task_wall_time` and `method_processor_time`.
+    Computation takes no simulated time if nodes hold it: see `task_wall_time` and `method_processor_time`.
     """
     return episode.task_s if episode.status is EpisodeStatus.SUCCEEDED else None
 
 
 def task_wall_time(episode: EpisodeMeasurements) -> float | None:
-    """Real time from the request for grasps to the end of the task [s]; None for a task that did not succeed."""
+    """Real time from the request for grasps to the end of the task [s]; None for an unsuccessful task."""
     return episode.task_wall_s if episode.status is EpisodeStatus.SUCCEEDED else None
 
 
 def failed_states(episode: EpisodeMeasurements) -> float | None:
-    """How many executions of states failed, also those the task recovered from."""
+    """Number of failed state executions, including those from which the task recovered."""
     states = [span for span in episode.states if span.kind == "state"]
     return float(sum(span.failed for span in states)) if states else None

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs episodes without the simulated task: planning, kinematics or grasps alone."""
+"""Runs episodes of the modes without simulation: planning, kinematics, grasps."""

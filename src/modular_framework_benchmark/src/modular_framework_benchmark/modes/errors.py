@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the modes complain of before an episode can run."""
+"""Errors of the modes without simulation."""
 
 
 class ModeError(Exception):
-    """The settings of an episode, or a file they name, cannot be used; the message names the file and what to do."""
+    """A setting of an episode, or a file that it names, is invalid; the message names the file and the remedy."""

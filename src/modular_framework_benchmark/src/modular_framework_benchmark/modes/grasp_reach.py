@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether an arm gets to the three poses of a grasp without a collision: as grasp generators ask move_group for it."""
+"""Reachability of a grasp: collision-free inverse kinematics at its three poses, as grasp generators request it."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class GraspReach:
     """Solves inverse kinematics for grasps in a planning scene.
 
     Args:
-        robot: The robot.
+        robot: Robot.
         solver: Inverse kinematics of the group whose tip is the grasp frame.
-        gripper: The hand.
-        scene: What stands around.
+        gripper: Geometry of the hand.
+        scene: Planning scene.
     """
 
     def __init__(self, robot: Robot, solver: InverseKinematics, gripper: GripperGeometry, scene: PlanningScene) -> None:
@@ -34,31 +34,28 @@ class GraspReach:
         self._checker = DEFAULT_CHECKER(scene, solver.group.indices)
 
     def joint_travel(self, candidate: GraspCandidate) -> float | None:
-        """Returns how far a joint moves at most from one pose of the grasp to the next [rad or m].
+        """Returns the largest joint movement between successive poses of a grasp [rad or m], or None if unreachable.
 
-        The hand advances as it is opened for the grasp; it arrives at the first pose as it is in the scene.
+        The hand advances with the opening of the grasp. It arrives at the first pose with its opening in the scene.
 
         Args:
-            candidate: The grasp, in the planning frame.
-
-        Returns:
-            None where a pose cannot be reached without a collision.
+            candidate: Grasp in the planning frame.
         """
         opened = self._model.merge(self._scene.positions, {self._gripper.joint: candidate.pregrasp_joint})
         opened = self._model.with_mimics(opened)
         checker = DEFAULT_CHECKER(self._scene.with_positions(opened), self._solver.group.indices)
-        turn = candidate.hand_axes @ self._gripper.axes.T
+        rotation = candidate.hand_axes @ self._gripper.axes.T
         seed, travel, indices = opened, 0.0, self._solver.group.indices
         for number, position in enumerate(
             (candidate.pregrasp_position, candidate.position, candidate.postgrasp_position)
         ):
             try:
-                found = self._solver.solutions(
-                    self._solver.group.tip_link, pin.SE3(turn, np.asarray(position)), seed, math.inf
+                solutions = self._solver.solutions(
+                    self._solver.group.tip_link, pin.SE3(rotation, np.asarray(position)), seed, math.inf
                 )
             except PlanningError:
                 return None
-            free = first_free(found, checker.is_free)
+            free = first_free(solutions, checker.is_free)
             if not free or (number == 0 and not self._checker.is_free(self._as_in_scene(free[0]))):
                 return None
             if number:
@@ -67,7 +64,7 @@ class GraspReach:
         return travel
 
     def _as_in_scene(self, positions: Array) -> Array:
-        """Returns positions with the joints outside the group as they are in the scene."""
+        """Returns positions whose joints outside the group have their values of the scene."""
         result = self._scene.positions.copy()
         result[self._solver.group.indices] = positions[self._solver.group.indices]
         return self._model.with_mimics(result)

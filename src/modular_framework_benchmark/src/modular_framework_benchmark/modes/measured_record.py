@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The record of an episode that is the work of one component alone."""
+"""Creates the record of an episode that runs a single component."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSp
 
 @dataclass(frozen=True, slots=True)
 class Stopwatch:
-    """When an episode began.
+    """Start of an episode.
 
     Attributes:
-        begun: [s since 1970].
-        start: By the monotonic clock [s].
-        load: Load of the machine.
+        begun: Start time [s since 1970].
+        start: Start time by the monotonic clock [s].
+        load: Load of the machine at the start.
     """
 
     begun: float = field(default_factory=time.time)
@@ -28,27 +28,33 @@ class Stopwatch:
     load: MachineLoad = field(default_factory=MachineLoad.now)
 
     def elapsed_s(self) -> float:
-        """Returns the time since then [s]."""
+        """Returns the time since the start [s]."""
         return time.monotonic() - self.start
 
 
 def broken_record(spec: EpisodeSpec, cause: str, watch: Stopwatch) -> EpisodeRecord:
-    """Returns the record of an episode that could not be run, which says nothing of the method."""
+    """Returns the record of an episode that could not run; it does not count against the method.
+
+    Args:
+        spec: Specification of the episode.
+        cause: Reason for the failure.
+        watch: Stopwatch of the episode.
+    """
     return EpisodeRecord(spec, EpisodeStatus.BROKEN, "", cause, watch.begun, watch.elapsed_s(), None, {})
 
 
 def measured_record(
     spec: EpisodeSpec, status: EpisodeStatus, outcome: str, report: ComponentReport, folder: Path, watch: Stopwatch
 ) -> EpisodeRecord:
-    """Measures what a component did.
+    """Returns the record of an episode with its measured metrics.
 
     Args:
-        spec: What was run.
-        status: How it ended.
-        outcome: In the component's words.
-        report: What it did; its times count from the start of the episode [s].
+        spec: Specification of the episode.
+        status: Final status.
+        outcome: Outcome as named by the component.
+        report: Report of the component, with times since the start of the episode [s].
         folder: Folder of the episode.
-        watch: Started with the episode.
+        watch: Stopwatch of the episode.
     """
     generation_s = report.wall_s if report.component == "generation" else None
     measurements = EpisodeMeasurements(

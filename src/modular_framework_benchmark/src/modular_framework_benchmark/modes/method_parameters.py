@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters of a method that an experiment file gives, for a mode without a parameter server."""
+"""Parameters of a grasp method from an experiment file, without a parameter server."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from modular_framework_ros.parameter_declarations import NodeDeclaration
 
 
 class GivenParameters:
-    """Reads parameters that were given by name; implements `ReadNumber` of the grasp methods.
+    """Reads given or default parameters; implements `ReadNumber` of the grasp methods.
 
     Args:
-        values: Values by name, without the ~ of a node's own parameters.
+        values: Values by name, without the ~ of private parameters.
         declared: Parameters that the method declares.
 
     Raises:
-        ModeError: The method declares no such parameter, or a value is not allowed.
+        ModeError: The method does not declare a parameter, or a value is not allowed.
     """
 
     def __init__(self, values: Mapping[str, Any], declared: NodeDeclaration) -> None:
@@ -35,5 +35,5 @@ class GivenParameters:
         self._values = {name: values.get(name, item.default) for name, item in own.items()}
 
     def __call__(self, name: str) -> Any:
-        """Returns a parameter; its default when it was not given."""
+        """Returns the given value of a parameter, or its default."""
         return self._values[name.removeprefix("~")]

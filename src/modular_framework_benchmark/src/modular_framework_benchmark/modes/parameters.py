@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ROS parameters that an episode sets, for modes that have no parameter server."""
+"""ROS parameters of an episode, for the modes without a parameter server."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from modular_framework_benchmark.modes.errors import ModeError
 
 
 def parameters_below(parameters: Mapping[str, Any], parents: Sequence[str]) -> dict[str, Any]:
-    """Returns parameters by their names below a parent, nested where a name has slashes.
+    """Returns parameters relative to a parent, nested where a name has slashes.
 
     Args:
-        parameters: Values by whole name, such as `/move_group/planner_configs/RRTConnect/range`.
-        parents: Whole names with a slash at the end that a parameter may lie below; the longest that fits counts.
+        parameters: Values by full name, such as `/move_group/planner_configs/RRTConnect/range`.
+        parents: Full names with a trailing slash; the longest matching parent applies.
 
     Raises:
-        ModeError: One lies below none of them, so it would have no effect.
+        ModeError: A parameter has no parent, so it would have no effect.
     """
     result: dict[str, Any] = {}
     for name, value in parameters.items():
         fitting = [parent for parent in parents if name.startswith(parent)]
         if not fitting:
             raise ModeError(
-                f"parameter '{name}' has no effect in this mode; allowed are names below {' and '.join(parents)}"
+                f"parameter '{name}' has no effect in this mode; allowed: names below {' and '.join(parents)}"
             )
         *path, last = name.removeprefix(max(fitting, key=len)).split("/")
         inner = result
@@ -35,7 +35,7 @@ def parameters_below(parameters: Mapping[str, Any], parents: Sequence[str]) -> d
 
 
 def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns mappings merged key by key, at every depth; values of `changes` win."""
+    """Returns nested mappings merged recursively; values of `changes` take precedence."""
     result = dict(base)
     for key, value in changes.items():
         old = result.get(key)

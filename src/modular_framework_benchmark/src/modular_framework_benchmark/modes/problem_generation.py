@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes motion-planning problems for any robot: random boxes within its reach, random free starts and goals.
+"""Generates motion planning problems for any robot: random boxes within reach, random collision-free start and goal.
 
-They are written as a PlanningScene and a MotionPlanRequest in YAML each, which `problems` of an experiment reads.
+Each problem is a PlanningScene and a MotionPlanRequest in YAML, readable by the key `problems` of an experiment.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from modular_framework_planning.robot_model.robot_model import JointGroup, Robot
 
 REACH_SAMPLES = 1000
 STRAIGHT_STEP = 0.02  # [rad or m]
-ATTEMPTS = 1000  # at a state, before the boxes are drawn anew
+ATTEMPTS = 1000  # to sample a state before new boxes are drawn
 SCENE_ATTEMPTS = 20
-BOX_EDGE_IN_REACH = (0.05, 0.3)  # least and largest edge, as a share of the robot's reach
-BOX_DISTANCE_IN_REACH = (0.4, 1.0)  # of a box's centre from the base
+BOX_EDGE_IN_REACH = (0.05, 0.3)  # smallest and largest edge as a fraction of the robot's reach
+BOX_DISTANCE_IN_REACH = (0.4, 1.0)  # distance of a box's centre from the base as a fraction of the reach
 
 
 def make_problems(robot: Robot, group_name: str, count: int, boxes: int, seed: int) -> list[tuple[Any, Any]]:
-    """Makes problems whose start and goal are free, and whose straight motion between them is not.
+    """Returns problems with collision-free start and goal whose straight joint-space motion collides.
 
     Args:
-        robot: For which.
-        group_name: Planning group that moves.
-        count: How many problems.
-        boxes: How many boxes each has.
-        seed: The same seed gives the same problems.
+        robot: Robot.
+        group_name: Planning group.
+        count: Number of problems.
+        boxes: Number of boxes per problem.
+        seed: Seed that reproduces the problems.
 
     Returns:
-        A scene (moveit_msgs/PlanningScene) and a request (moveit_msgs/MotionPlanRequest) each, as YAML values.
+        A scene (moveit_msgs/PlanningScene) and a request (moveit_msgs/MotionPlanRequest) per problem, as YAML values.
 
     Raises:
-        ModeError: No free state was found.
+        ModeError: No collision-free state was found.
     """
     generator, model = np.random.default_rng(seed), robot.model
     group = model.group(group_name)
@@ -59,13 +59,13 @@ def make_problems(robot: Robot, group_name: str, count: int, boxes: int, seed: i
 
 
 def write_problems(problems: list[tuple[Any, Any]], folder: Path) -> None:
-    """Writes `sceneNNNN.yaml` and `requestNNNN.yaml` of each problem, numbers from 1 on.
+    """Writes `sceneNNNN.yaml` and `requestNNNN.yaml` of each problem, numbered from 1.
 
     Raises:
-        ModeError: The folder has problems already.
+        ModeError: The folder contains problems already.
     """
     if any(folder.glob("scene*.yaml")):
-        raise ModeError(f"{folder}: has problems already; give another folder, or remove it")
+        raise ModeError(f"{folder}: contains problems already; remove it, or choose another folder")
     folder.mkdir(parents=True, exist_ok=True)
     for number, (scene, request) in enumerate(problems, 1):
         for name, content in (("scene", scene), ("request", request)):
@@ -74,15 +74,15 @@ def write_problems(problems: list[tuple[Any, Any]], folder: Path) -> None:
 
 
 def _reach(model: RobotModel, group: JointGroup, generator: np.random.Generator) -> tuple[Array, float]:
-    """Returns where the group's base is, shape (3,), and how far its tip gets from there [m]."""
+    """Returns the position of the group's base, shape (3,), and the reach of its tip from there [m]."""
     positions = model.default_positions()
     tip = group.tip_link or group.links[-1]
     base = model.link_transforms(positions)[group.base_link or model.planning_frame].translation
-    farthest = 0.0
+    reach = 0.0
     for _ in range(REACH_SAMPLES):
         positions[group.indices] = _random_values(model, group, generator)
-        farthest = max(farthest, float(np.linalg.norm(model.link_transforms(positions)[tip].translation - base)))
-    return base, farthest
+        reach = max(reach, float(np.linalg.norm(model.link_transforms(positions)[tip].translation - base)))
+    return base, reach
 
 
 def _random_values(model: RobotModel, group: JointGroup, generator: np.random.Generator) -> Array:
@@ -95,10 +95,10 @@ def _random_boxes(count: int, base: Array, reach: float, generator: np.random.Ge
     for _ in range(count):
         direction = generator.normal(size=3)
         distance = generator.uniform(*BOX_DISTANCE_IN_REACH) * reach
-        half_turn = generator.uniform(-np.pi, np.pi) / 2.0
+        half_yaw = generator.uniform(-np.pi, np.pi) / 2.0
         pose = make_transform(
             (base + distance * direction / np.linalg.norm(direction)).round(4).tolist(),
-            [0.0, 0.0, float(np.sin(half_turn)), float(np.cos(half_turn))],
+            [0.0, 0.0, float(np.sin(half_yaw)), float(np.cos(half_yaw))],
             "box",
         )
         result.append((pose, Box(*(generator.uniform(*BOX_EDGE_IN_REACH, 3) * reach).round(4).tolist())))
@@ -111,9 +111,9 @@ def _free_problem(
     draw_boxes: Callable[[], list[tuple[Transform, Box]]],
     generator: np.random.Generator,
 ) -> tuple[PlanningScene, Array, Array]:
-    """Returns a scene with a start and a goal that collide with nothing, while the straight motion between them does.
+    """Returns a scene with collision-free start and goal whose straight joint-space motion collides.
 
-    The states have the shape (joints of the robot,).
+    Start and goal have the shape (joints of the robot,).
     """
     for _ in range(SCENE_ATTEMPTS):
         scene = empty_scene(model)
@@ -131,8 +131,8 @@ def _free_problem(
             if len(free) == 2 and not checker.path_is_free(np.array(free), STRAIGHT_STEP):
                 return scene, free[0], free[1]
     raise ModeError(
-        f"group '{group.name}': no two free states with something between them in {SCENE_ATTEMPTS} scenes with "
-        f"{ATTEMPTS} random states each; give another number of boxes"
+        f"group '{group.name}': no two free states with an obstacle between them in {SCENE_ATTEMPTS} scenes with "
+        f"{ATTEMPTS} random states each; change the number of boxes"
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A robot of the modes without simulation."""
+"""Robot of the modes without simulation."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Robot:
     """A robot and its planning parameters.
 
     Attributes:
-        model: Joints, groups, frames, geometry.
-        kinematics: Settings of inverse kinematics, by group.
+        model: Joints, groups, frames and geometry.
+        kinematics: Inverse kinematics settings, keyed by group.
         planning: `robot_description_planning`: limits and default scaling factors.
-        pipelines: Parameters of each planning pipeline, by its name.
-        urdf: Its description, as text.
+        pipelines: Parameters of the planning pipelines, keyed by name.
+        urdf: Robot description (URDF text).
     """
 
     model: RobotModel
@@ -32,18 +32,20 @@ class Robot:
     urdf: str = ""
 
     def solvers(self) -> KinematicsPool:
-        """Returns the inverse kinematics of its groups."""
+        """Returns the inverse kinematics solvers of the groups."""
         return KinematicsPool(self.model, self.kinematics)
 
     def chain(self, name: str) -> JointGroup:
-        """Returns a group that is a chain, as inverse kinematics needs it.
+        """Returns a group that is a chain, which inverse kinematics requires.
 
         Raises:
-            ModeError: It is none.
-            ModelError: There is no such group.
+            ModeError: The group is not a chain.
+            ModelError: The group does not exist.
         """
         group = self.model.group(name)
         if not group.is_chain:
             chains = ", ".join(other for other, item in self.model.groups.items() if item.is_chain)
-            raise ModeError(f"group '{name}' is no chain, which inverse kinematics needs; allowed: {chains or 'none'}")
+            raise ModeError(
+                f"group '{name}' is not a chain, as inverse kinematics requires; allowed: {chains or 'none'}"
+            )
         return group

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Estimates how much disk the records of an experiment take, before any episode runs."""
+"""Estimates the disk space for the records of an experiment before it runs."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from modular_framework_simulation.sensors.camera_config import read_cameras
 from modular_framework_simulation.sensors.cameras import POINT, Camera
 
 SIMULATED_S = 10.0
-"""Length of an episode: that of the shipped pick, of which the following figures are, too [s of simulated time]."""
+"""Length of the shipped pick [s of simulated time], on which the following sizes were measured."""
 TEXT_BYTES, MOTION_BYTES_PER_S = 230e3, 34e3
-"""Log, parameters and reports of an episode; samples of 10 joints [B per s]. Both grow with the robot."""
+"""Log, parameters and reports of an episode [B]; samples of 10 joints [B/s]. Both grow with the robot."""
 BAG_BYTES_PER_S, VIDEO_BYTES_PER_S = 0.4e6, 6e3
 DATABASE_BYTES, PLAN_BYTES = 10e3, 20e3
-"""An episode in the database; the motion of a plan in the mode `planning`."""
+"""An episode in the database; the motion of a plan in the mode `planning` [B]."""
 SENSORS = "/gazebo/sensors"
 UNITS = ("B", "kB", "MB", "GB", "TB")
 
 
 def disk_text(mode: str, episodes: Sequence[EpisodeSpec]) -> str:
-    """Returns a line with the disk that the records of an experiment take, and the figures behind it.
+    """Returns a line with the estimated disk space of an experiment, itemised.
 
     Args:
         mode: Mode of the experiment.
-        episodes: All its episodes.
+        episodes: Episodes of the experiment.
 
     Raises:
-        SettingsError: A launch file cannot be read.
+        SettingsError: A launch file is invalid.
     """
     parts: dict[str, float] = {}
     for spec in episodes:
-        for name, size in _of_task(spec) if mode == "task" else _of_model(mode, spec):
+        for name, size in _task_sizes(spec) if mode == "task" else _model_sizes(mode, spec):
             parts[name] = parts.get(name, 0.0) + size
-    named = ", ".join(f"{name} {size_text(size)}" for name, size in parts.items())
-    basis = f", each {SIMULATED_S:g} s of simulated time long like the shipped pick" if mode == "task" else ""
-    return f"  disk: about {size_text(sum(parts.values()))} for {len(episodes)} episodes{basis}: {named}"
+    items = ", ".join(f"{name} {size_text(size)}" for name, size in parts.items())
+    assumption = f", each {SIMULATED_S:g} s of simulated time, as long as the shipped pick" if mode == "task" else ""
+    return f"  disk: about {size_text(sum(parts.values()))} for {len(episodes)} episodes{assumption}: {items}"
 
 
 def size_text(size: float) -> str:
-    """Returns a size [B] with two digits and a unit."""
+    """Returns a size [B] as text with two digits and a unit."""
     power = min(int(math.log10(max(size, 1.0)) // 3), 4)
     value = size / 1000**power
     return f"{value:.0f} {UNITS[power]}" if value >= 10.0 else f"{value:.2g} {UNITS[power]}"
 
 
-def _of_task(spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
+def _task_sizes(spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
     record = spec.settings["record"]
     yield "database", DATABASE_BYTES
     yield "logs and recordings", TEXT_BYTES + MOTION_BYTES_PER_S * SIMULATED_S
@@ -64,14 +64,14 @@ def _of_task(spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
             yield name, _image_bytes(camera) * camera.rate_hz * SIMULATED_S
 
 
-def _of_model(mode: str, spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
+def _model_sizes(mode: str, spec: EpisodeSpec) -> Iterator[tuple[str, float]]:
     yield "database", DATABASE_BYTES
     if mode == "planning" and spec.settings["record"].get("trajectories", True):
         yield "trajectories", PLAN_BYTES
 
 
 def _cameras(spec: EpisodeSpec) -> list[Camera]:
-    """Returns the cameras of the launch's sensors_config.yaml; those of models and robots are not looked for."""
+    """Returns the cameras of the launch's sensors_config.yaml, without cameras of models and robots."""
     settings = preview_stack(spec.settings).preview.below(SENSORS)
     return read_cameras(settings, SENSORS, lambda frame: "world")[0]
 

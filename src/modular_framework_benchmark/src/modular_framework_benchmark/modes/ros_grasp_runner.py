@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs grasp generation methods on scenes with objects, without simulation and without a ROS master.
 
-A method finds its candidates; the best of them are then checked as a grasp generator has move_group do it: inverse
-kinematics at pregrasp, grasp and postgrasp pose, free of collisions.
+A method returns ranked candidates. The best candidates are then checked like those of a grasp generator: collision-free
+inverse kinematics at the pregrasp, grasp and postgrasp pose.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ ALLOWED_METHOD = "allowed: MODULE:CLASS of a grasp method, such as top_down_gras
 
 @dataclass(frozen=True, slots=True)
 class _Prepared:
-    """What episodes with the same robot and hand share."""
+    """Data shared by episodes with the same robot and hand."""
 
     robot: Robot
     solver: InverseKinematics
@@ -59,7 +59,7 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
     prepared_by = ("robot", "group", "gripper_joint")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
-        """Finds the grasps of one scene; nothing is written, the figures are all there is."""
+        """Generates and checks the grasps of one scene; writes no files."""
         settings = spec.settings
         prepared = self.prepared(settings)
         scene = grasp_scene(prepared.robot.model, settings["objects"], str(settings["target"]))
@@ -67,25 +67,25 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         started_s, start = watch.elapsed_s(), time.perf_counter()
         candidates, cause = _candidates(method, scene, prepared.gripper, spec.seed)
         search_s = time.perf_counter() - start
-        reached = _reached(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
-        found = [place for place, travel in enumerate(reached, start=1) if travel is not None]
-        outcome = "reachable" if found else ("out_of_reach" if candidates else "no_grasp")
+        travels = _joint_travels(prepared, scene, candidates[: int(settings.get("max_checks", 40))])
+        reachable = [rank for rank, travel in enumerate(travels, start=1) if travel is not None]
+        outcome = "reachable" if reachable else ("out_of_reach" if candidates else "no_grasp")
         report = ComponentReport(
             component="generation",
             name=str(settings["target"]),
-            succeeded=bool(found),
-            reason=_reason(method, candidates, reached, outcome) + cause,
+            succeeded=bool(reachable),
+            reason=_reason(method, candidates, travels, outcome) + cause,
             started_s=started_s,
             ended_s=watch.elapsed_s(),
             wall_s=search_s,
-            figures=_figures(candidates, reached, found),
+            figures=_figures(candidates, travels, reachable),
             ran=_ran(str(settings["method"]), prepared),
         )
-        status = EpisodeStatus.SUCCEEDED if found else EpisodeStatus.FAILED
+        status = EpisodeStatus.SUCCEEDED if reachable else EpisodeStatus.FAILED
         return measured_record(spec, status, outcome, report, folder, watch)
 
     def prepare(self, settings: Mapping[str, Any]) -> _Prepared:
-        """Returns the robot, its inverse kinematics and its hand."""
+        """Returns the robot with its inverse kinematics and hand."""
         robot = self.robot(settings["robot"])
         group = robot.chain(str(settings["group"]))
         try:
@@ -107,22 +107,22 @@ def _ran(method: str, prepared: _Prepared) -> WhatRan:
 
 
 def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:
-    """Makes a method.
+    """Returns an instance of a grasp method.
 
     Args:
-        reference: MODULE:CLASS, such as `top_down_grasps.ros_top_down_node:TopDownMethod`; the class takes what reads
-            its parameters, and its `declared_in` names the file that declares them.
+        reference: MODULE:CLASS, such as `top_down_grasps.ros_top_down_node:TopDownMethod`. The constructor takes
+            a parameter reader; `declared_in` names the file that declares its parameters.
         parameters: Values that differ from the defaults, by name without ~.
 
     Raises:
-        ModeError: It cannot be imported, or a parameter is not allowed.
+        ModeError: The class cannot be imported, or a parameter is not allowed.
     """
     kind = method_class(reference)
     declared = node_declaration(*getattr(kind, "declared_in", ("", ""))) or NodeDeclaration()
     try:
         made: GraspMethod = kind(GivenParameters(parameters, declared))
     except TypeError as error:
-        raise ModeError(f"method '{reference}' cannot be made ({error}); {ALLOWED_METHOD}") from error
+        raise ModeError(f"method '{reference}' cannot be constructed ({error}); {ALLOWED_METHOD}") from error
     return made
 
 
@@ -138,37 +138,39 @@ def method_class(reference: str) -> Any:
 def _candidates(
     method: GraspMethod, scene: GraspScene, gripper: GripperGeometry, seed: int
 ) -> tuple[list[GraspCandidate], str]:
-    """Returns the candidates of all parts of the target, best first, and why there are none, as far as it is known."""
-    found_in, causes = [], []
+    """Returns the candidates of all parts of the target, best first, and the known causes if there are none."""
+    per_target, causes = [], []
     for target in scene.targets:
         beside = tuple(part for part in (*scene.targets, *scene.others) if part.name != target.name)
         try:
-            found_in.append(method.candidates(GraspQuery(target, beside, target.bottom, gripper, seed)))
+            per_target.append(method.candidates(GraspQuery(target, beside, target.bottom, gripper, seed)))
         except NoCandidatesError as error:
             causes.append(f": {error}")
-    found = list(heapq.merge(*found_in, key=lambda candidate: -candidate.quality))
-    return found, "" if found else "".join(causes)
+    merged = list(heapq.merge(*per_target, key=lambda candidate: -candidate.quality))
+    return merged, "" if merged else "".join(causes)
 
 
-def _reached(prepared: _Prepared, scene: GraspScene, candidates: list[GraspCandidate]) -> list[float | None]:
-    """Returns the joint travel of each candidate; None for one out of reach."""
+def _joint_travels(prepared: _Prepared, scene: GraspScene, candidates: list[GraspCandidate]) -> list[float | None]:
+    """Returns the joint travel of each candidate; None if unreachable."""
     if not candidates:
         return []
     reach = GraspReach(prepared.robot, prepared.solver, prepared.gripper, scene.planning_scene)
     return [reach.joint_travel(candidate) for candidate in candidates]
 
 
-def _figures(candidates: list[GraspCandidate], reached: list[float | None], found: list[int]) -> dict[Figure, float]:
+def _figures(
+    candidates: list[GraspCandidate], travels: list[float | None], reachable: list[int]
+) -> dict[Figure, float]:
     """Returns the figures of `metrics.generation`."""
-    figures = {CANDIDATES: float(len(candidates)), CHECKED: float(len(reached)), REACHABLE: float(len(found))}
-    return figures | ({BEST_RANK: float(found[0])} if found else {})
+    figures = {CANDIDATES: float(len(candidates)), CHECKED: float(len(travels)), REACHABLE: float(len(reachable))}
+    return figures | ({BEST_RANK: float(reachable[0])} if reachable else {})
 
 
-def _reason(method: GraspMethod, candidates: list[GraspCandidate], reached: list[float | None], outcome: str) -> str:
+def _reason(method: GraspMethod, candidates: list[GraspCandidate], travels: list[float | None], outcome: str) -> str:
     match outcome:
         case "reachable":
             return ""
         case "out_of_reach":
-            return f"none of the {len(reached)} grasps that were checked, of {len(candidates)}, is reachable"
+            return f"none of {len(travels)} checked grasps (of {len(candidates)} candidates) is reachable"
         case _:
             return f"no part of it can be grasped {method.manner}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The scene of an episode of the mode `grasps`: models at their poses, as the simulation shows them to move_group."""
+"""Scene of an episode of the mode `grasps`: models at their poses, as the simulation publishes them to move_group."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from modular_framework_simulation.models.sdf_resources import Resources, no_pack
 
 @dataclass(frozen=True, slots=True)
 class GraspScene:
-    """What stands around the robot.
+    """Objects around the robot.
 
     Attributes:
-        planning_scene: All objects, for the collision checker.
+        planning_scene: Planning scene with all objects.
         targets: Parts of the object to grasp.
         others: Parts of all other objects.
     """
@@ -37,15 +37,15 @@ class GraspScene:
 
 
 def grasp_scene(model: RobotModel, objects: Sequence[Mapping[str, Any]], target: str) -> GraspScene:
-    """Returns the scene of an episode; the robot is in its default state.
+    """Returns the scene of an episode, with the robot in its default state.
 
     Args:
-        model: The robot.
-        objects: {name, model: FILE, x, y, z [m], roll, pitch, yaw [rad]} each, in the planning frame.
+        model: Robot model.
+        objects: {name, model: FILE, x, y, z [m], roll, pitch, yaw [rad]} per object, in the planning frame.
         target: Name of the object to grasp.
 
     Raises:
-        ModeError: A model cannot be used, or has nothing that can be grasped.
+        ModeError: A model is invalid, or the target has no graspable shape.
     """
     scene = empty_scene(model, model.default_positions())
     targets: list[SceneObject] = []
@@ -60,7 +60,7 @@ def grasp_scene(model: RobotModel, objects: Sequence[Mapping[str, Any]], target:
         except (DescriptionError, SceneObjectError, PlanningError, OSError) as error:
             raise ModeError(f"object '{item['name']}': {error}") from error
     if not targets:
-        raise ModeError(f"object '{target}' has no collision shape that can be grasped; choose another target")
+        raise ModeError(f"object '{target}' has no graspable collision shape; choose another target")
     return GraspScene(scene, tuple(targets), tuple(others))
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs inverse kinematics on random reachable poses of a robot, without simulation and without a ROS master.
 
-A pose is that of random joint values within bounds, so it can be reached; the search starts from the robot's default
-state, so the answer cannot be read off the seed. Each solution is checked by forward kinematics (Pinocchio).
+Each target pose results from random joint values within bounds, so it is reachable. The search starts from the robot's
+default state, so the seed does not contain the answer. Forward kinematics (Pinocchio) checks each solution.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ ROTATION_TOLERANCE_RAD = 1.0e-3
 
 @dataclass(frozen=True, slots=True)
 class _PoseResult:
-    """What one pose gave; errors are those of the nearest solution, infinite without one."""
+    """Result for a target pose; errors are those of the first solution, infinite without a solution."""
 
     time_s: float
     solutions: int
@@ -68,7 +68,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
     prepared_by = ("robot", "group", "solver", "timeout", "parameters")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
-        """Solves the poses of one trial; nothing is written, the figures are all there is."""
+        """Solves the poses of a trial; writes no files."""
         robot, solver = self.robot(spec.settings["robot"]), self.prepared(spec.settings)
         started_s = watch.elapsed_s()
         results = _solve_poses(robot, solver, spec)
@@ -94,7 +94,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
         return measured_record(spec, status, "unsolved" if unsolved else "solved", report, folder, watch)
 
     def prepare(self, settings: Mapping[str, Any]) -> InverseKinematics:
-        """Returns the solver, warm: its first solution takes longer."""
+        """Returns the solver after a first solution, which takes longer than the following ones."""
         robot = self.robot(settings["robot"])
         group = robot.chain(str(settings["group"]))
         check_solver(str(settings.get("solver", "")))
@@ -137,7 +137,7 @@ def _home(robot: Robot) -> Array:
 
 
 def _reachable_pose(robot: Robot, group: JointGroup, generator: np.random.Generator) -> Transform:
-    """Returns the tip's pose at random joint values, at most one turn from zero."""
+    """Returns the pose of the tip at random joint values, within pi of zero."""
     model, positions = robot.model, _home(robot)
     lower, upper = np.maximum(model.lower[group.indices], -np.pi), np.minimum(model.upper[group.indices], np.pi)
     positions[group.indices] = generator.uniform(lower, upper)
@@ -152,24 +152,32 @@ def _solve_poses(robot: Robot, solver: InverseKinematics, spec: EpisodeSpec) -> 
         target = _reachable_pose(robot, solver.group, generator)
         start = time.perf_counter()
         found = solver.solutions(solver.group.tip_link, target, _home(robot), timeout_s)
-        results.append(_judge(robot, solver.group.tip_link, target, found, time.perf_counter() - start))
+        results.append(_check_solution(robot, solver.group.tip_link, target, found, time.perf_counter() - start))
     return results
 
 
-def _judge(robot: Robot, tip: str, target: Transform, found: list[Array], time_s: float) -> _PoseResult:
-    """Checks the solution that is used, the first one, by forward kinematics."""
+def _check_solution(robot: Robot, tip: str, target: Transform, found: list[Array], time_s: float) -> _PoseResult:
+    """Returns the errors of the first solution, computed by forward kinematics.
+
+    Args:
+        robot: Robot.
+        tip: Tip link.
+        target: Target pose of the tip.
+        found: Solutions, each of shape (joints of the robot,).
+        time_s: Solving time [s].
+    """
     if not found:
         return _PoseResult(time_s, 0, np.inf, np.inf)
     reached = robot.model.link_transforms(found[0])[tip]
     model, values = robot.model, found[0]
-    inside = bool(((values >= model.lower - 1e-9) & (values <= model.upper + 1e-9)).all())
+    within_limits = bool(((values >= model.lower - 1e-9) & (values <= model.upper + 1e-9)).all())
     error = pin.log3(target.rotation.T @ reached.rotation)
-    position_error = float(np.linalg.norm(reached.translation - target.translation)) if inside else np.inf
+    position_error = float(np.linalg.norm(reached.translation - target.translation)) if within_limits else np.inf
     return _PoseResult(time_s, len(found), position_error, float(np.linalg.norm(error)))
 
 
 def _figures(results: list[_PoseResult]) -> dict[Figure, float]:
-    """Returns the figures of `metrics.kinematics`; those of solutions only where there are some."""
+    """Returns the figures of `metrics.kinematics`; errors require a solved pose."""
     solved = [result for result in results if result.is_solved]
     figures = {
         SOLVED_SHARE: len(solved) / len(results),

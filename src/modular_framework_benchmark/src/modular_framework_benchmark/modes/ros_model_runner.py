@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the modes without simulation share: robots and solvers are made once, what cannot be run is a broken episode."""
+"""Common part of the modes without simulation: caches robots and solvers, and records errors as broken episodes."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ PreparedT = TypeVar("PreparedT")
 
 
 class ModelEpisodeRunner(abc.ABC, Generic[PreparedT]):
-    """Runs episodes of a mode without simulation; belongs to one process.
+    """Runs episodes of a mode without simulation within a process.
 
     Attributes:
-        prepared_by: Names of the settings that `prepare` uses: episodes with the same values of them share its result.
+        prepared_by: Names of the settings that `prepare` uses; episodes with equal values share the result.
     """
 
     prepared_by: ClassVar[tuple[str, ...]]
 
     def __init__(self) -> None:
-        """Starts nothing: robots are loaded for the first episode that needs them."""
+        """Creates empty caches; robots are loaded on demand."""
         self._robots: dict[str, Robot] = {}
         self._prepared: dict[str, PreparedT] = {}
 
@@ -37,7 +37,7 @@ class ModelEpisodeRunner(abc.ABC, Generic[PreparedT]):
         """Runs an episode.
 
         Args:
-            spec: What to run; the experiment file of its mode has the settings.
+            spec: Specification of the episode, with the settings of its mode.
             folder: Folder of the episode.
         """
         watch = Stopwatch()
@@ -48,40 +48,45 @@ class ModelEpisodeRunner(abc.ABC, Generic[PreparedT]):
 
     @abc.abstractmethod
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
-        """Does what the episode is about; `watch` runs since its begin.
+        """Runs the component and returns the record of the episode.
+
+        Args:
+            spec: Specification of the episode.
+            folder: Folder of the episode.
+            watch: Stopwatch of the episode.
 
         Raises:
-            ModeError: A setting of it is wrong.
-            ModelError: The robot is.
-            PlanningError: What it asks for cannot be prepared.
+            ModeError: A setting is invalid.
+            ModelError: The robot model is invalid.
+            PlanningError: The component cannot be prepared.
         """
 
     @abc.abstractmethod
     def prepare(self, settings: Mapping[str, Any]) -> PreparedT:
-        """Makes what episodes share, such as a solver; raises as `measure` does."""
+        """Returns data that episodes share, such as a solver; raises like `measure`."""
 
     def end(self, prepared: PreparedT) -> None:
-        """Ends what `prepare` has started: nothing, unless a mode starts processes."""
+        """Releases the result of `prepare`; overridden by modes that start processes."""
 
     def prepared(self, settings: Mapping[str, Any]) -> PreparedT:
-        """Returns what `prepare` makes for an episode's settings, made once; raises as `measure` does."""
+        """Returns the cached result of `prepare` for an episode's settings; raises like `measure`."""
         key = json.dumps([settings.get(name) for name in self.prepared_by], sort_keys=True)
         if key not in self._prepared:
             self._prepared[key] = self.prepare(settings)
         return self._prepared[key]
 
     def close(self) -> None:
-        """Ends the processes, if there are any, and forgets the robots; may be called twice."""
+        """Releases all results of `prepare` and the robots; repeated calls are allowed."""
         for prepared in self._prepared.values():
             self.end(prepared)
         self._prepared.clear()
         self._robots.clear()
 
     def robot(self, robot: str | Mapping[str, Any]) -> Robot:
-        """Returns a robot, see :func:`load_robot`; loads it once.
+        """Returns a cached robot, see :func:`load_robot`.
 
         Raises:
-            ModeError: A file of it is missing or wrong.
+            ModeError: A file of the robot is missing or invalid.
         """
         key = json.dumps(robot, sort_keys=True)
         if key not in self._robots:

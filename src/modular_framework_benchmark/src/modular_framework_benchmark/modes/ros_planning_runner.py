@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs planners on sets of motion-planning problems, without simulation and without a ROS master.
+"""Runs planners on sets of motion planning problems, without simulation and without a ROS master.
 
-Each plan runs in a process of its own that starts from the same state, so that a seed repeats it bit for bit.
+Each plan runs in a forked process with the same initial state, so that a seed reproduces it bit for bit.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 from modular_framework_ros.reported_figures import CLEARANCE, PLANNING_TIME, PROCESSOR_TIME, SEARCH_TIME, Figure
 
 MOTION_PERIOD_S = 0.01
-CLEARANCE_STATES = 25  # along a motion; the distances of one state cost about 0.1 s on detailed meshes
+CLEARANCE_STATES = 25  # per motion; the distances of a state take about 0.1 s on detailed meshes
 
 
 FULL_SPEED = {"default_velocity_scaling_factor": 1.0, "default_acceleration_scaling_factor": 1.0}
-PLUGINS = {  # of pipelines that the robot's configuration does not have
+PLUGINS = {  # of pipelines that the robot's configuration lacks
     "ompl": "ompl_interface/OMPLPlanner",
     "pilz_industrial_motion_planner": "pilz_industrial_motion_planner/CommandPlanner",
     "stomp": "stomp_moveit/StompPlannerManager",
@@ -50,7 +50,7 @@ PLUGINS = {  # of pipelines that the robot's configuration does not have
 
 @dataclass(frozen=True, slots=True)
 class _Prepared:
-    """What episodes with the same robot and pipeline share."""
+    """Data shared by episodes with the same robot and pipeline."""
 
     model: RobotModel
     pipeline: PlanningPipeline
@@ -63,7 +63,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
     prepared_by = ("robot", "pipeline", "planner", "planner_parameters", "parameters")
 
     def measure(self, spec: EpisodeSpec, folder: Path, watch: Stopwatch) -> EpisodeRecord:
-        """Plans one problem, and writes the motion to `trajectory.parquet` in the folder."""
+        """Plans one problem and writes the motion to `trajectory.parquet` in the folder."""
         prepared = self.prepared(spec.settings)
         problem = _read_problem(spec.settings, prepared.model)
         started_s, answer, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
@@ -93,7 +93,7 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         return measured_record(spec, _status(code), code.name, report, folder, watch)
 
     def prepare(self, settings: Mapping[str, Any]) -> _Prepared:
-        """Returns the robot and the process that plans."""
+        """Returns the robot and the planning process."""
         robot = self.robot(settings["robot"])
         spec = _pipeline_spec(robot, settings)
         pipeline = spec.build(robot.model, robot.solvers())
@@ -101,14 +101,14 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         return _Prepared(robot.model, pipeline, SeededPlanning(robot.model, [spec]))
 
     def end(self, prepared: _Prepared) -> None:
-        """Ends the process that plans."""
+        """Ends the planning process."""
         prepared.seeded.close()
 
 
 def _pipeline_spec(robot: Robot, settings: Mapping[str, Any]) -> PipelineSpec:
     """Returns the pipeline of the robot's configuration with the episode's parameters, at full speed.
 
-    Full speed, so that durations of motions compare planners and not scaling factors.
+    Full speed makes the durations of motions compare planners instead of scaling factors.
     """
     name, planner = str(settings.get("pipeline") or "ompl"), str(settings["planner"])
     own = robot.pipelines.get(name) or {"planning_plugin": PLUGINS.get(name, name)}
@@ -123,13 +123,13 @@ def _pipeline_spec(robot: Robot, settings: Mapping[str, Any]) -> PipelineSpec:
 
 
 def _check_planner(pipeline: PlanningPipeline, planner: str) -> None:
-    """Raises ModeError where move_group would plan with a default instead."""
+    """Raises ModeError if move_group would replace the planner by its default."""
     known = (*pipeline.planner_ids, *pipeline.configurations.names())
     if not planner:
         return  # the pipeline's default
     if pipeline.planner_ids and planner not in known:
         raise ModeError(
-            f"planner '{planner}': pipeline '{pipeline.name}' has none of that name; allowed are {', '.join(known)}"
+            f"planner '{planner}': pipeline '{pipeline.name}' has no such planner; allowed: {', '.join(known)}"
         )
     faults = pipeline.parameter_faults(planner)
     if faults:
@@ -169,7 +169,7 @@ def _status(code: ErrorCode) -> EpisodeStatus:
 
 
 def _figures(problem: MotionProblem, answer: PlanningAnswer, settings: Mapping[str, Any]) -> dict[Figure, float]:
-    """Returns the figures of `metrics.planning`; the clearance only where it is asked for, because it takes seconds."""
+    """Returns the figures of `metrics.planning`; the clearance only on request, because it takes seconds."""
     figures = {PLANNING_TIME: answer.total_time_s, SEARCH_TIME: answer.planning_time_s}
     if "clearance" in settings.get("metrics", ()):
         figures[CLEARANCE] = _clearance(problem, answer)
@@ -177,13 +177,13 @@ def _figures(problem: MotionProblem, answer: PlanningAnswer, settings: Mapping[s
 
 
 def _motion(trajectory: Trajectory) -> Motion:
-    """Returns the curve a controller makes of it, every 10 ms at most."""
+    """Returns the motion that a controller interpolates, sampled at least every 10 ms."""
     times = trajectory.sample_times(MOTION_PERIOD_S)
     return Motion(trajectory.joint_names, times, trajectory.positions_at(times))
 
 
 def _clearance(problem: MotionProblem, answer: PlanningAnswer) -> float:
-    """Returns the smallest distance of checked pairs along the motion [m]."""
+    """Returns the minimum distance of the checked pairs along the motion [m]."""
     motion, model = answer.trajectory, problem.request.scene.model
     checker = DEFAULT_CHECKER(problem.request.scene, model.group(problem.request.group).indices)
     times = np.linspace(0.0, motion.duration_s, min(CLEARANCE_STATES, len(motion.sample_times())))
@@ -193,9 +193,9 @@ def _clearance(problem: MotionProblem, answer: PlanningAnswer) -> float:
 
 
 def write_motion(motion: Trajectory, path: Path) -> None:
-    """Writes a motion as a Parquet file.
+    """Writes a motion to a Parquet file.
 
-    Its columns are `time_s`, and `<joint>/position`, `/velocity` and `/acceleration` [rad or m, per s, per s^2].
+    The columns are `time_s`, and `<joint>/position`, `/velocity` and `/acceleration` [rad or m, per s, per s^2].
     """
     columns = {"time_s": motion.times}
     for number, joint in enumerate(motion.joint_names):

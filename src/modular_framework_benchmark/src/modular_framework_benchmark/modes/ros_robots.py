@@ -18,7 +18,7 @@ from modular_framework_planning.robot_model.urdf_document import directory_resol
 
 @dataclass(frozen=True, slots=True)
 class _MeshesBeside:
-    """Finds meshes by their packages, else in a folder; can be sent to another process."""
+    """Picklable mesh resolver that searches packages first and a folder second."""
 
     folder: Path
 
@@ -30,14 +30,14 @@ class _MeshesBeside:
 
 
 def load_robot(robot: str | Mapping[str, Any]) -> Robot:
-    """Loads a robot.
+    """Returns a robot.
 
     Args:
-        robot: Name of a MoveIt configuration package, or {urdf: FILE, srdf: FILE}; meshes of a package that is not on
-            ROS_PACKAGE_PATH are looked for beside the URDF.
+        robot: Name of a MoveIt configuration package, or {urdf: FILE, srdf: FILE}; meshes of packages outside
+            ROS_PACKAGE_PATH are searched beside the URDF.
 
     Raises:
-        ModeError: A file is missing or wrong.
+        ModeError: A file is missing or invalid.
     """
     try:
         return _from_package(robot) if isinstance(robot, str) else _from_files(robot)
@@ -47,7 +47,7 @@ def load_robot(robot: str | Mapping[str, Any]) -> Robot:
 
 def _from_files(files: Mapping[str, Any]) -> Robot:
     if set(files) != {"urdf", "srdf"}:
-        raise ModeError(f"robot: found {', '.join(map(str, files)) or 'nothing'}; give both urdf and srdf, and no more")
+        raise ModeError(f"robot: found {', '.join(map(str, files)) or 'nothing'}; allowed: urdf and srdf; give both")
     urdf, srdf = Path(str(files["urdf"])), Path(str(files["srdf"]))
     text = urdf.read_text()
     return Robot(RobotModel(text, srdf.read_text(), {}, _MeshesBeside(urdf.parent)), urdf=text)
@@ -58,7 +58,7 @@ def _from_package(package: str) -> Robot:
 
     try:
         configs = MoveItConfigsBuilder(package.removesuffix("_moveit_config"), package_name=package).to_moveit_configs()
-    except Exception as error:  # noqa: BLE001 - the builder names the file; its kinds of errors are many
+    except Exception as error:  # noqa: BLE001 - the builder raises many kinds of errors, which name the file
         raise ModeError(f"robot: MoveIt configuration package '{package}' cannot be loaded: {error}") from error
     (urdf,) = configs.robot_description.values()
     (srdf,) = configs.robot_description_semantic.values()

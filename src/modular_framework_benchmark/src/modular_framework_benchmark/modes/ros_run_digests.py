@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Digests of what the episodes of an experiment will run with, beside their settings: an extension must find it equal.
+"""Digests of the software and files of an experiment's episodes, which an extension of the experiment must reproduce.
 
-Of a launch file these are its parameters, the files that its nodes are given, and the packages of its nodes.
+The digests of a launch file cover its parameters, the files given to its nodes, and the packages of its nodes.
 """
 
 from __future__ import annotations
@@ -18,27 +18,29 @@ from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCH_SETTING
 from modular_framework_benchmark.episodes.snapshot import PACKAGES
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
-LOADED = (*LAUNCH_SETTINGS, "robot", "method")
-"""Settings that decide what is launched or loaded."""
+LOAD_SETTINGS = (*LAUNCH_SETTINGS, "robot", "method")
+"""Settings that determine what is launched or loaded."""
 LIBRARIES = ("modular_framework_benchmark", "modular_framework_core", "modular_framework_planning")
 
 
 def run_digests(mode: str, episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
-    """Returns digests of all that episodes run with, by what it is; several, separated by blanks, where stacks differ.
+    """Returns the digests of all software and files, keyed by description; several digests are separated by spaces.
 
     Args:
-        mode: Of the experiment.
-        episodes: All its episodes.
+        mode: Mode of the experiment.
+        episodes: Episodes of the experiment.
 
     Raises:
-        SettingsError: A launch file cannot be read.
+        SettingsError: A launch file is invalid.
     """
     found: dict[str, set[str]] = {f"Python package {name}": {_python_version(name)} for name in PACKAGES}
-    stacks = {json.dumps([spec.settings.get(key) for key in LOADED], sort_keys=True): spec for spec in episodes}
+    stacks = {json.dumps([spec.settings.get(key) for key in LOAD_SETTINGS], sort_keys=True): spec for spec in episodes}
     for spec in stacks.values():
-        for what, digest in _of_launch(spec) if mode == "task" else _of_packages(_named_packages(spec.settings)):
-            found.setdefault(what, set()).add(digest[:16])
-    return {what: " ".join(sorted(digests)) for what, digests in sorted(found.items())}
+        for description, digest in (
+            _launch_digests(spec) if mode == "task" else _package_digests(_named_packages(spec.settings))
+        ):
+            found.setdefault(description, set()).add(digest[:16])
+    return {description: " ".join(sorted(digests)) for description, digests in sorted(found.items())}
 
 
 def _python_version(name: str) -> str:
@@ -54,22 +56,24 @@ def _named_packages(settings: Mapping[str, Any]) -> set[str]:
     return {*LIBRARIES, *named} - {""}
 
 
-def _of_packages(packages: Iterable[str]) -> Iterator[tuple[str, str]]:
+def _package_digests(packages: Iterable[str]) -> Iterator[tuple[str, str]]:
     for package in packages:
         yield f"package {package}", package_source(package)[1]
 
 
-def _of_launch(spec: EpisodeSpec) -> Iterator[tuple[str, str]]:
+def _launch_digests(spec: EpisodeSpec) -> Iterator[tuple[str, str]]:
     stack = preview_stack(spec.settings)
     texts = [str(stack.launch.arguments[name]) for name in sorted(stack.launch.arguments)]
     for name, value in stack.preview.parameters.items():
         yield f"parameter {name}", _digest(json.dumps(value, sort_keys=True, default=str))
         texts.append(str(value))
-    words = {word for text in (*texts, *(node.arguments for node in stack.preview.nodes)) for word in text.split()}
-    for file in sorted(Path(word) for word in words if word.startswith("/") and len(word) < 1024):
+    arguments = {
+        argument for text in (*texts, *(node.arguments for node in stack.preview.nodes)) for argument in text.split()
+    }
+    for file in sorted(Path(argument) for argument in arguments if argument.startswith("/") and len(argument) < 1024):
         if file.is_file():
             yield f"file {file.parent.name}/{file.name}", hashlib.sha256(file.read_bytes()).hexdigest()
-    yield from _of_packages({*LIBRARIES, *(node.package for node in stack.preview.nodes)})
+    yield from _package_digests({*LIBRARIES, *(node.package for node in stack.preview.nodes)})
 
 
 def _digest(text: str) -> str:

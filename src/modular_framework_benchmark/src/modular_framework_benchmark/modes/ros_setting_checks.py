@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Looks up what the settings of each mode name, before any episode runs; nothing is started."""
+"""Resolves the names in the settings of each mode before any episode runs, without starting anything."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "
 
 
 def setting_checks() -> dict[str, SettingsCheck]:
-    """Returns what looks up the settings of each mode."""
+    """Returns the checks of the settings, keyed by mode."""
     planning, kinematics, grasps = PlanningEpisodeRunner(), KinematicsEpisodeRunner(), GraspEpisodeRunner()
     return {
         "task": check_task,
@@ -54,7 +54,7 @@ def _plain(settings: Mapping[str, Any], *without: str) -> dict[str, Any]:
 
 
 def _faults_of(checks: Iterable[tuple[tuple[str, ...], Callable[[], object]]]) -> list[SettingFault]:
-    """Returns the faults that checks raise, each with the keys of its setting."""
+    """Returns the errors raised by checks, each with the keys of its setting."""
     faults = []
     for keys, check in checks:
         try:
@@ -65,7 +65,7 @@ def _faults_of(checks: Iterable[tuple[tuple[str, ...], Callable[[], object]]]) -
 
 
 def _robot(runner: ModelEpisodeRunner[Any], settings: Mapping[str, Any]) -> tuple[Robot | None, list[SettingFault]]:
-    """Returns the robot and the fault of loading it; None without a fault if the setting could not be read."""
+    """Returns the robot and the faults of loading; None without a fault if the setting is unreadable."""
     if "robot" not in settings:
         return None, []
     faults = _faults_of([(("robot",), lambda: runner.robot(settings["robot"]))])
@@ -73,14 +73,14 @@ def _robot(runner: ModelEpisodeRunner[Any], settings: Mapping[str, Any]) -> tupl
 
 
 def _is_whole(mode: str, settings: Mapping[str, Any]) -> bool:
-    """Returns whether every setting of a mode could be read."""
+    """Returns whether all settings of a mode are present."""
     return settings.keys() >= MODES[mode].keys.keys()
 
 
 def _check_group(robot: Robot, name: str) -> None:
     groups = robot.model.groups
     if name not in groups:
-        raise ModeError(f"there is no planning group '{name}'; {listing(groups)}{nearest(name, groups)}")
+        raise ModeError(f"planning group '{name}' does not exist; {listing(groups)}{nearest(name, groups)}")
 
 
 def _check_chain(robot: Robot, name: str) -> None:
@@ -89,7 +89,7 @@ def _check_chain(robot: Robot, name: str) -> None:
 
 
 def check_kinematics(runner: KinematicsEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
-    """Checks robot, group, solver and parameters of mode `kinematics`."""
+    """Checks robot, group, solver and parameters of the mode `kinematics`."""
     group = str(settings.get("group", ""))
 
     def check_parameter(name: str, value: object) -> Callable[[], object]:
@@ -108,7 +108,7 @@ def check_kinematics(runner: KinematicsEpisodeRunner, settings: Mapping[str, Any
 
 
 def check_grasps(runner: GraspEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
-    """Checks robot, group, gripper joint, method and its parameters of mode `grasps`."""
+    """Checks robot, group, gripper joint, method and its parameters of the mode `grasps`."""
     robot, faults = _robot(runner, settings)
     joint, group = str(settings.get("gripper_joint")), str(settings.get("group"))
     method, parameters = str(settings.get("method")), settings.get("method_parameters", {})
@@ -132,7 +132,7 @@ def check_grasps(runner: GraspEpisodeRunner, settings: Mapping[str, Any]) -> Che
 
 
 def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
-    """Checks the launch and the task of mode `task`."""
+    """Checks the launch and the task of the mode `task`."""
     if "launch" not in settings:
         return CheckedSettings((), None)
     is_known = "arguments" in settings
@@ -161,7 +161,7 @@ def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
 
 
 def check_planning(runner: PlanningEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
-    """Checks robot, group, pipeline, planner and parameters of mode `planning`."""
+    """Checks robot, group, pipeline, planner and parameters of the mode `planning`."""
     robot, faults = _robot(runner, settings)
     if robot is None:
         return CheckedSettings(tuple(faults), None)
@@ -176,7 +176,7 @@ def check_planning(runner: PlanningEpisodeRunner, settings: Mapping[str, Any]) -
 
 
 def _planning_check(robot: Robot, settings: Mapping[str, Any]) -> LaunchCheck:
-    """Returns the check of a move_group with the robot and the pipeline of mode `planning`."""
+    """Returns the check of a move_group with the robot and the pipeline of the mode `planning`."""
     pipeline = str(settings["pipeline"])
     pipelines = {**robot.pipelines}
     pipelines.setdefault(pipeline, {"planning_plugin": PLUGINS.get(pipeline, pipeline)})
@@ -206,7 +206,7 @@ def _parameter_faults(check: LaunchCheck, settings: Mapping[str, Any]) -> Iterat
 
 
 def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | None) -> tuple[str, ...]:
-    """Returns what would run in place of a planner, as its records would say."""
+    """Returns the text of the substitution that constrained requests cause, as in the records of plans."""
     constrained = registry.constrained_planner(planner) if registry is not None and planner is not None else ""
     return (substitution_text(planner.planner, constrained),) if planner is not None and constrained else ()
 
@@ -214,7 +214,14 @@ def _substitutions(registry: PlannerRegistry | None, planner: ResolvedPlanner | 
 def _planner(
     check: LaunchCheck, settings: Mapping[str, Any], faults: list[SettingFault], pipelines: list[str]
 ) -> ResolvedPlanner | None:
-    """Returns the planner of mode `planning`; notes faults."""
+    """Returns the planner of the mode `planning`, or None after adding faults.
+
+    Args:
+        check: Check of the launch.
+        settings: Settings of a combination.
+        faults: List to which faults are added.
+        pipelines: Names of the available pipelines.
+    """
     try:
         registry = check.registry()
         assert registry is not None
