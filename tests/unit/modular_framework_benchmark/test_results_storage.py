@@ -105,7 +105,7 @@ def test_a_full_disk_loses_no_episode(filled: Path) -> None:
 
     answer, _, key = in_child(fill).partition(" KEY ")
     assert answer.startswith(f"DatabaseFullError {filled}.unwritten/")
-    assert f"{filled}: reading or writing failed; look for a full disk" in answer
+    assert f"{filled}: reading or writing failed; check for a full disk" in answer
     assert "imported when the database is next opened" in answer
     with sqlite3.connect(filled) as connection:
         assert connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
@@ -258,7 +258,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
         open_database(tmp_path / "none" / "results.db", create=True)
     with pytest.raises(ResultsError, match="a database in memory is lost"):
         open_database("sqlite://")
-    with pytest.raises(ResultsError, match="no URL of a database"):
+    with pytest.raises(ResultsError, match="not a URL of a database"):
         open_database("://x")
     with pytest.raises(ResultsError, match="install the driver that the URL names"):
         open_database("nosuchserver://me@host/results")
@@ -293,7 +293,7 @@ def test_a_damaged_file_is_told(filled: Path) -> None:
 def test_a_file_that_is_no_database_is_told(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("no database at all, but long enough to be taken for one" * 10)
-    with pytest.raises(DatabaseCorruptError, match="notes.txt: it is no SQLite file"):
+    with pytest.raises(DatabaseCorruptError, match="notes.txt: it is not a SQLite file"):
         open_database(path)
 
 

@@ -114,7 +114,7 @@ def test_without_a_copy_there_is_no_upgrade(old: Path, monkeypatch: pytest.Monke
         return connect(path, *arguments, **keywords)  # type: ignore[arg-type, call-overload, no-any-return]
 
     monkeypatch.setattr(schema_upgrade.sqlite3, "connect", full)
-    with pytest.raises(DatabaseFullError, match=r"no copy of it could be made as .*version_1 \(disk full\)"):
+    with pytest.raises(DatabaseFullError, match=r"its copy .*version_1 could not be written \(disk full\)"):
         open_database(old)
     monkeypatch.undo()
     assert dump(old) == before

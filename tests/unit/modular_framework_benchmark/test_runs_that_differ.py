@@ -78,7 +78,7 @@ def test_compare_marks_what_else_differs(
     before, after = stored(tmp_path / "before.db"), stored(tmp_path / "after.db", **changes)
     assert compare([before, after, "--into", str(tmp_path / "page.html")]) == 0
     shown = capsys.readouterr().out
-    assert shown.startswith("The two runs also differ in what they ran with")
+    assert shown.startswith("The runs also differ in the following")
     assert text in shown and text in (tmp_path / "page.html").read_text()
 
 

@@ -23,7 +23,7 @@ from modular_framework_benchmark.metrics.recording_files import (
 )
 from modular_framework_benchmark.metrics.registry import measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
-from modular_framework_benchmark.records.what_ran import WhatRan
+from modular_framework_benchmark.records.used_software import UsedSoftware
 
 TASK_RECORDS = "task_records"
 PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
@@ -89,7 +89,7 @@ class EpisodeEnd:
 def make_record(end: EpisodeEnd) -> EpisodeRecord:
     """Returns the record of an episode whose processes have all ended."""
     wall_s = time.monotonic() - end.begun_monotonic
-    software = WhatRan.from_parts(end.answer.get("ran", {}))
+    software = UsedSoftware.from_parts(end.answer.get("ran", {}))
     if software.replaced:
         end = end.broken(f"the named software did not run: {'; '.join(software.replaced)}")
     recording = read_recording(end.folder)

@@ -11,9 +11,9 @@ from typing import Any
 import rospkg
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source
-from modular_framework_benchmark.records.what_ran import (
-    RanMethod,
-    WhatRan,
+from modular_framework_benchmark.records.used_software import (
+    UsedMethod,
+    UsedSoftware,
     description_digests,
     solver_substitutions,
 )
@@ -36,7 +36,7 @@ def running_stack(
     controllers: Mapping[str, str],
     generators: Iterable[str],
     plans: Iterable[Mapping[str, Any]],
-) -> WhatRan:
+) -> UsedSoftware:
     """Returns the software of a stack, including the planners that ran.
 
     Args:
@@ -49,8 +49,8 @@ def running_stack(
     described = description_digests(*(str(_value(parameters, name)) for name in DESCRIPTIONS))
     digests = {what: hashlib.sha256(path.read_bytes()).hexdigest() for what, path in files.items() if path.is_file()}
     methods = {package: package_source(package) for package in sorted({package_of(node) for node in generators} - {""})}
-    software = WhatRan(
-        methods={name: RanMethod(version, digest) for name, (version, digest) in methods.items()},
+    software = UsedSoftware(
+        methods={name: UsedMethod(version, digest) for name, (version, digest) in methods.items()},
         controllers=dict(controllers),
         physics_engine=str(_value(parameters, "/gazebo/physics_engine")),
         renderer=str(_value(parameters, "/gazebo_cameras/renderer")),

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from modular_framework_benchmark.records.episode import EpisodeStatus, Span
-from modular_framework_benchmark.records.what_ran import WhatRan
+from modular_framework_benchmark.records.used_software import UsedSoftware
 from modular_framework_ros.reported_figures import Figure
 
 Array = npt.NDArray[np.float64]
@@ -47,7 +47,7 @@ class ComponentReport:
     wall_s: float
     figures: Mapping[Figure, float] = field(default_factory=dict)
     motion: Motion | None = None
-    ran: WhatRan = WhatRan()
+    ran: UsedSoftware = UsedSoftware()
 
 
 @dataclass(frozen=True, slots=True)

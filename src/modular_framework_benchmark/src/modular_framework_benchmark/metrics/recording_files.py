@@ -3,7 +3,7 @@
 
 | file | contents |
 |---|---|
-| `trajectory.parquet` | rows of samples: `time_s`, `<joint>/position|velocity|effort|command`, poses of moving objects |
+| `trajectory.parquet` | samples: `time_s`, `<joint>/position|velocity|effort|command`, poses of moving objects |
 | `tracking.parquet` | `time_s`, `controller`, `joint`, `desired`, `actual` |
 | `parameters.json` | all parameters of the parameter server |
 | `recording.json` | objects, grasps and reports of the components |

@@ -137,7 +137,7 @@ def find_metric(name: str) -> RegisteredMetric:
         return METRICS[name]
     similar = get_close_matches(name, METRICS, n=1)
     raise MetricError(
-        f"there is no metric '{name}'{f'; did you mean {similar[0]!r}' if near else ''}; allowed: "
+        f"there is no metric '{name}'{f'; did you mean {similar[0]!r}' if similar else ''}; allowed: "
         f"{', '.join(METRICS)}, or FILE.py:FUNCTION for a user's function"
     )
 

@@ -25,7 +25,12 @@ from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_grasp_scenes import GraspScene, grasp_scene
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.what_ran import RanMethod, WhatRan, description_digests, solver_substitutions
+from modular_framework_benchmark.records.used_software import (
+    UsedMethod,
+    UsedSoftware,
+    description_digests,
+    solver_substitutions,
+)
 from modular_framework_core.grasp_generation.grasp_candidates import (
     GraspCandidate,
     GraspMethod,
@@ -95,11 +100,11 @@ class GraspEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         return _Prepared(robot, robot.solvers().solver(group.name), gripper)
 
 
-def _ran(method: str, prepared: _Prepared) -> WhatRan:
+def _ran(method: str, prepared: _Prepared) -> UsedSoftware:
     package = method.partition(":")[0].partition(".")[0]
     version, sources = package_source(package)
-    return WhatRan(
-        methods={package: RanMethod(version, sources)},
+    return UsedSoftware(
+        methods={package: UsedMethod(version, sources)},
         solver=prepared.solver.method,
         substitutions=solver_substitutions([prepared.solver.settings.solver]),
         digests=description_digests(*prepared.robot.model.source[:2]),

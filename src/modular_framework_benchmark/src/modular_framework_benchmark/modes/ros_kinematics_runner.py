@@ -23,7 +23,7 @@ from modular_framework_benchmark.modes.parameters import parameters_below
 from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.what_ran import WhatRan, description_digests, solver_substitutions
+from modular_framework_benchmark.records.used_software import UsedSoftware, description_digests, solver_substitutions
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.kinematics.kinematics_settings import (
@@ -84,7 +84,7 @@ class KinematicsEpisodeRunner(ModelEpisodeRunner[InverseKinematics]):
             ended_s=ended_s,
             wall_s=ended_s - started_s,
             figures=_figures(results),
-            ran=WhatRan(
+            ran=UsedSoftware(
                 solver=solver.method,
                 digests=description_digests(*robot.model.source[:2]),
                 substitutions=solver_substitutions([solver.settings.solver]),

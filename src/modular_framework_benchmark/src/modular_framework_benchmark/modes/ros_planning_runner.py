@@ -23,7 +23,7 @@ from modular_framework_benchmark.modes.robots import Robot
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
-from modular_framework_benchmark.records.what_ran import WhatRan, description_digests
+from modular_framework_benchmark.records.used_software import UsedSoftware, description_digests
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.plan_statistics import PlanStatistics
 from modular_framework_planning.planning_interface.collision_detectors import DEFAULT_CHECKER
@@ -151,9 +151,9 @@ def _read_problem(settings: Mapping[str, Any], model: RobotModel) -> MotionProbl
     return MotionProblem(str(named.get("name") or problem.name), request)
 
 
-def _ran(statistics: PlanStatistics | None, model: RobotModel) -> WhatRan:
+def _ran(statistics: PlanStatistics | None, model: RobotModel) -> UsedSoftware:
     run = None if statistics is None else statistics.run
-    return WhatRan(digests=description_digests(*model.source[:2])).with_plans([] if run is None else [run])
+    return UsedSoftware(digests=description_digests(*model.source[:2])).with_plans([] if run is None else [run])
 
 
 def _status(code: ErrorCode) -> EpisodeStatus:

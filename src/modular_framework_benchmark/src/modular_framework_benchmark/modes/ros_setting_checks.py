@@ -24,7 +24,7 @@ from modular_framework_benchmark.modes.ros_kinematics_runner import (
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
 from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
-from modular_framework_benchmark.records.what_ran import solver_substitutions, substitution_text
+from modular_framework_benchmark.records.used_software import solver_substitutions, substitution_text
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the other rooms exchange: the description of an experiment, an episode to run, and what it gave."""
+"""Records that the other rooms exchange: the description of an experiment, episodes and their results."""

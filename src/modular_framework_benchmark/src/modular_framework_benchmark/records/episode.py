@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One episode of an experiment: what to run, and what it gave."""
+"""An episode of an experiment: its specification and its record."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class EpisodeSpec:
-    """An episode to run.
+    """Specification of an episode.
 
     Attributes:
-        number: Its place in the order of the run, from 0; unique in an experiment.
-        configuration: Level of each factor, by the factor's name.
+        number: Index in the order of the run; unique in an experiment.
+        configuration: Level of each factor, keyed by factor name.
         trial: Number of the scene and seed. Episodes of different methods with the same trial and the same levels of
-            the other factors are a pair: they have the same scene and the same seeds.
-        seed: What every random source of the episode is seeded with, from the experiment's seed and the trial.
-        settings: What the levels stand for, merged: the keys of the mode (launch arguments, parameters, objects, ...).
+            the other factors are a pair: they share the scene and the seeds.
+        seed: Seed of all random generators of the episode, derived from the experiment's seed and the trial.
+        settings: Settings of the levels, merged: the keys of the mode (launch arguments, parameters, objects, ...).
     """
 
     number: int
@@ -30,33 +30,33 @@ class EpisodeSpec:
 
     @property
     def key(self) -> str:
-        """Returns what identifies the episode within its experiment, whatever the order of the run is."""
+        """Returns a text that identifies the episode within its experiment, independent of the order of the run."""
         levels = ",".join(f"{name}={self.configuration[name]}" for name in sorted(self.configuration))
         return f"{levels};trial={self.trial}"
 
 
 class EpisodeStatus(Enum):
-    """How an episode ended."""
+    """Final status of an episode."""
 
     SUCCEEDED = "succeeded"
-    FAILED = "failed"  # it ran to its end, without success
-    TIMED_OUT = "timed_out"  # it did not end within its time limit
-    BROKEN = "broken"  # the launch died or the measurement failed: says nothing of the method by itself
-    INVALID = "invalid"  # what it was judged by was changed from outside: counts as a failure without any figure
+    FAILED = "failed"  # ended without success
+    TIMED_OUT = "timed_out"  # exceeded the time limit
+    BROKEN = "broken"  # the launch died or the measurement failed, which need not be the method's fault
+    INVALID = "invalid"  # external interference with its judgement; counts as a failure without figures
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A part of an episode with a start and an end, for timelines and times by component.
+    """A part of an episode with a start and an end, for timelines and times per component.
 
     Attributes:
         kind: `state` for a state of the task, `component` for generation, planning or execution.
         name: Path of the state, or name of the component.
-        started_s: Start [s since the episode began, by the clock named in `EpisodeRecord`].
-        ended_s: End [s]; None if it never ended.
-        outcome: Outcome of the state; "" where there is none.
-        failed: Whether it failed.
-        reason: Why it failed; "" when it did not.
+        started_s: Start by the wall clock [s since the start of the episode].
+        ended_s: End [s since the start of the episode]; None if it never ended.
+        outcome: Outcome of the state; "" for none.
+        failed: Whether the state or component failed.
+        reason: Reason for the failure; "" on success.
     """
 
     kind: str
@@ -70,21 +70,21 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class EpisodeRecord:
-    """What an episode gave.
+    """Record of a finished episode.
 
     Attributes:
-        spec: What was run.
-        status: How it ended.
-        outcome: Outcome of the task; "" when it had none.
-        cause: Why it did not succeed, in words; "" on success.
-        begun: When it started [s since 1970].
-        wall_s: How long it took, start and stop included [s].
-        simulated_s: How long it took by the simulated clock [s]; None without one.
-        metrics: Value of each metric by its name; None where it has none, such as the lift of an object never touched.
-        spans: What its states and components did, in the order they started.
-        snapshot: What it ran with: versions, machine, git revision, seeds, parameters (JSON values).
-        folder: Folder with its files (log, trajectories, bag, video), relative to that of the database; "" for none.
-        worker: Who ran it.
+        spec: Specification of the episode.
+        status: Final status.
+        outcome: Outcome of the task; "" for none.
+        cause: Cause of a failure; "" on success.
+        begun: Start time [s since 1970].
+        wall_s: Real duration including start and stop of the stack [s].
+        simulated_s: Simulated duration [s]; None without simulated time.
+        metrics: Value of each metric, keyed by name; None without a value, such as the lift of an untouched object.
+        spans: Spans of states and components in the order of their starts.
+        snapshot: Environment: versions, machine, git revision, seeds, parameters (JSON values).
+        folder: Folder of its files (log, trajectories, bag, video), relative to the database's folder; "" for none.
+        worker: Worker that ran the episode.
     """
 
     spec: EpisodeSpec
@@ -102,5 +102,5 @@ class EpisodeRecord:
 
     @property
     def succeeded(self) -> bool:
-        """Returns whether it succeeded."""
+        """Returns whether the episode succeeded."""
         return self.status is EpisodeStatus.SUCCEEDED

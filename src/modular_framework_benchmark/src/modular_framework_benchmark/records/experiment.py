@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Describes an experiment: which methods it compares, by which metrics.
+"""Description of an experiment: its factors, methods and metrics.
 
-It is what a result database keeps of an experiment file, so that statistics and reports need no other source.
+A result database stores this description of an experiment file, so that statistics and reports need no other source.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from modular_framework_ros.reported_figures import Clock, Source
 
 
 class Direction(Enum):
-    """Which values of a metric are better."""
+    """Direction in which values of a metric are better."""
 
     HIGHER = "higher"
     LOWER = "lower"
 
 
 class MetricKind(Enum):
-    """What the values of a metric are, which decides the statistics that fit."""
+    """Kind of a metric's values, which determines the statistics."""
 
     RATE = "rate"  # true or false in each episode, such as success
     VALUE = "value"  # a number, such as a length
-    COUNT = "count"  # how many of something, such as attempts
-    TIME = "time"  # a duration, censored at a limit when the episode did not finish
+    COUNT = "count"  # a number of events, such as attempts
+    TIME = "time"  # a duration, censored at a limit if the episode did not finish
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,16 +36,16 @@ class Metric:
 
     Attributes:
         name: Identifier, a column of the result table: `planning_time`.
-        component: What it measures: `task`, `generation`, `planning`, `execution`, `grasp` or a user's own.
-        kind: What its values are.
-        better: Which values are better.
+        component: Measured component: `task`, `generation`, `planning`, `execution`, `grasp` or one of the user.
+        kind: Kind of the values.
+        better: Direction of better values.
         unit: Unit of the values, such as `s`; "" for none.
-        limit: Value at which it is censored [unit]; None: never. An episode that failed counts at the limit.
-        description: What it says, in a sentence.
-        lowest: Least value that it can have [unit]; None: 0 for counts and times, otherwise none is known.
-        highest: Greatest value that it can have [unit]; None: none is known.
-        clock: Clock of a duration; None: it is no duration, or the clock is not known.
-        source: Who measures it.
+        limit: Censoring limit in the metric's unit, at which failed episodes count; None for no limit.
+        description: One-sentence description.
+        lowest: Smallest possible value in the metric's unit; None for 0 (counts and times) or unknown.
+        highest: Largest possible value in the metric's unit; None for unknown.
+        clock: Clock of a duration; None if unknown or not a duration.
+        source: Origin of the values.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Metric:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Returns between which values an episode counts, the limit included [unit]."""
+        """Returns the smallest and largest value of an episode, including the limit, in the metric's unit."""
         never_negative = self.kind in (MetricKind.COUNT, MetricKind.TIME)
         low = (0.0 if never_negative else -math.inf) if self.lowest is None else self.lowest
         high = math.inf if self.highest is None else self.highest
@@ -73,11 +73,11 @@ class Metric:
 
 @dataclass(frozen=True, slots=True)
 class Factor:
-    """What is varied between episodes.
+    """A factor that varies between episodes.
 
     Attributes:
         name: Identifier, such as `grasp_method`.
-        levels: Labels of its values, such as ("top_down", "antipodal").
+        levels: Labels of the levels, such as ("top_down", "antipodal").
     """
 
     name: str
@@ -86,22 +86,22 @@ class Factor:
 
 @dataclass(frozen=True, slots=True)
 class ExperimentDescription:
-    """An experiment as the result database keeps it.
+    """Description of an experiment as stored in the result database.
 
     Attributes:
         name: Name of the experiment.
         mode: `task` (the whole stack in simulation), `planning`, `kinematics` or `grasps`.
-        text: The experiment file, verbatim.
-        digest: SHA-256 of what decides the episodes, hexadecimal: two files with the same digest run the same episodes.
-        factors: What is varied.
-        compared: Name of the factor whose levels are the methods that are compared.
-        metrics: What is measured.
-        time_limit_s: Longest an episode may take [s].
-        confidence: Level of the intervals, such as 0.95.
-        sequential: Whether a stopping rule looks at the results: its comparisons must then hold at any time.
-        source: Path of the experiment file, from whose folder its relative paths count; "" where there is none.
-        ran_with: Digests of all that its episodes run with beside their settings, by what it is; empty: not known.
-        extended: Whether episodes were added after some had been finished, which is a look at the results.
+        text: Experiment file, verbatim.
+        digest: SHA-256 of everything that determines the episodes, hexadecimal; equal digests mean equal episodes.
+        factors: Factors of the experiment.
+        compared: Name of the factor whose levels are the compared methods.
+        metrics: Measured metrics.
+        time_limit_s: Maximum real duration of an episode [s].
+        confidence: Confidence level of the intervals, such as 0.95.
+        sequential: Whether a stopping rule makes interim analyses, so that comparisons must be anytime-valid.
+        source: Path of the experiment file, whose folder is the base of its relative paths; "" if unknown.
+        ran_with: Digests of everything that episodes use beside their settings, by description; empty if unknown.
+        extended: Whether episodes were added after others had finished, which is an interim analysis.
     """
 
     name: str
@@ -120,5 +120,5 @@ class ExperimentDescription:
 
     @property
     def holds_at_any_time(self) -> bool:
-        """Returns whether its tests must hold however often the results are looked at."""
+        """Returns whether tests must be anytime-valid, because results may be analysed repeatedly."""
         return self.sequential or self.extended

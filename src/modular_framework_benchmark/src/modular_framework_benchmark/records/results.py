@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The results of an experiment as tables, which statistics, reports and exports read."""
+"""Results of an experiment as tables for statistics, reports and exports."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from modular_framework_benchmark.records.experiment import ExperimentDescription
 
 @dataclass(frozen=True, slots=True)
 class ExperimentResults:
-    """The finished episodes of an experiment.
+    """Finished episodes of an experiment.
 
     Attributes:
-        description: What was run.
-        episodes: A row for each episode, ordered by number, with the columns `number`, `trial`, `seed`, `status` (value
+        description: Description of the experiment.
+        episodes: A row per episode, ordered by number, with the columns `number`, `trial`, `seed`, `status` (value
             of `EpisodeStatus`), `success` (bool), `outcome`, `cause`, `begun`, `wall_s`, `simulated_s`, `folder`,
-            `worker`; a column for each factor, by its name, with the labels of the levels; a column for each metric, by
-            its name (float, NaN where an episode has none; 0 and 1 for a rate); in the mode `planning` also
-            `drawn_problem`, a text that is the same for episodes with the same problem.
-        spans: A row for each span, with the columns `number` (of the episode), `kind`, `name`, `started_s`, `ended_s`,
+            `worker`; a column named after each factor with the labels of the levels; a column named after each metric
+            (float, NaN without a value; 0 and 1 for a rate); in the mode `planning` also `drawn_problem`, a text that
+            identifies the problem.
+        spans: A row per span, with the columns `number` (of the episode), `kind`, `name`, `started_s`, `ended_s`,
             `outcome`, `failed`, `reason`.
-        planned: How many episodes the experiment has in all, finished or not.
+        planned: Total number of episodes, finished or not.
     """
 
     description: ExperimentDescription

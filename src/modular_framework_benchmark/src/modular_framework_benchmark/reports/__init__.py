@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows results: a page, figures, tables."""
+"""Reports of results: pages, figures and tables."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws how the values of a metric are spread: boxes, and the share of the episodes at least as good as each value.
+"""Figures of a metric's distribution: box plots and performance profiles.
 
-A figure stays small however many episodes there are: boxes are drawn from quartiles that are computed here from all
-values, curves at a limited number of values.
+The size of a figure is bounded: box plots use quartiles of all values computed here, and profiles have a limited number
+of points.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from modular_framework_benchmark.reports.figure_style import (
 from modular_framework_benchmark.statistics.curves import Curve, performance_profile
 from modular_framework_benchmark.statistics.observations import EpisodeTable, metrics_of
 
-MOST_POINTS = 150  # of a method that are drawn one by one
-FEWEST_VALUES = 3  # that differ; with fewer a table says it better
-FARTHEST_LIMIT = 2.0  # largest values away from 0; one farther off would squeeze the values
+MAX_POINTS = 150  # drawn individually per method
+MIN_DISTINCT_VALUES = 3  # distinct values; a table shows fewer better
+MAX_LIMIT_RATIO = 2.0  # relative to the largest absolute value; a limit beyond would compress the values
 
 Values = npt.NDArray[np.float64]
 
 
 def distribution_figures(results: ExperimentResults, methods: Sequence[str]) -> Iterator[NamedFigure]:
-    """Yields a figure for each metric that is no rate and has values that differ."""
+    """Yields a figure for each metric, except rates, with enough distinct values."""
     table = EpisodeTable(results)
     for metric in metrics_of(results):
         if metric.kind is MetricKind.RATE:
             continue
-        values = [_seen_values(table, metric, method) for method in methods]
-        if np.unique(np.concatenate(values)).size >= FEWEST_VALUES:
+        values = [_measured_values(table, metric, method) for method in methods]
+        if np.unique(np.concatenate(values)).size >= MIN_DISTINCT_VALUES:
             profiles = [performance_profile(results, metric.name, method) for method in methods]
             yield _distribution_figure(metric, methods, values, profiles)
 
 
-def _seen_values(table: EpisodeTable, metric: Metric, method: str) -> Values:
-    """Returns the values that episodes gave: none of those that count at the limit."""
-    seen = table.observations(metric, method)
-    return seen.values[np.isfinite(seen.values) & ~seen.censored]
+def _measured_values(table: EpisodeTable, metric: Metric, method: str) -> Values:
+    """Returns the measured values, without episodes that count at the limit."""
+    observed = table.observations(metric, method)
+    return observed.values[np.isfinite(observed.values) & ~observed.censored]
 
 
 def _distribution_figure(
@@ -69,7 +69,7 @@ def _distribution_figure(
         tickvals=list(range(len(names))), ticktext=names, range=[len(names) - 0.5, -0.5], ticks="", row=1, col=1
     )
     figure.update_yaxes(
-        title={"text": "share at least as good", "standoff": 14}, tickformat=".0%", range=[-0.02, 1.02], row=1, col=2
+        title={"text": "fraction at least as good", "standoff": 14}, tickformat=".0%", range=[-0.02, 1.02], row=1, col=2
     )
     if _shows_limit(metric, values):
         for column in (1, 2):
@@ -81,40 +81,40 @@ def _distribution_figure(
 
 
 def _shows_limit(metric: Metric, values: Sequence[Values]) -> bool:
-    return metric.limit is not None and abs(metric.limit) <= FARTHEST_LIMIT * float(
+    return metric.limit is not None and abs(metric.limit) <= MAX_LIMIT_RATIO * float(
         np.abs(np.concatenate(values)).max()
     )
 
 
 def _summary(metric: Metric, values: Sequence[Values]) -> str:
     text = (
-        "Left: box from the lower to the upper quartile with the median; whiskers to the furthest value within 1.5 box "
-        "lengths. Right: share of the episodes that are at least as good as each value, with its interval; higher "
+        "Left: box from the lower to the upper quartile with the median; whiskers to the farthest value within 1.5 box "
+        "lengths. Right: fraction of the episodes that are at least as good as each value, with its interval; higher "
         "curves are better."
     )
     if metric.limit is not None:
         limit = f"{metric.limit:g} {metric.unit}".strip() + (", dotted" if _shows_limit(metric, values) else "")
-        text += f" Episodes at the limit ({limit}) are in no box and in no share: a curve may end below 100 %."
-    if any(item.size > MOST_POINTS for item in values):
-        text += f" Boxes are of all values; the points are {MOST_POINTS} of each method, evenly spaced in rank."
+        text += f" Episodes at the limit ({limit}) are in no box and no fraction, so a curve may end below 100 %."
+    if any(item.size > MAX_POINTS for item in values):
+        text += f" Boxes include all values; {MAX_POINTS} points of each method are drawn, evenly spaced in rank."
     return text
 
 
 def _add_box(figure: go.Figure, name: str, values: Values, index: int) -> None:
     quartiles = np.quantile(values, (0.25, 0.5, 0.75))
-    reach = 1.5 * (quartiles[2] - quartiles[0])
-    inside = values[(values >= quartiles[0] - reach) & (values <= quartiles[2] + reach)]
+    whisker = 1.5 * (quartiles[2] - quartiles[0])
+    within_whiskers = values[(values >= quartiles[0] - whisker) & (values <= quartiles[2] + whisker)]
     figure.add_trace(
         go.Box(
             q1=[quartiles[0]], median=[quartiles[1]], q3=[quartiles[2]],
-            lowerfence=[inside.min()], upperfence=[inside.max()],
+            lowerfence=[within_whiskers.min()], upperfence=[within_whiskers.max()],
             y=[index - 0.1], orientation="h", name=name, showlegend=False,
             line={"color": color_of(index), "width": 1.5}, width=0.4, boxpoints=False, hoverinfo="x",
         ),
         row=1, col=1,
     )  # fmt: skip
-    points = thinned(np.sort(values), MOST_POINTS)
-    jitter = 0.09 * np.modf(np.arange(len(points)) * 0.618)[0]  # spread evenly, and the same in each report
+    points = thinned(np.sort(values), MAX_POINTS)
+    jitter = 0.09 * np.modf(np.arange(len(points)) * 0.618)[0]  # evenly spread and reproducible
     figure.add_trace(
         go.Scatter(
             x=points, y=index + 0.2 + jitter, mode="markers", showlegend=False, name=name,
@@ -125,7 +125,7 @@ def _add_box(figure: go.Figure, name: str, values: Values, index: int) -> None:
 
 
 def _add_profile(figure: go.Figure, name: str, profile: Curve, index: int, line_shape: str) -> None:
-    taus, share = np.asarray(profile.values, dtype=float), np.asarray(profile.fractions, dtype=float)
+    taus, fraction = np.asarray(profile.values, dtype=float), np.asarray(profile.fractions, dtype=float)
     low, high = np.asarray(profile.low, dtype=float), np.asarray(profile.high, dtype=float)
     red, green, blue = (int(color_of(index)[start : start + 2], 16) for start in (1, 3, 5))
     figure.add_trace(
@@ -137,7 +137,7 @@ def _add_profile(figure: go.Figure, name: str, profile: Curve, index: int, line_
     )  # fmt: skip
     figure.add_trace(
         go.Scatter(
-            x=taus, y=share, mode="lines", name=name, line_shape=line_shape,
+            x=taus, y=fraction, mode="lines", name=name, line_shape=line_shape,
             line={"color": color_of(index), "dash": dash_of(index), "width": 2},
             hovertemplate=f"{name}: %{{y:.1%}} at %{{x:.4g}}<extra></extra>",
         ),
@@ -145,8 +145,8 @@ def _add_profile(figure: go.Figure, name: str, profile: Curve, index: int, line_
     )  # fmt: skip
 
 
-def thinned(ordered: Values, most: int) -> Values:
-    """Returns at most `most` of the values, evenly spaced in rank, the first and the last among them."""
-    if ordered.size <= most:
+def thinned(ordered: Values, max_count: int) -> Values:
+    """Returns at most `max_count` of the values, evenly spaced in rank, including the first and last value."""
+    if ordered.size <= max_count:
         return ordered
-    return ordered[np.linspace(0, ordered.size - 1, most).round().astype(np.intp)]
+    return ordered[np.linspace(0, ordered.size - 1, max_count).round().astype(np.intp)]

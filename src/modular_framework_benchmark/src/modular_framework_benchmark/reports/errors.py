@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Why a report was not made."""
+"""Errors of reports."""
 
 from __future__ import annotations
 
 
 class ReportError(Exception):
-    """A report could not be made: what was found, what is allowed and what to do."""
+    """A report could not be created; the message gives the fault, the allowed values and the remedy."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Groups the episodes that did not succeed by their cause, and finds the files of each."""
+"""Groups unsuccessful episodes by cause, with links to their files."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.figure_style import NamedFigure, color_of, label, stacked_bars, unique_labels
 from modular_framework_benchmark.reports.number_text import counted
 
-MOST_GROUPS = 40
-MOST_EPISODES = 10
-MOST_BARS = 12
-MOST_FILES = 6
+MAX_GROUPS = 40
+MAX_EPISODES = 10
+MAX_BARS = 12
+MAX_FILES = 6
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w])")
 _KINDS = {".log": "log", ".mp4": "video", ".webm": "video", ".bag": "bag"}
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link of the report: what the reader sees, and where it leads, relative to the report and percent-encoded."""
+    """A link of the report: visible text, and target relative to the report, percent-encoded."""
 
     text: str
     target: str
@@ -36,16 +36,16 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class FailedEpisode:
-    """An episode that did not succeed.
+    """An unsuccessful episode.
 
     Attributes:
-        number: Of the episode.
-        method: Its method.
-        levels: Its levels of the other factors, in words.
-        seed: Its seed.
-        status: How it ended.
-        cause: Why, in words.
-        links: Its folder and files.
+        number: Number of the episode.
+        method: Method of the episode.
+        levels: Levels of the other factors as text.
+        seed: Seed of the episode.
+        status: Final status.
+        cause: Cause of the failure.
+        links: Links to its folder and files.
     """
 
     number: int
@@ -59,14 +59,14 @@ class FailedEpisode:
 
 @dataclass(frozen=True, slots=True)
 class FailureGroup:
-    """Episodes that failed for the same cause, numbers in it aside.
+    """Episodes with the same cause, except for numbers in its text.
 
     Attributes:
-        cause: The cause; numbers are replaced by `…` where episodes differ in them.
-        status: How these episodes ended.
-        episodes: How many they are.
-        shown: The first of them.
-        by_method: How many they are of each method.
+        cause: Cause; `…` replaces numbers that differ between episodes.
+        status: Final status of these episodes.
+        episodes: Number of episodes.
+        shown: First episodes of the group.
+        by_method: Number of episodes, keyed by method.
     """
 
     cause: str
@@ -77,19 +77,19 @@ class FailureGroup:
 
     @property
     def caption(self) -> str:
-        """Says which of its episodes are shown."""
+        """Returns a caption that tells how many of the episodes are shown."""
         every = counted(self.episodes, "episode")
         return f"All {every}." if len(self.shown) == self.episodes else f"The first {len(self.shown)} of {every}."
 
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """All failures of an experiment.
+    """Failures of an experiment.
 
     Attributes:
-        groups: The most frequent causes, at most MOST_GROUPS.
-        causes: How many causes there are.
-        episodes: How many episodes did not succeed, of all causes.
+        groups: Most frequent causes, at most MOST_GROUPS.
+        causes: Number of causes.
+        episodes: Number of unsuccessful episodes.
     """
 
     groups: tuple[FailureGroup, ...]
@@ -101,9 +101,9 @@ def group_failures(results: ExperimentResults, database_folder: Path, report_fol
     """Returns the failures of an experiment by cause, the most frequent first.
 
     Args:
-        results: the episodes.
-        database_folder: folder that the episodes' folders are relative to.
-        report_folder: folder of the report, which links are relative to.
+        results: Finished episodes.
+        database_folder: Base of the episodes' folders.
+        report_folder: Folder of the report, the base of its links.
     """
     table = results.episodes[results.episodes["status"] != EpisodeStatus.SUCCEEDED.value]
     causes = {text: _NUMBER.sub("…", text) for text in table["cause"].astype(str).unique()}
@@ -112,7 +112,7 @@ def group_failures(results: ExperimentResults, database_folder: Path, report_fol
     groups.sort(key=lambda item: -len(item[1]))
     finder = _EpisodeReader(results, database_folder, report_folder)
     return Failures(
-        tuple(finder.group(EpisodeStatus(str(key[0])), str(key[1]), rows) for key, rows in groups[:MOST_GROUPS]),
+        tuple(finder.group(EpisodeStatus(str(key[0])), str(key[1]), rows) for key, rows in groups[:MAX_GROUPS]),
         len(groups),
         len(table),
     )
@@ -132,7 +132,7 @@ class _EpisodeReader:
             (str(causes[0]) if len(causes) == 1 else pattern) or "no cause was recorded",
             status,
             len(rows),
-            tuple(self.episode(row) for row in rows.head(MOST_EPISODES).to_dict("records")),
+            tuple(self.episode(row) for row in rows.head(MAX_EPISODES).to_dict("records")),
             {str(method): int(count) for method, count in counts.items()},
         )
 
@@ -151,32 +151,34 @@ class _EpisodeReader:
 
 
 def episode_links(folder: str, database_folder: Path, report_folder: Path) -> tuple[Link, ...]:
-    """Returns links to the folder of an episode and to its logs, videos and bags; nothing for a folder outside.
+    """Returns links to the folder of an episode and its logs, videos and bags; none for a folder outside the base.
 
     Args:
-        folder: of the episode, relative to `database_folder`; "" for none.
-        database_folder: folder of the database.
-        report_folder: folder of the report.
+        folder: Folder of the episode, relative to `database_folder`; "" for none.
+        database_folder: Folder of the database.
+        report_folder: Folder of the report.
     """
     root = database_folder.resolve()
     path = (root / folder).resolve()
     if not folder or not path.is_relative_to(root) or not path.is_dir():
         return ()
     files = [item for item in sorted(path.iterdir()) if item.suffix in _KINDS and item.is_file()]
-    named = [Link(f"{_KINDS[item.suffix]} {item.name}", _relative(item, report_folder)) for item in files[:MOST_FILES]]
-    return (Link("folder", _relative(path, report_folder) + "/"), *named)
+    file_links = [
+        Link(f"{_KINDS[item.suffix]} {item.name}", _relative(item, report_folder)) for item in files[:MAX_FILES]
+    ]
+    return (Link("folder", _relative(path, report_folder) + "/"), *file_links)
 
 
 def _relative(path: Path, report_folder: Path) -> str:
     relative = Path(os.path.relpath(path, report_folder.resolve())).as_posix()
-    return quote(relative if relative.startswith(".") else f"./{relative}")  # a colon is no scheme then
+    return quote(relative if relative.startswith(".") else f"./{relative}")  # keeps a colon from ending a scheme
 
 
 def failures_figure(failures: Failures, methods: tuple[str, ...]) -> NamedFigure | None:
-    """Returns bars of the most frequent causes, by method; None without a failure."""
+    """Returns a bar chart of the most frequent causes by method, or None without failures."""
     if not failures.groups:
         return None
-    groups = failures.groups[:MOST_BARS]
+    groups = failures.groups[:MAX_BARS]
     names = unique_labels([group.cause for group in groups], 64)
     figure = go.Figure(
         [
@@ -190,7 +192,7 @@ def failures_figure(failures: Failures, methods: tuple[str, ...]) -> NamedFigure
     )  # fmt: skip
     stacked_bars(figure, height=130 + 34 * len(groups), value_title="episodes")
     summary = (
-        f"Episodes that did not succeed, by cause and method: the {len(groups)} most frequent of "
+        f"Unsuccessful episodes by cause and method: the {len(groups)} most frequent of "
         f"{counted(failures.causes, 'cause')}."
     )
     return NamedFigure("failures", "Failures by cause", summary, figure)

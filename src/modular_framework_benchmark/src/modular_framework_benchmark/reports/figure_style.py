@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How all figures look: colours that colour-blind readers tell apart, plain axes, labels whose text is shown as it is.
+"""Common style of all figures: colours for colour-blind readers, plain axes, escaped labels.
 
-Plotly reads a part of HTML in every text it draws. So each text that comes from a database passes `label`.
+Plotly interprets some HTML in every text, so each text from a database passes through `label`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import plotly.graph_objects as go
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6B3A", "#5B5B5B")  # Okabe and Ito's
 DASHES = ("solid", "dash", "dot", "dashdot")
 INK, MUTED, LINES, FAILED = "#1f2933", "#5f6c7b", "#e3e8ee", "#b3261e"
-LONGEST_LABEL = 48
+MAX_LABEL_LENGTH = 48
 
 
 @dataclass(frozen=True)
@@ -23,12 +23,12 @@ class NamedFigure:
     """A figure of a report.
 
     Attributes:
-        name: How the command line names it, such as `success`; unique in a report.
+        name: Name on the command line, such as `success`; unique in a report.
         title: Heading.
-        summary: What is drawn, in a sentence or two, for those who see the figure and those who do not; says so where
-            points are a sample.
-        figure: The figure, without a title of its own.
-        component: Component it is about; "" for the whole experiment.
+        summary: Description in a sentence or two, also for readers who cannot see the figure; mentions sampling of
+            points.
+        figure: Figure without a title.
+        component: Component of the figure; "" for the whole experiment.
     """
 
     name: str
@@ -38,40 +38,40 @@ class NamedFigure:
     component: str = ""
 
 
-def label(text: str, longest: int = LONGEST_LABEL) -> str:
-    """Returns a text that Plotly shows as it is, shortened with an ellipsis."""
+def label(text: str, max_length: int = MAX_LABEL_LENGTH) -> str:
+    """Returns a text that Plotly displays literally, shortened with an ellipsis."""
     shown = "".join(letter if letter.isprintable() else " " for letter in text)
-    if len(shown) > longest:
-        shown = shown[: longest - 1] + "…"
+    if len(shown) > max_length:
+        shown = shown[: max_length - 1] + "…"
     return html.escape(shown, quote=False).replace("%{", "%&#123;")
 
 
 def color_of(index: int) -> str:
-    """Returns the colour of the method with that index."""
+    """Returns the colour of the method with this index."""
     return COLORS[index % len(COLORS)]
 
 
 def dash_of(index: int) -> str:
-    """Returns the dash of the line of a method: differs where colours repeat."""
+    """Returns the line dash of the method with this index, which differs when colours repeat."""
     return DASHES[index // len(COLORS) % len(DASHES)]
 
 
 def axis_title(name: str, unit: str) -> str:
-    """Returns the title of an axis: a name without underscores, and a unit in brackets."""
+    """Returns the title of an axis: the name with spaces, and the unit in brackets."""
     return label(words(name)) + (f" [{label(unit)}]" if unit else "")
 
 
 def words(name: str) -> str:
-    """Returns an identifier as words."""
+    """Returns an identifier with spaces for underscores."""
     return name.replace("_", " ")
 
 
 def styled(figure: go.Figure, height: int) -> go.Figure:
-    """Gives a figure the common look.
+    """Applies the common style to a figure.
 
     Args:
-        figure: what is drawn; changed.
-        height: [px].
+        figure: Figure to modify.
+        height: Height [px].
     """
     figure.update_layout(
         template="none",
@@ -98,12 +98,12 @@ def styled(figure: go.Figure, height: int) -> go.Figure:
 
 
 def stacked_bars(figure: go.Figure, height: int, value_title: str) -> go.Figure:
-    """Gives horizontal bars the common look: the parts of a bar one behind the other, the first bar on top.
+    """Applies the common style to horizontal bars: stacked parts, the first bar at the top.
 
     Args:
-        figure: horizontal bars; changed.
-        height: [px].
-        value_title: title of the axis of values.
+        figure: Figure of horizontal bars to modify.
+        height: Height [px].
+        value_title: Title of the value axis.
     """
     styled(figure, height)
     figure.update_layout(barmode="stack", legend_traceorder="normal")
@@ -112,11 +112,11 @@ def stacked_bars(figure: go.Figure, height: int, value_title: str) -> go.Figure:
     return figure
 
 
-def unique_labels(names: Sequence[str], longest: int = LONGEST_LABEL) -> list[str]:
-    """Returns labels for a categorical axis; names that look alike when shortened stay apart."""
+def unique_labels(names: Sequence[str], max_length: int = MAX_LABEL_LENGTH) -> list[str]:
+    """Returns distinct labels for a categorical axis, even if shortened names are equal."""
     shown: list[str] = []
     for name in names:
-        text = label(name, longest)
+        text = label(name, max_length)
         while text in shown:
             text += " ′"
         shown.append(text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lays a report out as one HTML page that needs no other file and no network."""
+"""Renders a report as a self-contained HTML page that needs no network."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def report_page(content: ReportContent, database: str) -> str:
     """Returns the page of a report.
 
     Args:
-        content: what it says.
-        database: the database, as the user named it.
+        content: Content of the report.
+        database: Database as named by the user.
     """
     figures = {figure.name: figure for figure in content.figures}
     absent = {name for name, there in (("levels", content.levels), ("timelines", content.spans)) if not there}
@@ -70,7 +70,7 @@ def report_page(content: ReportContent, database: str) -> str:
 
 
 def _as_sentence(text: str) -> str:
-    """Returns a text with a full stop and a capital; a name of a method in front stays as it is."""
+    """Returns a text as a sentence with a full stop; a leading method name keeps its case."""
     start = text[:1].upper() if text.startswith(("no ", "nothing ")) else text[:1]
     return start + text[1:] + ("" if text.endswith(".") else ".")
 
@@ -87,13 +87,13 @@ def _component(content: ReportContent, name: str) -> dict[str, object]:
 
 
 def render_page(template: str, data: Mapping[str, Any], shown: Sequence[NamedFigure], **values: object) -> str:
-    """Returns a page from one of the templates.
+    """Returns a page from a template.
 
     Args:
-        template: file name in the folder of templates.
-        data: what the page carries for programs, JSON values.
-        shown: all figures that the page may show.
-        values: what the template names.
+        template: File name in the folder of templates.
+        data: JSON values embedded for programs.
+        shown: Figures that the page may show.
+        values: Values of the template's variables.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
@@ -111,7 +111,7 @@ def render_page(template: str, data: Mapping[str, Any], shown: Sequence[NamedFig
         counted=number_text.counted,
         moment=number_text.moment_text,
         duration=number_text.duration_text,
-        share=number_text.share_text,
+        share=number_text.percentage_text,
     )
     data_json = _in_script(json.dumps(data, allow_nan=False, ensure_ascii=False))
     drawings = ",".join(f"{json.dumps(item.name)}:{item.figure.to_json()}" for item in shown)
@@ -127,12 +127,12 @@ def render_page(template: str, data: Mapping[str, Any], shown: Sequence[NamedFig
 
 
 def _in_script(text: str) -> Markup:
-    """Returns JSON as it may stand in a script element: nothing in it ends the element."""
+    """Returns JSON escaped for a script element, so that no text ends the element."""
     for letter in ("<", ">", "&", "\u2028", "\u2029"):
         text = text.replace(letter, f"\\u{ord(letter):04x}")
     return Markup(text)
 
 
 def _in_groups(rows: Sequence[tuple[Cell, ...]]) -> list[list[tuple[Cell, ...]]]:
-    """Returns rows in groups of neighbours with the same heading."""
+    """Returns the rows grouped by equal heading of adjacent rows."""
     return [list(group) for _, group in itertools.groupby(rows, key=lambda row: row[0].text)]

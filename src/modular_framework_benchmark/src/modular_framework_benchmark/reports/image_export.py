@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes a figure as PNG or PDF, drawn by a headless browser."""
+"""Exports a figure as PNG or PDF through a headless browser."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from modular_framework_benchmark.reports.figure_style import NamedFigure
 FORMATS = ("png", "pdf")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 WIDTH_PX = 900
-SCALE = 2.0  # PNG: points of the image to a pixel of the figure
+SCALE = 2.0  # image pixels per figure pixel of a PNG
 
 
 def find_browser() -> Path:
-    """Returns the browser: the one that the environment variable BROWSER_PATH names, else Chromium or Chrome.
+    """Returns the browser from the environment variable BROWSER_PATH, or else Chromium or Chrome.
 
     Raises:
-        ReportError: when there is none.
+        ReportError: No browser is installed.
     """
     named = os.environ.get("BROWSER_PATH")
     found = shutil.which(named) if named else next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -38,7 +38,7 @@ def find_figure(figures: Sequence[NamedFigure], name: str) -> NamedFigure:
     """Returns a figure by its name.
 
     Raises:
-        ReportError: when there is none of that name.
+        ReportError: The report has no figure of this name.
     """
     for figure in figures:
         if figure.name == name:
@@ -47,17 +47,17 @@ def find_figure(figures: Sequence[NamedFigure], name: str) -> NamedFigure:
 
 
 def figure_image(figure: NamedFigure, image_format: str) -> bytes:
-    """Returns a figure as an image.
+    """Returns a figure as an image file.
 
     Args:
-        figure: what is drawn.
-        image_format: one of FORMATS.
+        figure: Figure to draw.
+        image_format: Format, one of FORMATS.
 
     Raises:
-        ReportError: when there is no browser, or it does not draw.
+        ReportError: No browser is installed, or the browser fails.
     """
     browser = find_browser()
-    import kaleido  # takes a second, and most reports need no image
+    import kaleido  # slow to import, and most reports need no image
 
     height = figure.figure.layout.height
     options = {"format": image_format, "width": WIDTH_PX, "height": height}
@@ -69,7 +69,7 @@ def figure_image(figure: NamedFigure, image_format: str) -> bytes:
             opts=options,
             kopts={"path": str(browser), "page_generator": kaleido.PageGenerator(mathjax=False), "timeout": 120},
         )
-    except Exception as error:  # the library and the browser raise many kinds
+    except Exception as error:  # kaleido and the browser raise many kinds of errors
         raise ReportError(
             f"figure {figure.name}: {browser} did not draw it: {type(error).__name__}: {error}; "
             "try another browser in BROWSER_PATH"

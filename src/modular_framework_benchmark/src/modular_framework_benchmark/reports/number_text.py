@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes numbers as a reader wants them: with as many digits as they are sure of, and with their units."""
+"""Formats numbers with their significant digits and units."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import math
 from datetime import UTC, datetime
 
 NONE = "–"
-FINEST = {"s": 3, "m": 4, "rad": 4, "Nm": 1, "N": 1, "%": 1}
-"""Decimals beyond which a value of a unit says nothing: 1 ms, 0.1 mm, 0.0001 rad."""
+MAX_DECIMALS = {"s": 3, "m": 4, "rad": 4, "Nm": 1, "N": 1, "%": 1}
+"""Maximum meaningful decimals of a unit: 1 ms, 0.1 mm, 0.0001 rad."""
 
 
 def decimals_for(width: float) -> int:
-    """Returns with how many decimals a number is written whose uncertainty is `width`.
+    """Returns the number of decimals for a number with uncertainty `width`.
 
-    Of the uncertainty two figures remain where it begins with 1, 2 or 3, else one. Source: Particle Data Group, Review
-    of Particle Physics, section 5.3 (which draws the line at 3.54).
+    The uncertainty keeps two digits if it begins with 1, 2 or 3, else one digit. Source: Particle Data Group, Review
+    of Particle Physics, section 5.3 (with the threshold 3.54).
     """
     if not math.isfinite(width) or width <= 0.0:
         return 3
@@ -25,12 +25,12 @@ def decimals_for(width: float) -> int:
 
 
 def number_text(value: float | None, decimals: int | None = None, unit: str = "") -> str:
-    """Returns a number; with three significant figures when `decimals` is not given; a dash for None and NaN.
+    """Returns a number as text; a dash for None and NaN.
 
     Args:
-        value: the number; an infinite one is a failure.
-        decimals: how many there are.
-        unit: limits the decimals to what means something, but for two figures of a small value.
+        value: Number; infinity stands for a failure.
+        decimals: Number of decimals; None for three significant digits.
+        unit: Unit that limits the decimals, except that small values keep two digits.
     """
     if value is None or math.isnan(value):
         return NONE
@@ -41,27 +41,27 @@ def number_text(value: float | None, decimals: int | None = None, unit: str = ""
         if value == 0.0:
             return "0"
         decimals = min(max(2 - magnitude, 0), 9)
-    if unit in FINEST:
-        decimals = min(decimals, max(FINEST[unit], 1 - magnitude))
+    if unit in MAX_DECIMALS:
+        decimals = min(decimals, max(MAX_DECIMALS[unit], 1 - magnitude))
     text = f"{value:,.{decimals}f}"
     return text.lstrip("-") if float(text.replace(",", "")) == 0.0 else text.replace("-", "−")
 
 
-def share_text(share: float | None, decimals: int = 1) -> str:
-    """Returns a share of 0 to 1 as a percentage; a dash for None and NaN."""
-    if share is None or not math.isfinite(share):
+def percentage_text(fraction: float | None, decimals: int = 1) -> str:
+    """Returns a fraction from 0 to 1 as a percentage; a dash for None and NaN."""
+    if fraction is None or not math.isfinite(fraction):
         return NONE
-    return f"{number_text(100.0 * share, decimals)} %"
+    return f"{number_text(100.0 * fraction, decimals)} %"
 
 
 def interval_text(estimate: float | None, low: float | None, high: float | None, unit: str = "") -> str:
-    """Returns an estimate and its interval, all with the decimals that the interval's width and the unit allow.
+    """Returns an estimate with its interval, with decimals that fit the interval's width and the unit.
 
     Args:
-        estimate: the number; None and NaN give a dash.
-        low: lower end; None for no interval.
-        high: upper end.
-        unit: of the numbers.
+        estimate: Number; None and NaN give a dash.
+        low: Lower end; None for no interval.
+        high: Upper end; None for no interval.
+        unit: Unit of the numbers.
     """
     if estimate is None or math.isnan(estimate) or low is None or high is None or (low == high and math.isinf(low)):
         return number_text(estimate, unit=unit)
@@ -72,7 +72,7 @@ def interval_text(estimate: float | None, low: float | None, high: float | None,
 
 
 def p_value_text(p_value: float | None) -> str:
-    """Returns a p value: no more digits than anyone decides on."""
+    """Returns a p value as text, with digits relevant to a decision."""
     if p_value is None or not math.isfinite(p_value):
         return NONE
     if p_value < 0.001:
@@ -81,7 +81,7 @@ def p_value_text(p_value: float | None) -> str:
 
 
 def count_text(count: int) -> str:
-    """Returns a count with separated thousands."""
+    """Returns a count with thousands separators."""
     return f"{count:,}"
 
 
@@ -91,7 +91,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def duration_text(seconds: float | None) -> str:
-    """Returns a duration in the two units that matter."""
+    """Returns a duration with its one or two largest units."""
     if seconds is None or not math.isfinite(seconds):
         return NONE
     if seconds < 60.0:
@@ -106,7 +106,7 @@ def duration_text(seconds: float | None) -> str:
 
 
 def moment_text(seconds: float | None) -> str:
-    """Returns a moment, given in seconds since 1970, in UTC."""
+    """Returns a time [s since 1970] as text in UTC."""
     if seconds is None or not math.isfinite(seconds):
         return NONE
     return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M UTC")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes tables for a paper: Markdown, and LaTeX in the style of booktabs."""
+"""Tables for a paper: Markdown, and LaTeX with booktabs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#~&$])")
 
 
 def markdown_table(table: Table) -> str:
-    """Returns a table in GitHub's Markdown, its caption first and its notes last."""
+    """Returns a table in GitHub's Markdown, with the caption above and the notes below."""
     lines = [markdown_text(table.caption), ""]
     lines.append("| " + " | ".join(markdown_text(title) for title in table.columns) + " |")
     numbers = [_is_number(table, column) for column in range(len(table.columns))]
@@ -30,7 +30,7 @@ def markdown_table(table: Table) -> str:
 
 
 def latex_table(table: Table) -> str:
-    """Returns a table that needs the package booktabs; its notes are comments."""
+    """Returns a LaTeX table that needs the package booktabs; the notes are comments."""
     columns = "".join("r" if _is_number(table, column) else "l" for column in range(len(table.columns)))
     body = [" & ".join(_latex_cell(cell) for cell in row) + r" \\" for row in table.rows]
     notes = [f"% {line}" for note in table.notes for line in note.splitlines()]
@@ -54,12 +54,12 @@ def latex_table(table: Table) -> str:
 
 
 def latex_text(text: str) -> str:
-    """Returns a text that LaTeX prints as it is."""
+    """Returns a text that LaTeX prints literally."""
     return "".join(_LATEX.get(letter, letter) for letter in text if letter.isprintable() or letter in _LATEX)
 
 
 def markdown_text(text: str) -> str:
-    """Returns a text that Markdown shows as it is, on one line."""
+    """Returns a text that Markdown displays literally, on one line."""
     return _MARKDOWN.sub(r"\\\1", " ".join(text.split()))
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compares two experiments with the same factors: what got better, what got worse, and how sure that is.
+"""Compares two experiments with the same factors to find regressions and improvements.
 
-An episode of one experiment and one of the other are a pair where method, levels, trial and seed agree: then they have
-the same scene. The statistics are those of a comparison of two methods.
+Episodes of the two experiments with equal method, levels, trial and seed are pairs, because they share the scene. The
+statistics are those of a comparison of two methods.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ AFTER, BEFORE = "after", "before"
 
 
 class Change(Enum):
-    """What happened to a metric of a method between two experiments."""
+    """Change of a metric of a method between two experiments."""
 
     BETTER = "better"
     WORSE = "worse"
@@ -44,17 +44,17 @@ _CHANGES = {
     Verdict.NOT_SHOWABLE: Change.NOT_SHOWABLE,
     Verdict.NO_DATA: Change.NO_DATA,
 }
-"""What a verdict says where the later experiment is the first of the comparison."""
+"""Change for a verdict whose first method is the later experiment."""
 
 
 @dataclass(frozen=True, slots=True)
 class MetricChange:
-    """A metric of a method in both experiments.
+    """Change of a metric of a method.
 
     Attributes:
         method: Name of the method.
-        metric: The metric.
-        comparison: The statistics; its first is the later experiment, its second the earlier one.
+        metric: Compared metric.
+        comparison: Comparison whose first method is the later experiment and whose second is the earlier one.
     """
 
     method: str
@@ -63,21 +63,21 @@ class MetricChange:
 
     @property
     def change(self) -> Change:
-        """Returns what is shown."""
+        """Returns the change that is shown."""
         return _CHANGES[self.comparison.verdict]
 
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """Two experiments compared.
+    """Comparison of two experiments.
 
     Attributes:
-        before: The earlier one.
-        after: The later one.
-        changes: Each metric of each method that both have.
-        confidence: Level over all methods: the chance that no change is shown where nothing changed.
-        notes: What could not be compared, and how episodes were paired.
-        differing: What the two ran with that is not the same.
+        before: Description of the earlier experiment.
+        after: Description of the later experiment.
+        changes: Change of each common metric of each common method.
+        confidence: Probability over all methods that no change is shown if nothing changed.
+        notes: Excluded methods and metrics, and the pairing of episodes.
+        differing: Differences in the software and machines of the experiments.
     """
 
     before: ExperimentDescription
@@ -88,35 +88,35 @@ class Regression:
     differing: tuple[str, ...] = ()
 
     def count(self, change: Change) -> int:
-        """Returns how many metrics of methods changed so."""
+        """Returns the number of metrics of methods with this change."""
         return sum(item.change is change for item in self.changes)
 
 
 def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> Regression:
-    """Returns what changed between two experiments.
+    """Returns the changes between two experiments.
 
     Raises:
-        ReportError: when their factors differ, or they have no method or no metric in common.
+        ReportError: The experiments differ in their factors, or share no method or no metric.
     """
     _check_factors(before.description, after.description)
     methods, levels_notes = _common(_levels(before.description), _levels(after.description), "method")
     metrics, metric_notes = _common_metrics(before, after)
     confidence = before.description.confidence
-    of_method = 1.0 - (1.0 - confidence) / len(methods)
+    method_confidence = 1.0 - (1.0 - confidence) / len(methods)
     notes = [*levels_notes, *metric_notes]
     if len(methods) > 1:
         notes.append(
-            f"Intervals of {100.0 * of_method:.3g} % each, so that {100.0 * confidence:g} % hold over "
+            f"Intervals of {100.0 * method_confidence:.3g} % each, so that {100.0 * confidence:g} % hold over "
             f"all {len(methods)} methods."
         )
     changes, pairs, episodes = [], 0, 0
     if any(COLD_START in results.episodes and results.episodes[COLD_START].any() for results in (before, after)):
         notes.append(
-            "Metrics in real or processor time are compared between episodes of which both, or neither, were the first "
-            "one of their stack."
+            "Metrics in real or processor time are compared only between two first episodes of their stacks or two "
+            "later episodes."
         )
     for method in methods:
-        merged = _merged(before, after, method, metrics, of_method)
+        merged = _merged(before, after, method, metrics, method_confidence)
         comparisons = {item.metric: item for item in compare(merged)}
         changes += [MetricChange(method, metric, comparisons[metric.name]) for metric in metrics_of(merged)]
         counts = comparisons[SUCCESS.name].counts
@@ -125,7 +125,7 @@ def compare_experiments(before: ExperimentResults, after: ExperimentResults) -> 
     notes.append(
         f"{pairs:,} pairs of episodes with the same method, levels, trial and seed, of {episodes:,} episodes."
         if pairs
-        else "No two episodes have the same method, levels, trial and seed: pairs are any two episodes."
+        else "No two episodes have the same method, levels, trial and seed: episodes are paired at random."
     )
     return Regression(before.description, after.description, tuple(changes), confidence, tuple(notes))
 
@@ -141,7 +141,7 @@ def _check_factors(before: ExperimentDescription, after: ExperimentDescription) 
             f"{item.name} varies {', '.join(found)} and compares {item.compared}"
             for item, found in zip((before, after), names, strict=True)
         ]
-        raise ReportError(f"{'; '.join(parts)}; only experiments with the same factors can be compared: name two such")
+        raise ReportError(f"{'; '.join(parts)}; experiments must have the same factors: name two such experiments")
 
 
 def _common(before: tuple[str, ...], after: tuple[str, ...], noun: str) -> tuple[tuple[str, ...], list[str]]:
@@ -152,7 +152,7 @@ def _common(before: tuple[str, ...], after: tuple[str, ...], noun: str) -> tuple
             "name experiments that share one"
         )
     notes = [
-        f"Only the {side} experiment has the {noun} {name}: it is left out."
+        f"Only the {side} experiment has the {noun} {name}: it is excluded."
         for side, names, others in (("earlier", before, after), ("later", after, before))
         for name in names
         if name not in others
@@ -161,26 +161,26 @@ def _common(before: tuple[str, ...], after: tuple[str, ...], noun: str) -> tuple
 
 
 def _common_metrics(before: ExperimentResults, after: ExperimentResults) -> tuple[tuple[Metric, ...], list[str]]:
-    """Returns the metrics that both have and that mean the same in both."""
+    """Returns the metrics of both experiments with the same definition."""
     earlier = {metric.name: metric for metric in metrics_of(before)}
     later = {metric.name: metric for metric in metrics_of(after)}
     names, notes = _common(tuple(earlier), tuple(later), "metric")
-    kept = []
+    common = []
     for name in names:
         first, second = (dataclasses.replace(side[name], description="") for side in (earlier, later))
         if first == second:
-            kept.append(later[name])
+            common.append(later[name])
         else:
             notes.append(
-                f"The metric {name} has another unit, kind, direction or limit in the later experiment: left out."
+                f"The metric {name} has a different unit, kind, direction or limit in the later experiment: excluded."
             )
-    return tuple(kept), notes
+    return tuple(common), notes
 
 
 def _merged(
     before: ExperimentResults, after: ExperimentResults, method: str, metrics: tuple[Metric, ...], confidence: float
 ) -> ExperimentResults:
-    """Returns the episodes of a method in both experiments as one experiment that compares the two."""
+    """Returns the episodes of a method in both experiments as an experiment that compares the two experiments."""
     compared = before.description.compared
     others = tuple(factor for factor in before.description.factors if factor.name != compared)
     sides = []
@@ -188,9 +188,9 @@ def _merged(
         rows = results.episodes[results.episodes[compared] == method].drop(columns=compared)
         sides.append(rows.assign(**{SIDE: side}))
     key = [factor.name for factor in others] + ["trial"]
-    sides[1] = _unpaired_where_seeds_differ(sides[0], sides[1], key)
+    sides[1] = _unpair_different_seeds(sides[0], sides[1], key)
     if all(COLD_START in side for side in sides):
-        sides = _without_unlike_starts(sides, key, metrics)
+        sides = _mask_unlike_starts(sides, key, metrics)
     factors = (Factor(SIDE, (AFTER, BEFORE)), *_all_levels(others, sides))
     description = dataclasses.replace(
         before.description,
@@ -206,18 +206,16 @@ def _merged(
     return ExperimentResults(description, episodes, before.spans.iloc[:0], len(episodes) + (0 if finished else 1))
 
 
-def _without_unlike_starts(
-    sides: Sequence[pd.DataFrame], key: list[str], metrics: Sequence[Metric]
-) -> list[pd.DataFrame]:
-    """Returns the episodes of both sides; pairs of a cold and a warm start have no values in real or processor time."""
+def _mask_unlike_starts(sides: Sequence[pd.DataFrame], key: list[str], metrics: Sequence[Metric]) -> list[pd.DataFrame]:
+    """Returns the episodes of both sides, without real and processor times in pairs of a cold and a warm start."""
     names = [metric.name for metric in metrics if metric.clock in (Clock.WALL, Clock.PROCESSOR)]
     starts = [side.set_index(key)[COLD_START] for side in sides]
-    kept = []
+    common = []
     for side, own, other in zip(sides, starts, reversed(starts), strict=True):
         partners = other.reindex(own.index)
         unlike = (partners.notna() & (partners != own)).to_numpy()
-        kept.append(side.assign(**{name: side[name].mask(unlike) for name in names}))
-    return kept
+        common.append(side.assign(**{name: side[name].mask(unlike) for name in names}))
+    return common
 
 
 def _all_levels(factors: tuple[Factor, ...], sides: list[pd.DataFrame]) -> list[Factor]:
@@ -228,11 +226,11 @@ def _all_levels(factors: tuple[Factor, ...], sides: list[pd.DataFrame]) -> list[
     ]
 
 
-def _unpaired_where_seeds_differ(later: pd.DataFrame, earlier: pd.DataFrame, key: list[str]) -> pd.DataFrame:
-    """Returns the earlier episodes; those whose partner has another seed get a trial that no later episode has."""
+def _unpair_different_seeds(later: pd.DataFrame, earlier: pd.DataFrame, key: list[str]) -> pd.DataFrame:
+    """Returns the earlier episodes, with an unmatched trial number where the partner's seed differs."""
     seeds = later.set_index(key)["seed"]
     partners = earlier.set_index(key)["seed"]
     found = seeds.reindex(partners.index)
     differs = (found.notna() & (found != partners)).to_numpy()
-    beyond = int(max(later["trial"].max(), earlier["trial"].max())) + 1 if len(later) and len(earlier) else 0
-    return earlier.assign(trial=earlier["trial"].where(~differs, earlier["trial"] + beyond))
+    offset = int(max(later["trial"].max(), earlier["trial"].max())) + 1 if len(later) and len(earlier) else 0
+    return earlier.assign(trial=earlier["trial"].where(~differs, earlier["trial"] + offset))

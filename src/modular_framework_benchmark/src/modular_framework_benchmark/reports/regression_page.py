@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows what changed between two experiments: as text, and as a page."""
+"""Presents the changes between two experiments as text and as a page."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from modular_framework_benchmark.reports.report_content import plain_json
 from modular_framework_benchmark.reports.tables import Cell, Table, metric_title, pairs_text, table_text, wins_text
 
 COLORS = {Change.BETTER: "#176639", Change.WORSE: "#b3261e"}
-DIFFERING = "The two runs also differ in what they ran with, so a change may come from there"
+DIFFERING = "The runs also differ in the following, which may cause a change"
 MOODS = {Change.BETTER: "better", Change.WORSE: "worse"}
 
 
 def changes_table(regression: Regression) -> Table:
-    """Returns each metric of each method before and after, and what is shown."""
+    """Returns a table of each metric of each method before and after, with the change."""
     rows = tuple(_row(item) for item in regression.changes)
     columns = (
         "method",
@@ -58,7 +58,7 @@ def _row(item: MetricChange) -> tuple[Cell, ...]:
 
 
 def summary_sentences(regression: Regression) -> tuple[str, ...]:
-    """Returns what changed in words, regressions first."""
+    """Returns the changes as sentences, regressions first."""
     counts = {change: regression.count(change) for change in Change}
     text = (
         f"{counted(counts[Change.WORSE], 'metric')} of methods got worse, {counts[Change.BETTER]:,} better; "
@@ -80,12 +80,12 @@ def regression_text(regression: Regression) -> str:
 
 
 def regression_page(regression: Regression, before: str, after: str) -> str:
-    """Returns the comparison as a page that needs no other file.
+    """Returns the comparison as a self-contained page.
 
     Args:
-        regression: what changed.
-        before: database of the earlier experiment.
-        after: that of the later one.
+        regression: Comparison of the experiments.
+        before: Database of the earlier experiment.
+        after: Database of the later experiment.
     """
     figure = _figure(regression)
     figures = [figure] if figure else []
@@ -115,7 +115,7 @@ def regression_page(regression: Regression, before: str, after: str) -> str:
 
 
 def _figure(regression: Regression) -> NamedFigure | None:
-    """Returns the win differences of all metrics in points."""
+    """Returns a figure of the win differences of all metrics in points."""
     bars = []
     for item in regression.changes:
         difference = item.comparison.difference
@@ -128,7 +128,7 @@ def _figure(regression: Regression) -> NamedFigure | None:
     figure.add_vline(x=0.0, line={"color": MUTED, "width": 1})
     styled(figure, height=130 + 30 * len(bars))
     figure.update_layout(showlegend=False)
-    figure.update_xaxes(title_text="pairs in which the later one is better − worse [points]")
+    figure.update_xaxes(title_text="pairs in which the later experiment is better − worse [points]")
     figure.update_yaxes(range=[len(bars) - 0.5, -0.5], ticks="")
     summary = "Win differences with their intervals. Green: shown to be better; red: worse; grey: no difference shown."
     return NamedFigure("changes", "Changes", summary, figure)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gathers all that a report says, before any of it is laid out."""
+"""Collects the content of a report, independent of its layout."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ from modular_framework_benchmark.statistics.comparison import Analysis, MethodSu
 from modular_framework_benchmark.statistics.observations import metrics_of
 
 SUCCESS = "success"
-MOST_PAIRED = 3  # methods whose pairs are drawn; more are ranked in one figure
-COMPONENTS = ("task", "generation", "planning", "execution", "grasp")  # the order of a pick; a user's own follow
+MAX_PAIRED_METHODS = 3  # methods whose pairs are drawn; more methods are ranked in one figure
+COMPONENTS = ("task", "generation", "planning", "execution", "grasp")  # order of a pick; user components follow
 
 
 @dataclass(frozen=True, slots=True)
 class ReportSource:
-    """Where a report's episodes come from and where it goes.
+    """Source of a report's data, and its destination.
 
     Attributes:
-        database: As the user named it.
-        database_folder: Folder that the episodes' folders are relative to.
-        report_folder: Folder of the report, which its links are relative to.
-        snapshots: What the episodes ran with: the different values of each name, each with its number of episodes.
-        span_totals: Sums of all spans, as `summarise_spans` takes them.
-        spans_of: Reads the spans of some episodes, by their numbers.
+        database: Database as named by the user.
+        database_folder: Base of the episodes' folders.
+        report_folder: Folder of the report, the base of its links.
+        snapshots: Distinct values of each snapshot part with their numbers of episodes.
+        span_totals: Sums of all spans for `summarise_spans`.
+        spans_of: Function that reads the spans of the episodes with the given numbers.
     """
 
     database: str
@@ -59,15 +59,15 @@ class ReportSource:
 
 @dataclass(frozen=True, slots=True)
 class RunFacts:
-    """When and where the episodes ran.
+    """Times and numbers of an experiment's run.
 
     Attributes:
         begun: Start of the first episode [s since 1970]; None without episodes.
-        ended: End of the last [s since 1970]; None without episodes.
+        ended: End of the last episode [s since 1970]; None without episodes.
         episode_s: Sum of the durations of the episodes [s].
-        workers: How many workers ran them.
-        seeds: How many different seeds they had.
-        trials: How many different trials they had.
+        workers: Number of workers.
+        seeds: Number of distinct seeds.
+        trials: Number of distinct trials.
     """
 
     begun: float | None
@@ -80,23 +80,23 @@ class RunFacts:
 
 @dataclass(frozen=True, slots=True)
 class ReportContent:
-    """All that a report says.
+    """Content of a report.
 
     Attributes:
-        description: What was run.
-        planned: How many episodes it has.
-        finished: How many are finished.
-        facts: When and where they ran.
-        analysis: The statistics.
-        metrics: The metrics, in the order of the components.
+        description: Description of the experiment.
+        planned: Number of planned episodes.
+        finished: Number of finished episodes.
+        facts: Times and numbers of the run.
+        analysis: Statistical analysis.
+        metrics: Metrics in the order of the components.
         levels: Success of each method at each level of the other factors.
-        spans: What states and components took.
-        chosen: The episodes whose timelines are shown.
-        failures: What did not succeed, by cause.
+        spans: Time of states and components.
+        chosen: Episodes whose timelines are shown.
+        failures: Unsuccessful episodes by cause.
         figures: All figures.
         recorded: Versions, machine, parameters.
-        warnings: What a reader must know first.
-        commands: How to run it again.
+        warnings: Warnings at the top of the report.
+        commands: Commands that repeat the experiment.
     """
 
     description: ExperimentDescription
@@ -116,17 +116,23 @@ class ReportContent:
 
     @property
     def unit_noun(self) -> str:
-        """Returns what an independent unit of the comparisons is."""
+        """Returns the noun for an independent unit of the comparisons."""
         return next((item.unit_noun for item in self.analysis.comparisons), "episode")
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Returns the components that have metrics."""
+        """Returns the components with metrics."""
         return tuple(dict.fromkeys(metric.component for metric in self.metrics))
 
 
 def gather(results: ExperimentResults, source: ReportSource, mean_intervals: bool = False) -> ReportContent:
-    """Returns the content of the report of an experiment; `mean_intervals` is that of `analyse`."""
+    """Returns the content of the report of an experiment.
+
+    Args:
+        results: Finished episodes.
+        source: Source of further data.
+        mean_intervals: See `analyse`.
+    """
     description = results.description
     analysis = analyse(results, mean_intervals=mean_intervals)
     levels = _success_by_level(results)
@@ -137,7 +143,7 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
     recorded = recorded_values(source.snapshots)
     metrics = tuple(sorted(metrics_of(results), key=_component_order))
     methods = analysis.methods
-    figures = _comparison_figures(results, analysis) + _made(
+    figures = _comparison_figures(results, analysis) + _present(
         components_figure(spans, methods),
         levels_figure(levels, methods),
         timelines_figure(chosen, timelines),
@@ -162,10 +168,10 @@ def _success_by_level(results: ExperimentResults) -> tuple[MethodSummary, ...]:
 
 
 def _comparison_figures(results: ExperimentResults, analysis: Analysis) -> list[NamedFigure]:
-    return _made(
+    return _present(
         ranking_figure(analysis.summaries, _main_metric(results)),
         differences_figure([item for item in analysis.comparisons if item.metric == SUCCESS])
-        if len(analysis.methods) <= MOST_PAIRED
+        if len(analysis.methods) <= MAX_PAIRED_METHODS
         else None,
         *distribution_figures(results, analysis.methods),
     )
@@ -175,7 +181,7 @@ def _main_metric(results: ExperimentResults) -> Metric | None:
     return next((item for item in results.description.metrics if item.name != SUCCESS), None)
 
 
-def _made(*figures: NamedFigure | None) -> list[NamedFigure]:
+def _present(*figures: NamedFigure | None) -> list[NamedFigure]:
     return [figure for figure in figures if figure is not None]
 
 
@@ -196,7 +202,7 @@ def _run_facts(results: ExperimentResults) -> RunFacts:
 
 
 def machine_readable(content: ReportContent) -> dict[str, Any]:
-    """Returns the claims of a report as JSON values: the page carries them, and they can be checked by a program."""
+    """Returns the claims of a report as JSON values, which the page embeds so that programs can check them."""
     return plain_json(
         {
             "experiment": content.description.name,
@@ -214,7 +220,7 @@ def machine_readable(content: ReportContent) -> dict[str, Any]:
 
 
 def plain_json(value: Any) -> Any:
-    """Returns a value as JSON holds it: no tuples, no enumerations, None for what is not finite."""
+    """Returns a JSON value: lists for tuples, values for enumerations, None for numbers that are not finite."""
     match value:
         case Mapping():
             return {str(key): plain_json(inner) for key, inner in value.items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes a file whole, or not at all."""
+"""Writes files atomically."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from modular_framework_core.files.atomic_files import write_atomically
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Writes a file; one that was there stays until the new one is complete.
+    """Writes a file; an existing file is kept until the new one is complete.
 
     Raises:
-        ReportError: when it cannot be written.
+        ReportError: The file is not writable.
     """
     try:
         write_atomically(path, content)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Opens an experiment of a result database for reading."""
+"""Opens an experiment of a result database for a report."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class OpenedExperiment:
     """An experiment in an open database.
 
     Attributes:
-        database: The database.
-        number: Identifier of the experiment in it.
-        results: Its finished episodes, without their spans.
+        database: Open database.
+        number: Identifier of the experiment in the database.
+        results: Finished episodes, without spans.
     """
 
     database: ResultDatabase
@@ -32,21 +32,21 @@ class OpenedExperiment:
 
     @property
     def snapshots(self) -> SnapshotValues:
-        """Returns what the episodes ran with: the different values of each name, each with its number of episodes."""
+        """Returns the distinct values of each snapshot part with their numbers of episodes."""
         return self.database.snapshot_values(self.number, VARYING_PARTS)
 
     @property
     def results_by_start(self) -> ExperimentResults:
-        """Returns the results with the column `cold_start`: whether an episode was the first one of its stack."""
+        """Returns the results with the column `cold_start`: whether an episode was the first of its stack."""
         cold = self.database.flagged_episodes(self.number, COLD_START)
         episodes = self.results.episodes
         return replace(self.results, episodes=episodes.assign(**{COLD_START: episodes["number"].isin(cold)}))
 
     def source(self, report_folder: Path) -> ReportSource:
-        """Returns what a report reads beside the episodes.
+        """Returns the source of a report's further data.
 
         Args:
-            report_folder: folder of the report.
+            report_folder: Folder of the report.
         """
         return ReportSource(
             self.database.label,
@@ -60,15 +60,15 @@ class OpenedExperiment:
 
 @contextlib.contextmanager
 def open_source(target: str, name: str | None) -> Iterator[OpenedExperiment]:
-    """Opens a database read-only and loads one of its experiments.
+    """Opens a database read-only and loads an experiment.
 
     Args:
-        target: database, as the user named it.
-        name: of the experiment; None: the only one.
+        target: Database as named by the user.
+        name: Name of the experiment; None for the only one.
 
     Raises:
-        ReportError: when it has several and none is named, or none at all.
-        ResultsError: when the database cannot be read, or has no experiment of that name.
+        ReportError: The database has several experiments and none is named, or is empty.
+        ResultsError: The database is unreadable, or lacks the experiment.
     """
     with open_database(target, read_only=True) as database:
         number = find_experiment(database, name)
@@ -79,12 +79,12 @@ def find_experiment(database: ResultDatabase, name: str | None) -> int:
     """Returns the identifier of an experiment.
 
     Args:
-        database: an open database.
-        name: of the experiment; None: the only one.
+        database: Open database.
+        name: Name of the experiment; None for the only one.
 
     Raises:
-        ReportError: when it has several and none is named, or none at all.
-        ResultsError: when it has no experiment of that name.
+        ReportError: The database has several experiments and none is named, or is empty.
+        ResultsError: The database lacks the experiment.
     """
     if name:
         return database.find(name)

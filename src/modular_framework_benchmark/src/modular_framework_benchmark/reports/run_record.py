@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says what was run, on what, and how to run it again."""
+"""Describes the run of an experiment: software, machine, incidents, and commands that repeat the run."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from pathlib import PurePath
 from typing import Any
 
 from modular_framework_benchmark.records.results import ExperimentResults
-from modular_framework_benchmark.records.what_ran import IMPLEMENTATION
+from modular_framework_benchmark.records.used_software import IMPLEMENTATION
 from modular_framework_benchmark.reports.number_text import counted
 from modular_framework_ros.reported_figures import Clock
 
 SnapshotValues = Mapping[str, Sequence[tuple[Any, int]]]
 
-MOST_VALUES = 4
-MOST_PARAMETERS = 400
-BUSY_SHARE = 0.1
-"""Fraction of the machine that other processes may use before times in real time are doubtful."""
-OF_ONE_EPISODE = (
+MAX_VALUES = 4
+MAX_PARAMETERS = 400
+MAX_OTHERS_FRACTION = 0.1
+"""Fraction of the machine used by other processes above which real times are doubtful."""
+MEASURED_PARTS = (
     *("metric_faults", "earlier_tries", "reference_s"),
     *("load_before", "load_after", "stolen_s", "busy_s", "others_share"),
 )
-"""Parts of a snapshot that are measured or happen: summed up, not listed."""
+"""Measured parts of a snapshot, which are summarised instead of listed."""
 _PER_EPISODE = ("seed", "trial", "number")  # differ between episodes by nature
-_DECISIVE = (
+_IDENTITY_WORDS = (
     "revision",
     "version",
     "hostname",
     "machine",
     "cpu",
-)  # an experiment with several of these is no one experiment
+)  # an experiment whose episodes differ in these is inconsistent
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedValue:
-    """A value of the snapshots, such as a version.
+    """A recorded value of the snapshots, such as a version.
 
     Attributes:
-        name: Path of its keys: `versions.ompl`.
-        values: The different values, each with the number of episodes that had it, most frequent first.
-        others: How many further values are not listed.
+        name: Path of keys: `versions.ompl`.
+        values: Distinct values with their numbers of episodes, most frequent first.
+        others: Number of distinct values that are not listed.
     """
 
     name: str
@@ -52,31 +52,31 @@ class RecordedValue:
 
     @property
     def is_decisive(self) -> bool:
-        """Returns whether results of episodes that differ in it should not be taken together."""
-        return any(word in self.name.lower() for word in _DECISIVE)
+        """Returns whether episodes that differ in this value should not be pooled."""
+        return any(word in self.name.lower() for word in _IDENTITY_WORDS)
 
 
 def recorded_values(snapshots: SnapshotValues) -> tuple[RecordedValue, ...]:
-    """Returns the values that episodes ran with.
+    """Returns the recorded values of the snapshots.
 
     Args:
-        snapshots: the different values of each name of the snapshots, each with the number of episodes that had it.
+        snapshots: Distinct values of each snapshot part with their numbers of episodes.
     """
     counts: dict[str, dict[str, int]] = {}
     for name, values in snapshots.items():
-        for value, episodes in values if name not in OF_ONE_EPISODE else ():
+        for value, episodes in values if name not in MEASURED_PARTS else ():
             for path, text in _leaves(value, name):
                 of_path = counts.setdefault(path, {})
                 of_path[text] = of_path.get(text, 0) + episodes
     recorded = []
     for name, of_name in counts.items():
         ordered = sorted(of_name.items(), key=lambda item: -item[1])
-        recorded.append(RecordedValue(name, tuple(ordered[:MOST_VALUES]), max(len(ordered) - MOST_VALUES, 0)))
-    return tuple(recorded[:MOST_PARAMETERS])
+        recorded.append(RecordedValue(name, tuple(ordered[:MAX_VALUES]), max(len(ordered) - MAX_VALUES, 0)))
+    return tuple(recorded[:MAX_PARAMETERS])
 
 
 def _leaves(value: object, name: str) -> Iterator[tuple[str, str]]:
-    """Yields the values of nested mappings with the paths of their keys; those that differ by nature are left out."""
+    """Yields the leaf values of nested mappings with key paths, except those that differ by nature."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
             yield from _leaves(inner, f"{name}.{key}")
@@ -87,27 +87,27 @@ def _leaves(value: object, name: str) -> Iterator[tuple[str, str]]:
 def warnings_of(
     results: ExperimentResults, recorded: Sequence[RecordedValue], snapshots: SnapshotValues
 ) -> tuple[str, ...]:
-    """Returns what a reader must know before the figures: unfinished or broken episodes, faults, several revisions.
+    """Returns the warnings of a report: unfinished or broken episodes, faults, inconsistent revisions.
 
     Args:
-        results: the experiment.
-        recorded: what its episodes ran with.
-        snapshots: as for `recorded_values`.
+        results: Finished episodes.
+        recorded: Recorded values of the snapshots.
+        snapshots: Distinct values of each snapshot part, as for `recorded_values`.
     """
     episodes = results.episodes
     found = []
     if len(episodes) < results.planned:
         found.append(
-            f"{len(episodes):,} of {counted(results.planned, 'planned episode')} are finished: figures are of these."
+            f"{len(episodes):,} of {counted(results.planned, 'planned episode')} are finished; figures cover these."
         )
     broken = episodes[episodes["status"] == "broken"]
     if len(broken):
-        listed = ", ".join(str(number) for number in broken["number"].head(12))
+        numbers = ", ".join(str(number) for number in broken["number"].head(12))
         more = f" and {len(broken) - 12:,} more" if len(broken) > 12 else ""
         verb = "is" if len(broken) == 1 else "are"
         found.append(
             f"{counted(len(broken), 'episode')} {verb} broken: the launch died or the measurement failed (number "
-            f"{listed}{more}). They count as failures; the table of comparisons says where a verdict rests on them."
+            f"{numbers}{more}). They count as failures; the comparisons name the verdicts that depend on them."
         )
     for item in recorded:
         if item.is_decisive and len(item.values) + item.others > 1:
@@ -117,7 +117,7 @@ def warnings_of(
 
 
 def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
-    """Yields faults of metrics, and tries of episodes that ended without a record."""
+    """Yields errors of metrics, and attempts of episodes that ended without a record."""
     faults: dict[str, list[tuple[str, int]]] = {}
     for value, episodes in snapshots.get("metric_faults", ()):
         for metric, text in value.items():
@@ -131,29 +131,29 @@ def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
 
 
 def _load_warning(results: ExperimentResults, snapshots: SnapshotValues) -> Iterator[str]:
-    shares = [(float(value), episodes) for value, episodes in snapshots.get("others_share", ())]
-    busy = sum(episodes for share, episodes in shares if share > BUSY_SHARE)
+    fractions = [(float(value), episodes) for value, episodes in snapshots.get("others_share", ())]
+    busy = sum(episodes for fraction, episodes in fractions if fraction > MAX_OTHERS_FRACTION)
     names = [metric.name for metric in results.description.metrics if metric.clock is Clock.WALL]
     if busy and names:
         yield (
-            f"{counted(busy, 'episode')} ran beside other processes that used up to {100 * max(shares)[0]:.0f} % of "
-            f"the machine: what is measured in real time is longer there ({', '.join(names)})."
+            f"{counted(busy, 'episode')} ran beside other processes that used up to {100 * max(fractions)[0]:.0f} % of "
+            f"the machine, which lengthens real times ({', '.join(names)})."
         )
 
 
 def differences_of(before: SnapshotValues, after: SnapshotValues) -> tuple[str, ...]:
-    """Returns what two experiments ran with that is not the same: versions, planners, methods, machine, files.
+    """Returns the differences between the runs of two experiments: versions, planners, methods, machine, files.
 
     Args:
-        before: what the episodes of the earlier experiment ran with, as for `recorded_values`.
-        after: that of the later one.
+        before: Snapshots of the earlier experiment, as for `recorded_values`.
+        after: Snapshots of the later experiment.
     """
     earlier, later = _values_of(before), _values_of(after)
     found = []
     for name in dict.fromkeys([*earlier, *later]):
         if earlier.get(name) == later.get(name) or name.endswith(IMPLEMENTATION) and name not in earlier.keys() & later:
             continue
-        sides = (", ".join(sorted(side.get(name, {"nothing"}))[:MOST_VALUES]) for side in (earlier, later))
+        sides = (", ".join(sorted(side.get(name, {"nothing"}))[:MAX_VALUES]) for side in (earlier, later))
         found.append(f"{name}: before {next(sides)}; after {next(sides)}")
     times = [[float(value) for value, _ in side.get("reference_s", ())] for side in (before, after)]
     if all(times) and any(text.startswith("machine.") for text in found):
@@ -168,19 +168,19 @@ def differences_of(before: SnapshotValues, after: SnapshotValues) -> tuple[str, 
 def _values_of(snapshots: SnapshotValues) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for name, values in snapshots.items():
-        for value, _ in values if name not in OF_ONE_EPISODE else ():
+        for value, _ in values if name not in MEASURED_PARTS else ():
             for path, text in _leaves(value, name):
                 found.setdefault(path, set()).add(text)
     return found
 
 
 def commands_to_repeat(results: ExperimentResults, recorded: Sequence[RecordedValue], database: str) -> tuple[str, ...]:
-    """Returns the commands that run the experiment again and report it.
+    """Returns the commands that repeat the experiment and report it.
 
     Args:
-        results: the experiment.
-        recorded: what its episodes ran with.
-        database: the database, as the report was asked for.
+        results: Finished episodes.
+        recorded: Recorded values of the snapshots.
+        database: Database as named by the user.
     """
     name = results.description.name
     file, again = shlex.quote(f"{name}.yaml"), shlex.quote(f"{name}_again.db")

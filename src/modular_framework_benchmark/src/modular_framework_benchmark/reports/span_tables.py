@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sums up what states and components took, by method, and picks the episodes whose timelines are shown."""
+"""Summarises the time of states and components by method, and selects episodes for timelines."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.failure_groups import Link, episode_links
 from modular_framework_benchmark.statistics.observations import methods_of
 
-MOST_TIMELINES = 12
+MAX_TIMELINES = 12
 
 
 @dataclass(frozen=True, slots=True)
 class SpanSummary:
-    """What a state or component took in the episodes of a method.
+    """Time of a state or component in the episodes of a method.
 
     Attributes:
         kind: `state` or `component`.
-        name: Of the state or component.
+        name: Name of the state or component.
         method: Name of the method.
-        runs: How often it ran.
-        failed: How often it failed.
-        unended: How often it never ended; these have no duration.
-        mean_s: Mean real time of those that ended [s]; NaN without one.
-        per_episode_s: Mean real time of an episode in which at least one of them ran [s].
+        runs: Number of runs.
+        failed: Number of failed runs.
+        unended: Number of runs that never ended and have no duration.
+        mean_s: Mean real time of ended runs [s]; NaN without ended runs.
+        per_episode_s: Mean real time per episode with at least one run active [s].
     """
 
     kind: str
@@ -49,11 +49,11 @@ class ChosenEpisode:
     """An episode whose timeline is shown.
 
     Attributes:
-        number: Of the episode.
-        method: Its method.
-        status: How it ended.
-        started_cold: Whether its launch was started for it.
-        links: To its folder and files.
+        number: Number of the episode.
+        method: Method of the episode.
+        status: Final status.
+        started_cold: Whether the episode was the first of its stack.
+        links: Links to its folder and files.
     """
 
     number: int
@@ -66,14 +66,14 @@ class ChosenEpisode:
 def choose_episodes(
     results: ExperimentResults, database_folder: Path, report_folder: Path
 ) -> tuple[ChosenEpisode, ...]:
-    """Returns, for each method, a success of median length and the first failure of its most frequent cause.
+    """Returns a success of median duration and the first failure of the most frequent cause for each method.
 
-    At most MOST_TIMELINES episodes, those of the first methods.
+    At most MOST_TIMELINES episodes are returned, those of the first methods.
 
     Args:
-        results: The episodes.
-        database_folder: Folder that the episodes' folders are relative to.
-        report_folder: Folder of the report, which links are relative to.
+        results: Finished episodes.
+        database_folder: Base of the episodes' folders.
+        report_folder: Folder of the report, the base of its links.
     """
     episodes = results.episodes
     rows: list[pd.Series] = []
@@ -81,9 +81,9 @@ def choose_episodes(
         of_method = episodes[episodes[results.description.compared] == method]
         success = of_method[of_method["success"].astype(bool)]
         if len(success):
-            taken = success["simulated_s"].astype(float).fillna(success["wall_s"]).to_numpy()
-            middle = int(np.argsort(taken, kind="stable")[(len(taken) - 1) // 2])
-            rows.append(success.iloc[middle])
+            durations = success["simulated_s"].astype(float).fillna(success["wall_s"]).to_numpy()
+            median = int(np.argsort(durations, kind="stable")[(len(durations) - 1) // 2])
+            rows.append(success.iloc[median])
         failed = of_method[of_method["status"].isin([EpisodeStatus.FAILED.value, EpisodeStatus.TIMED_OUT.value])]
         if len(failed):
             rows.append(failed[failed["cause"] == failed["cause"].value_counts().index[0]].iloc[0])
@@ -95,22 +95,22 @@ def choose_episodes(
             bool(row.get(COLD_START, False)),
             episode_links(str(row["folder"] or ""), database_folder, report_folder),
         )
-        for row in rows[:MOST_TIMELINES]
+        for row in rows[:MAX_TIMELINES]
     )
 
 
 def summarise_spans(results: ExperimentResults, totals: pd.DataFrame, shown: pd.DataFrame) -> tuple[SpanSummary, ...]:
-    """Returns a summary for each state and component and method.
+    """Returns a summary of each state and component for each method.
 
     Args:
-        results: the episodes.
-        totals: a row for each kind, name and method, with the columns `kind`, `name`, the compared factor's name,
+        results: Finished episodes.
+        totals: A row per kind, name and method, with the columns `kind`, `name`, the compared factor's name,
             `count`, `ended`, `failed`, `total_s` and `covered_s`.
-        shown: spans of some episodes, which give the order in which states follow each other.
+        shown: Spans of some episodes, which define the order of the states.
     """
     methods = methods_of(results)
     episodes = results.episodes[results.description.compared].value_counts()
-    order = {name: place for place, name in enumerate(dict.fromkeys(shown["name"]))}
+    order = {name: rank for rank, name in enumerate(dict.fromkeys(shown["name"]))}
     rows = totals.rename(columns={results.description.compared: "method"}).to_dict("records")
     summaries = [
         SpanSummary(
@@ -126,8 +126,8 @@ def summarise_spans(results: ExperimentResults, totals: pd.DataFrame, shown: pd.
         for row in rows
         if row["method"] in episodes.index
     ]
-    return tuple(sorted(summaries, key=lambda item: _place(item, order, methods)))
+    return tuple(sorted(summaries, key=lambda item: _sort_key(item, order, methods)))
 
 
-def _place(item: SpanSummary, order: dict[str, int], methods: Sequence[str]) -> tuple[str, int, str, int]:
+def _sort_key(item: SpanSummary, order: dict[str, int], methods: Sequence[str]) -> tuple[str, int, str, int]:
     return item.kind, order.get(item.name, len(order)), item.name, methods.index(item.method)

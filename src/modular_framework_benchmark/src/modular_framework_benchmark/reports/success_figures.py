@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws how often methods succeed: ranked with intervals, in pairs of methods, and by level of other factors."""
+"""Figures of success: ranking with intervals, pairs of methods, levels of other factors."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from modular_framework_benchmark.reports.figure_style import (
     unique_labels,
     words,
 )
-from modular_framework_benchmark.reports.number_text import count_text, counted, share_text
+from modular_framework_benchmark.reports.number_text import count_text, counted, percentage_text
 from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, MethodSummary
 
-MOST_ROWS = 60
+MAX_ROWS = 60
 
 
 def ranking_figure(summaries: Sequence[MethodSummary], main: Metric | None) -> NamedFigure | None:
-    """Returns success and the main metric of each method with their intervals, the best first; None without episodes.
+    """Returns success and the main metric of each method with intervals, the best method first; None without episodes.
 
     Args:
-        summaries: of each method by each metric, over all levels of the other factors.
-        main: the metric beside success; None where there is none.
+        summaries: Summaries of each method for each metric, over all levels of the other factors.
+        main: Metric beside success; None for none.
     """
     of_success = {item.method: item.estimate for item in summaries if item.metric == "success" and item.estimate}
     if not of_success:
@@ -39,10 +39,10 @@ def ranking_figure(summaries: Sequence[MethodSummary], main: Metric | None) -> N
     values = {item.method: item.estimate for item in summaries if main and item.metric == main.name and item.estimate}
     sign = -1.0 if main and main.better is Direction.HIGHER else 1.0
 
-    def place(method: str) -> tuple[float, float]:
+    def sort_key(method: str) -> tuple[float, float]:
         return -of_success[method].value, sign * values[method].value if method in values else math.inf
 
-    ranked = sorted(of_success, key=place)
+    ranked = sorted(of_success, key=sort_key)
     drawn = [estimate for estimate in values.values() if math.isfinite(estimate.value)]
     figure = make_subplots(cols=2 if drawn else 1, shared_yaxes=True, horizontal_spacing=0.06)
     names = unique_labels(ranked)
@@ -55,17 +55,15 @@ def ranking_figure(summaries: Sequence[MethodSummary], main: Metric | None) -> N
     figure.update_layout(showlegend=False)
     figure.update_yaxes(autorange="reversed", ticks="", categoryorder="array", categoryarray=names)
     rank = "by success" + (f", then by {words(main.name)}" if main else "")
-    summary = (
-        f"Methods ranked {rank}. Whiskers: intervals of single methods; what is shown between methods is said above."
-    )
+    summary = f"Methods ranked {rank}. Whiskers are intervals of single methods; differences are compared above."
     return NamedFigure("ranking", "Methods, the best first", summary, figure)
 
 
 def _dots(names: Sequence[str], estimates: Sequence[Estimate | None], scale: float) -> go.Scatter:
-    """Returns a dot for each estimate, with whiskers where it has an interval; an infinite end is not drawn."""
+    """Returns a dot per estimate, with whiskers for an interval; infinite ends are not drawn."""
     known = [(name, part) for name, part in zip(names, estimates, strict=True) if part and math.isfinite(part.value)]
     ends = [(part.interval.low, part.interval.high) if part.interval else (part.value,) * 2 for _, part in known]
-    reach = [
+    whiskers = [
         tuple(end if math.isfinite(end) else part.value for end in pair)
         for pair, (_, part) in zip(ends, known, strict=True)
     ]
@@ -74,18 +72,18 @@ def _dots(names: Sequence[str], estimates: Sequence[Estimate | None], scale: flo
         marker={"color": INK, "size": 9},
         error_x={
             "type": "data", "symmetric": False, "color": INK, "thickness": 1.6, "width": 6,
-            "array": [scale * (high - part.value) for (_, high), (_, part) in zip(reach, known, strict=True)],
-            "arrayminus": [scale * (part.value - low) for (low, _), (_, part) in zip(reach, known, strict=True)],
+            "array": [scale * (high - part.value) for (_, high), (_, part) in zip(whiskers, known, strict=True)],
+            "arrayminus": [scale * (part.value - low) for (low, _), (_, part) in zip(whiskers, known, strict=True)],
         },
         hovertemplate="%{y}: %{x:.4g}<extra></extra>",
     )  # fmt: skip
 
 
 def differences_figure(comparisons: Sequence[Comparison]) -> NamedFigure | None:
-    """Returns the differences in success of all pairs of methods with their intervals; None without one.
+    """Returns the differences in success of all pairs of methods with intervals, or None without pairs.
 
     Args:
-        comparisons: by the metric `success`.
+        comparisons: Comparisons for the metric `success`.
     """
     known = [(item, item.difference) for item in comparisons if item.difference and item.difference.interval]
     if not known:
@@ -98,23 +96,23 @@ def differences_figure(comparisons: Sequence[Comparison]) -> NamedFigure | None:
     figure.update_xaxes(title_text="difference in success [points]")
     figure.update_yaxes(autorange="reversed", ticks="")
     first = known[0][1].interval
-    kind = f"{share_text(first.confidence, 0)} interval, {first.method}" if first else ""
+    kind = f"{percentage_text(first.confidence, 0)} interval, {first.method}" if first else ""
     summary = f"Difference in success between methods. Whiskers: {kind}. Right of 0 the first method is better."
     return NamedFigure("differences", "Differences in success", summary, figure)
 
 
 def levels_figure(summaries: Sequence[MethodSummary], methods: Sequence[str]) -> NamedFigure | None:
-    """Returns a heat map of the success of each method at each level of the other factors; None without such factors.
+    """Returns a heat map of success by method and level of the other factors, or None without other factors.
 
     Args:
-        summaries: of the metric `success`, of each method at each level.
-        methods: names, in the order of the columns.
+        summaries: Summaries of the metric `success` for each method at each level.
+        methods: Names of the methods in the order of the columns.
     """
     rows = list(dict.fromkeys(item.levels for item in summaries if item.levels))
     if not rows:
         return None
     found = {(item.levels, item.method): item for item in summaries}
-    shown = rows[:MOST_ROWS]
+    shown = rows[:MAX_ROWS]
     cells = [[found.get((row, method)) for method in methods] for row in shown]
     figure = go.Figure(
         go.Heatmap(
@@ -129,7 +127,7 @@ def levels_figure(summaries: Sequence[MethodSummary], methods: Sequence[str]) ->
     styled(figure, height=100 + max(34 * len(shown), 100))
     figure.update_yaxes(autorange="reversed", ticks="", showgrid=False)
     figure.update_xaxes(side="top", ticks="", showgrid=False)
-    summary = "Share of successes of each method at each level of the other factors, with the number of episodes."
+    summary = "Success rate of each method at each level of the other factors, with the number of episodes."
     if len(rows) > len(shown):
         summary += f" The first {len(shown)} of {counted(len(rows), 'level')} are drawn; the table has all."
     return NamedFigure("levels", "Success by level of the other factors", summary, figure)
@@ -144,4 +142,4 @@ def level_words(levels: str) -> str:
 def _cell_text(cell: MethodSummary | None) -> str:
     if cell is None or cell.estimate is None:
         return "none"
-    return label(f"{share_text(cell.estimate.value, 0)}  ({count_text(cell.counts.counted)})")
+    return label(f"{percentage_text(cell.estimate.value, 0)}  ({count_text(cell.counts.counted)})")

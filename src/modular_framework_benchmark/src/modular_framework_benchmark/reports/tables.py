@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of a report, as texts in rows: the page, Markdown and LaTeX show the same ones."""
+"""Tables of a report as rows of texts, shared by the page, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from modular_framework_benchmark.reports.number_text import (
     interval_text,
     number_text,
     p_value_text,
-    share_text,
+    percentage_text,
 )
-from modular_framework_benchmark.reports.report_content import MOST_PAIRED, SUCCESS, ReportContent
+from modular_framework_benchmark.reports.report_content import MAX_PAIRED_METHODS, SUCCESS, ReportContent
 from modular_framework_benchmark.reports.success_figures import level_words
 from modular_framework_benchmark.statistics.comparison import (
     Comparison,
@@ -38,10 +38,10 @@ class Cell:
     """A cell of a table.
 
     Attributes:
-        text: What it says.
-        is_strong: Whether it is a result that a reader looks for.
-        is_number: Whether it is aligned as a number.
-        mood: `better` or `worse` where a change is shown; "" otherwise.
+        text: Text of the cell.
+        is_strong: Whether the cell is emphasised as a main result.
+        is_number: Whether the cell is aligned as a number.
+        mood: `better` or `worse` for a change that is shown; otherwise "".
     """
 
     text: str
@@ -56,10 +56,10 @@ class Table:
 
     Attributes:
         name: Identifier, unique in a report.
-        caption: What it shows.
-        columns: Titles.
-        rows: Cells, as many in each row as there are columns; the first heads its row.
-        notes: What a reader must know beside it.
+        caption: Caption.
+        columns: Column titles.
+        rows: Rows of cells; the first cell is the row heading.
+        notes: Notes below the table.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Table:
 
 
 def table_text(table: Table) -> str:
-    """Returns the titles and rows of a table as plain text."""
+    """Returns a table as plain text."""
     rows = [table.columns, *(tuple(cell.text for cell in row) for row in table.rows)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(table.columns))]
     return "\n".join(
@@ -79,12 +79,12 @@ def table_text(table: Table) -> str:
 
 
 def answer_text(content: ReportContent) -> str:
-    """Returns the first screen of a report as plain text."""
+    """Returns the summary at the top of a report as plain text."""
     return "\n".join([table_text(answer_table(content)), "", *answer_sentences(content), content.analysis.scope])
 
 
 def overview_table(content: ReportContent) -> Table:
-    """Returns each metric of each method with its interval, and what is shown of their differences."""
+    """Returns each metric of each method with its interval, and the shown differences."""
     methods = content.analysis.methods
     found = {(item.metric, item.method): item for item in content.analysis.summaries}
     rows = []
@@ -96,9 +96,9 @@ def overview_table(content: ReportContent) -> Table:
             for method in methods
         ]
         rows.append((Cell(metric_title(metric)), *estimates, Cell(shown_text(of_metric))))
-    confidence = share_text(content.description.confidence, 0)
+    confidence = percentage_text(content.description.confidence, 0)
     caption = (
-        "Each metric by method: rate, or median in which a failure is worse than any value, with its "
+        "Each metric by method: rate, or median with failures ranked worst, with its "
         f"{confidence} interval; none below 6 {content.unit_noun}s. Bold: shown to be better than every other method."
     )
     notes = (content.analysis.rule, content.analysis.scope, _without_interval(content))
@@ -106,7 +106,7 @@ def overview_table(content: ReportContent) -> Table:
 
 
 def _without_interval(content: ReportContent) -> str:
-    """Returns what fraction of the figures has no interval."""
+    """Returns the fraction of figures without an interval."""
     estimates = [item.estimate for item in content.analysis.summaries if item.estimate]
     estimates += [item.difference for item in content.analysis.comparisons if item.difference]
     without = sum(estimate.interval is None for estimate in estimates)
@@ -114,7 +114,7 @@ def _without_interval(content: ReportContent) -> str:
 
 
 def answer_table(content: ReportContent) -> Table:
-    """Returns the levels: episodes, success, the main metric, and where most failures were."""
+    """Returns a row per method: episodes, success, the main metric, and the most frequent failure."""
     main = next((item for item in content.description.metrics if item.name != SUCCESS), None)
     found = {(item.metric, item.method): item for item in content.analysis.summaries}
     success = next(metric for metric in content.metrics if metric.name == SUCCESS)
@@ -129,37 +129,37 @@ def answer_table(content: ReportContent) -> Table:
         if main is not None:
             row.append(Cell(estimate_text(found[main.name, method].estimate, main), is_number=True))
         causes = [group for group in content.failures.groups if group.by_method.get(method)]
-        worst = max(causes, key=lambda group: group.by_method[method], default=None)
-        row.append(Cell(f"{worst.by_method[method]}: {worst.cause[:90]}" if worst else NONE))
+        most_frequent = max(causes, key=lambda group: group.by_method[method], default=None)
+        row.append(Cell(f"{most_frequent.by_method[method]}: {most_frequent.cause[:90]}" if most_frequent else NONE))
         rows.append(tuple(row))
     columns = ["method", "succeeded of episodes", "success [%] (interval)"]
     columns += [] if main is None else [f"median {metric_title(main)} (interval)"]
-    confidence = share_text(content.description.confidence, 0)
+    confidence = percentage_text(content.description.confidence, 0)
     caption = f"Intervals of {confidence}. A failure is worse than any value."
     return Table("answer", caption, (*columns, "most frequent failure"), tuple(rows))
 
 
 def answer_sentences(content: ReportContent) -> tuple[str, ...]:
-    """Returns what is shown, and one line for all that is not; with more than three methods a line for each metric."""
+    """Returns the shown differences and one line for all others; with many methods, one line per metric."""
     comparisons = content.analysis.comparisons
     if not comparisons:
         return content.analysis.sentences
     won = [item for item in comparisons if item.verdict in (Verdict.FIRST_BETTER, Verdict.SECOND_BETTER)]
     lines = [item.sentence for item in won]
-    if len(content.analysis.methods) > MOST_PAIRED:
+    if len(content.analysis.methods) > MAX_PAIRED_METHODS:
         lines = [line for metric in content.metrics for line in _grouped([i for i in won if i.metric == metric.name])]
     counts = {verdict: sum(item.verdict is verdict for item in comparisons) for verdict in Verdict}
-    rest = [
+    unshown = [
         (counts[Verdict.NOT_SHOWN], "no difference shown"),
         (counts[Verdict.NOT_SHOWABLE], _not_showable(comparisons)),
         (counts[Verdict.NO_DATA], "nothing to compare"),
     ]
-    parts = [f"{text} in {number:,} of {counted(len(comparisons), 'comparison')}" for number, text in rest if number]
+    parts = [f"{text} in {number:,} of {counted(len(comparisons), 'comparison')}" for number, text in unshown if number]
     return (*lines, *(["; ".join(parts)] if parts else []))
 
 
 def _grouped(items: Sequence[Comparison]) -> list[str]:
-    """Returns what is shown by one metric: the methods that are better than the same others in one line."""
+    """Returns the shown differences in a metric; methods that are better than the same others share a line."""
     wins: dict[str, dict[str, float]] = {}
     for item in items:
         pair = (item.first, item.second) if item.verdict is Verdict.FIRST_BETTER else (item.second, item.first)
@@ -199,7 +199,7 @@ def _better_than_all(comparisons: Sequence[Comparison], methods: Sequence[str]) 
 
 
 def metric_title(metric: Metric) -> str:
-    """Returns the name of a metric, with its unit, its clock, who says it, and an arrow to the better values."""
+    """Returns the name of a metric with unit, clock, source, and an arrow to the better values."""
     arrow = "↑" if metric.better.value == "higher" else "↓"
     unit = "%" if metric.kind is MetricKind.RATE else metric.unit
     notes = [unit, *([metric.clock.value] if metric.clock else [])]
@@ -213,7 +213,7 @@ def _estimate(summary: MethodSummary | None) -> Estimate | None:
 
 
 def estimate_text(estimate: Estimate | None, metric: Metric) -> str:
-    """Returns an estimate with its interval, a rate in percent; without the unit."""
+    """Returns an estimate with its interval, without unit; a rate is in percent."""
     if estimate is None:
         return NONE
     scale, unit = (100.0, "%") if metric.kind is MetricKind.RATE else (1.0, metric.unit)
@@ -223,12 +223,12 @@ def estimate_text(estimate: Estimate | None, metric: Metric) -> str:
 
 
 def wins_text(found: Comparison) -> str:
-    """Returns the win difference of a comparison in points, with its interval."""
+    """Returns the win difference of a comparison in points with its interval."""
     return estimate_text(found.difference, SUCCESS_METRIC)
 
 
 def pairs_text(counts: PairCounts) -> str:
-    """Returns how many pairs were compared, and of how many units."""
+    """Returns the number of compared pairs and of their units."""
     if not counts.pairs:
         return NONE
     units = f" of {counts.units:,} units" if counts.units < counts.pairs else ""
@@ -236,7 +236,7 @@ def pairs_text(counts: PairCounts) -> str:
 
 
 def shown_text(comparisons: Sequence[Comparison]) -> str:
-    """Returns what is shown of the differences between methods by one metric."""
+    """Returns the shown differences between methods in a metric."""
     shown = []
     for item in comparisons:
         match item.verdict:
@@ -255,7 +255,7 @@ def shown_text(comparisons: Sequence[Comparison]) -> str:
 
 
 def method_table(content: ReportContent, component: str) -> Table:
-    """Returns the figures of each method by the metrics of a component."""
+    """Returns the figures of each method for the metrics of a component."""
     rows = []
     for metric in content.metrics:
         if metric.component != component:
@@ -286,7 +286,7 @@ def _method_row(metric: Metric, item: MethodSummary) -> tuple[Cell, ...]:
 
 
 def comparison_table(content: ReportContent, component: str) -> Table:
-    """Returns each pair of methods by the metrics of a component."""
+    """Returns the comparisons of each pair of methods for the metrics of a component."""
     metrics = {metric.name: metric for metric in content.metrics if metric.component == component}
     items = [item for item in content.analysis.comparisons if item.metric in metrics]
     rows = tuple(_comparison_row(metrics[item.metric], item) for item in items)
@@ -341,7 +341,7 @@ def _comparison_row(metric: Metric, item: Comparison) -> tuple[Cell, ...]:
 
 
 def missing_table(content: ReportContent) -> Table:
-    """Returns how many episodes of each method have no value of each metric, or count at its limit."""
+    """Returns the numbers of missing and censored values per metric and method."""
     rows = []
     for metric in content.metrics:
         for item in content.analysis.summaries:
@@ -355,17 +355,17 @@ def missing_table(content: ReportContent) -> Table:
                     for text in (
                         count_text(counts.episodes), count_text(counts.counted - counts.censored),
                         count_text(counts.censored) if limit else NONE, count_text(counts.missing),
-                        share_text(counts.unmeasured_share) if counts.unmeasured_share is not None else NONE,
+                        percentage_text(counts.unmeasured_share) if counts.unmeasured_share is not None else NONE,
                     )
                 ),
             ))  # fmt: skip
     columns = ("metric", "method", "episodes", "with a value", "at the limit", "missing", "without a value")
-    caption = "Values that are missing or censored: none is left out without being counted here."
+    caption = "Missing and censored values: every excluded value is counted here."
     return Table("missing", caption, columns, tuple(rows))
 
 
 def status_table(content: ReportContent) -> Table:
-    """Returns how the episodes of each method ended."""
+    """Returns the numbers of each method's episodes by final status."""
     items = [item for item in content.analysis.summaries if item.metric == SUCCESS]
     rows = tuple(
         (
@@ -381,7 +381,7 @@ def status_table(content: ReportContent) -> Table:
         for item in items
     )  # fmt: skip
     columns = ("method", "episodes", "succeeded", "failed", "timed out", "broken")
-    return Table("statuses", "How the finished episodes ended.", columns, rows)
+    return Table("statuses", "Final status of the finished episodes.", columns, rows)
 
 
 def levels_table(content: ReportContent) -> Table:
@@ -402,10 +402,10 @@ def levels_table(content: ReportContent) -> Table:
 
 
 def spans_table(content: ReportContent, kind: str) -> Table:
-    """Returns what each state or component took.
+    """Returns the time of each state or component.
 
     Args:
-        content: of the report.
+        content: Content of the report.
         kind: `state` or `component`.
     """
     rows = tuple(
@@ -424,5 +424,5 @@ def spans_table(content: ReportContent, kind: str) -> Table:
         if item.kind == kind
     )  # fmt: skip
     columns = (kind, "method", "runs", "failed", "never ended", "mean [s]", "mean per episode [s]")
-    caption = f"Real time that each {kind} took; in the mean per episode, work at the same time counts once."
+    caption = f"Real time of each {kind}; the mean per episode counts concurrent work once."
     return Table(f"spans_{kind}", caption, columns, rows)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws where time goes: by component and method, within single episodes, and over the run of the experiment."""
+"""Figures of time: per component and method, within single episodes, and progress of the experiment."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from modular_framework_benchmark.reports.figure_style import (
 from modular_framework_benchmark.reports.number_text import number_text
 from modular_framework_benchmark.reports.span_tables import ChosenEpisode, SpanSummary
 
-MOST_STEPS = 300
+MAX_STEPS = 300
 STATE_COLORS = (
     "#8ecae6",
     "#b7e4c7",
@@ -39,7 +39,7 @@ STATE_COLORS = (
 
 
 def components_figure(summaries: Sequence[SpanSummary], methods: Sequence[str]) -> NamedFigure | None:
-    """Returns stacked bars of the time that components take per episode; None when no component was recorded."""
+    """Returns stacked bars of the components' time per episode, or None without recorded components."""
     components = [item for item in summaries if item.kind == "component"]
     if not components:
         return None
@@ -60,18 +60,18 @@ def components_figure(summaries: Sequence[SpanSummary], methods: Sequence[str]) 
     )  # fmt: skip
     stacked_bars(figure, height=140 + 50 * len(methods), value_title="mean real time per episode [s]")
     summary = (
-        "Real time in which a component works, mean over all episodes of the method. Work at the same time, such as "
+        "Real time of each component, averaged over all episodes of the method. Concurrent work, such as "
         "concurrent plans, counts once; an episode in which a component did not run counts as 0 s."
     )
     return NamedFigure("components", "Time by component", summary, figure)
 
 
 def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> NamedFigure | None:
-    """Returns the states and, below them, the components of some episodes over time; None without a state.
+    """Returns the states and components of some episodes over time, or None without states.
 
     Args:
-        chosen: the episodes.
-        spans: their spans, in the order in which they started.
+        chosen: Episodes to draw.
+        spans: Spans of these episodes in the order of their starts.
     """
     with_states = set(spans.loc[spans["kind"] == "state", "number"])
     episodes = [item for item in chosen if item.number in with_states]
@@ -102,16 +102,16 @@ def timelines_figure(chosen: Sequence[ChosenEpisode], spans: pd.DataFrame) -> Na
         ticks="",
         showgrid=False,
     )
-    figure.update_xaxes(title_text="real time since the episode began [s]", rangemode="tozero")
+    figure.update_xaxes(title_text="real time since the start of the episode [s]", rangemode="tozero")
     summary = (
-        "States (wide bars) and components (narrow grey bars) of an episode. Red edges: failed; hatched: it never "
-        "ended. For each method a success of median length and the first failure of the most frequent cause."
+        "States (wide bars) and components (narrow grey bars) of an episode. Red edges: failed; hatched: never "
+        "ended. Each method has a success of median duration and the first failure of the most frequent cause."
     )
     return NamedFigure("timelines", "Timelines of single episodes", summary, figure)
 
 
 def _leaves(spans: pd.DataFrame) -> pd.DataFrame:
-    """Returns the states that contain no other state: a state is named by its path."""
+    """Returns the states that contain no other state, according to their paths."""
     states = spans[spans["kind"] == "state"]
     paths = [str(name).rstrip("/") + "/" for name in states["name"]]
     inner = [not any(other != path and other.startswith(path) for other in paths) for path in paths]
@@ -144,17 +144,17 @@ def _add_span(figure: go.Figure, span: dict[str, object], y: float, width: float
 
 
 def progress_figure(episodes: pd.DataFrame, planned: int) -> NamedFigure | None:
-    """Returns how many episodes were finished when; None when no episode says when it began.
+    """Returns the number of finished episodes over time, or None without recorded start times.
 
     Args:
-        episodes: table of the episodes.
-        planned: number of episodes of the experiment.
+        episodes: Table of the episodes.
+        planned: Number of planned episodes.
     """
     ended = (episodes["begun"].astype(float) + episodes["wall_s"].astype(float)).dropna()
     if ended.empty:
         return None
     order = ended.sort_values(kind="stable").to_numpy()
-    ranks = np.unique(np.linspace(0, order.size - 1, min(order.size, MOST_STEPS)).round().astype(np.intp))
+    ranks = np.unique(np.linspace(0, order.size - 1, min(order.size, MAX_STEPS)).round().astype(np.intp))
     begin = float(episodes["begun"].astype(float).min())
     hours = (order[ranks] - begin) / 3600.0
     unit, scale = ("h", 1.0) if hours[-1] >= 2.0 else ("min", 60.0)
@@ -167,6 +167,8 @@ def progress_figure(episodes: pd.DataFrame, planned: int) -> NamedFigure | None:
     )  # fmt: skip
     figure.add_hline(y=planned, line={"color": "#5f6c7b", "dash": "dot", "width": 1})
     styled(figure, height=260)
-    figure.update_xaxes(title_text=f"time since the first episode began [{unit}]", rangemode="tozero")
+    figure.update_xaxes(title_text=f"time since the start of the first episode [{unit}]", rangemode="tozero")
     figure.update_yaxes(title_text="finished episodes", range=[0, 1.06 * planned], tickformat=",d")
-    return NamedFigure("progress", "Progress", "Finished episodes over time; dotted: how many are planned.", figure)
+    return NamedFigure(
+        "progress", "Progress", "Finished episodes over time; dotted: number of planned episodes.", figure
+    )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an episode ran with, as the running nodes said; not what its experiment file names."""
+"""Software that an episode used, as reported by the running nodes instead of the experiment file."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from modular_framework_planning.plan_statistics import PlannerRun
 
 
 @dataclass(frozen=True, slots=True)
-class RanPlanner:
-    """A planner that planned.
+class UsedPlanner:
+    """A planner that ran.
 
     Attributes:
-        settings: Its parameters as resolved.
+        settings: Resolved parameters.
         request_adapters: Request adapters, outermost first.
-        implementations: Who searched for it: `compiled`, `OMPL`, `CBiRRT`; none where straight motions were enough.
+        implementations: Implementations that searched: `compiled`, `OMPL`, `CBiRRT`; empty for straight motions.
     """
 
     settings: Mapping[str, Any]
@@ -27,7 +27,7 @@ class RanPlanner:
     implementations: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Returns its settings and, beside them, how it planned."""
+        """Returns the settings, extended by request adapters and implementations."""
         return {
             **self.settings,
             "request_adapters": ", ".join(self.request_adapters),
@@ -36,32 +36,32 @@ class RanPlanner:
 
 
 @dataclass(frozen=True, slots=True)
-class RanMethod:
-    """A method that generated grasps: the version of its package, and SHA-256 of its sources."""
+class UsedMethod:
+    """A grasp generation method: version of its package, and SHA-256 of its sources."""
 
     version: str
     sources: str
 
 
 @dataclass(frozen=True, slots=True)
-class WhatRan:
-    """The parts of an episode; those that a mode does not have are empty.
+class UsedSoftware:
+    """Software that an episode used; parts that a mode lacks are empty.
 
     Attributes:
-        planners: Each planner, by its name and that of its pipeline.
-        solver: Methods of inverse kinematics; empty if no pose was solved for.
-        methods: Each method that generates grasps, by package.
-        controllers: Type of each controller that ran, by name.
-        physics_engine: What moved the bodies.
-        renderer: What drew the images of cameras; empty without a camera.
-        digests: SHA-256 of the robot description, the world and the task, by what they are.
-        substitutions: What ran in place of what was named, as documented: constrained plans of CBiRRT.
-        replaced: What was named and is not there, with what ran instead: such an episode is invalid.
+        planners: Planners, keyed by "PLANNER of PIPELINE".
+        solver: Inverse kinematics methods; empty if no pose was solved.
+        methods: Grasp generation methods, keyed by package.
+        controllers: Types of the running controllers, keyed by name.
+        physics_engine: Physics engine of the simulation.
+        renderer: Renderer of the cameras; empty without cameras.
+        digests: SHA-256 of the robot description, the world and the task, keyed by description.
+        substitutions: Documented substitutions of named software: CBiRRT for constrained plans.
+        replaced: Named software that was missing, with its replacement, which makes the episode invalid.
     """
 
-    planners: Mapping[str, RanPlanner] = field(default_factory=dict)
+    planners: Mapping[str, UsedPlanner] = field(default_factory=dict)
     solver: str = ""
-    methods: Mapping[str, RanMethod] = field(default_factory=dict)
+    methods: Mapping[str, UsedMethod] = field(default_factory=dict)
     controllers: Mapping[str, str] = field(default_factory=dict)
     physics_engine: str = ""
     renderer: str = ""
@@ -70,36 +70,36 @@ class WhatRan:
     replaced: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        """Returns the part of a snapshot that says what ran."""
+        """Returns the entries of a snapshot."""
         return asdict(self) | {"planners": {name: planner.as_json() for name, planner in self.planners.items()}}
 
     @classmethod
-    def from_parts(cls, parts: Mapping[str, Any]) -> WhatRan:
-        """Returns what another process has written by `dataclasses.asdict`, as JSON values."""
+    def from_parts(cls, parts: Mapping[str, Any]) -> UsedSoftware:
+        """Returns the object from JSON values that `dataclasses.asdict` produced in another process."""
         return cls(
             **{
                 **parts,
-                "planners": {name: RanPlanner(**planner) for name, planner in parts.get("planners", {}).items()},
-                "methods": {name: RanMethod(**method) for name, method in parts.get("methods", {}).items()},
+                "planners": {name: UsedPlanner(**planner) for name, planner in parts.get("planners", {}).items()},
+                "methods": {name: UsedMethod(**method) for name, method in parts.get("methods", {}).items()},
                 "substitutions": tuple(parts.get("substitutions", ())),
                 "replaced": tuple(parts.get("replaced", ())),
             }
         )
 
-    def with_plans(self, runs: Iterable[PlannerRun]) -> WhatRan:
-        """Returns it with what planned.
+    def with_plans(self, runs: Iterable[PlannerRun]) -> UsedSoftware:
+        """Returns this object with the planners of the given runs.
 
         Args:
-            runs: What planned each motion, also each one that failed.
+            runs: Planner run of each motion, including failed runs.
         """
-        runs, planners = list(runs), dict[str, RanPlanner]()
+        runs, planners = list(runs), dict[str, UsedPlanner]()
         substitutions, replaced = set(self.substitutions), set(self.replaced)
         solvers = {self.solver, *(run.solver for run in runs)} - {""}
         for run in runs:
             name = f"{run.planner} of {run.pipeline}"
             before = planners[name].implementations if name in planners else ()
             searched = tuple(sorted({*before, run.implementation} - {""}))
-            planners[name] = RanPlanner(run.settings, tuple(run.adapters), searched)
+            planners[name] = UsedPlanner(run.settings, tuple(run.adapters), searched)
             if run.implementation == CONSTRAINED != run.planner:
                 substitutions.add(substitution_text(run.planner))
             if run.replaced:
@@ -114,13 +114,13 @@ class WhatRan:
 
 
 IMPLEMENTATION = "implementation"
-"""Key of a planner's implementations in a snapshot."""
+"""Snapshot key of a planner's implementations."""
 CONSTRAINED = "CBiRRT"
-"""The search of plans whose path constraints no other planner can keep."""
+"""Planner of requests whose path constraints other planners cannot satisfy."""
 
 
 def substitution_text(planner: str, constrained: str = CONSTRAINED) -> str:
-    """Returns what a record and a dry run say of a planner that another search replaces."""
+    """Returns the text of a substitution in records and in the dry run."""
     return f"{constrained} for {planner}, which cannot keep path constraints"
 
 
@@ -131,6 +131,6 @@ def solver_substitutions(named: Iterable[str]) -> tuple[str, ...]:
 
 
 def description_digests(urdf: str, srdf: str) -> dict[str, str]:
-    """Returns SHA-256 of the texts that describe a robot, hexadecimal, by what they are; without empty ones."""
+    """Returns the SHA-256 of a robot's descriptions in hexadecimal, keyed by description; empty texts are skipped."""
     texts = {"robot description": urdf, "semantic description": srdf}
     return {what: hashlib.sha256(text.encode()).hexdigest() for what, text in texts.items() if text}
