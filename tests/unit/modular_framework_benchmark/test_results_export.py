@@ -236,7 +236,7 @@ def test_levels_and_success_choose_the_episodes(tmp_path: Path, capsys: pytest.C
     assert export(path, "--lerobot", tmp_path / "other", "--where", "object=canoe") == 2
     assert "object=cup or can" in capsys.readouterr().err
     assert export(path, "--csv", tmp_path / "other", "--succeeded") == 2
-    assert "for --lerobot" in capsys.readouterr().err
+    assert "require --lerobot" in capsys.readouterr().err
 
 
 def test_without_recorded_motions_there_is_no_dataset(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -32,12 +32,12 @@ class Terminal(io.StringIO):
 def test_the_counts_and_the_time_left_are_those_of_this_run(tmp_path: Path) -> None:
     clock, stream, specs = Clock(), io.StringIO(), plan_episodes(read(PICK, tmp_path))
     progress = Progress(48, 8, stream, clock)
-    assert "time left: not known yet" in progress.text()
+    assert "remaining time unknown" in progress.text()
     for number, status in enumerate([EpisodeStatus.SUCCEEDED, EpisodeStatus.FAILED, EpisodeStatus.TIMED_OUT] * 4):
         clock.time_s += 10.0
         progress.add(fake_runners.record_of(specs[number], status))
     assert progress.text() == (
-        "20 of 48 episodes (8 before): 4 succeeded, 4 failed, 4 timed out, 0 broken, 0 invalid; about 0:04:40 left"
+        "20 of 48 episodes (8 before): 4 succeeded, 4 failed, 4 timed out, 0 broken, 0 invalid; about 0:04:40 remaining"
     )
     lines = stream.getvalue().splitlines()
     assert len(lines) == 6, "a line now and then, not one for each episode"

@@ -104,7 +104,7 @@ def test_a_disk_limit_ends_the_command_cleanly_and_it_can_go_on(folder: Path) ->
     process = start(folder, "run_experiment", "experiment.yaml", "--disk-limit", "1e-6", runner="QuickRunner")
     printed, errors = process.communicate(timeout=300)
     assert process.returncode == 1, errors
-    assert "stopped: the next episode would exceed --disk-limit 1e-06" in errors and "To go on: rosrun" in errors
+    assert "stopped: the next episode would exceed --disk-limit 1e-06" in errors and "To continue: rosrun" in errors
     assert 0 < finished(folder) < 120
     process = start(folder, "resume", "plans.db", runner="QuickRunner")
     printed, errors = process.communicate(timeout=300)
@@ -174,7 +174,7 @@ def test_a_signal_ends_the_run_and_what_it_has_started_and_says_how_to_go_on(fol
         process.send_signal(kind)
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 130
-        assert "every episode that had ended is stored. To go on: rosrun modular_framework_benchmark resume" in errors
+        assert "every ended episode is stored. To continue: rosrun modular_framework_benchmark resume" in errors
         assert marked_processes(f"{RunLock(str(folder / 'plans.db')).run}/") == []
 
 

@@ -85,7 +85,7 @@ def test_a_killed_worker_costs_no_other_episode_and_its_own_is_tried_twice(
     for record in bench.records():
         if record.spec.trial == 0:
             assert record.status is EpisodeStatus.BROKEN
-            assert "was killed by signal SIGKILL; it said last: the worker is about to die" in record.cause
+            assert "was killed by signal SIGKILL; its last output: the worker is about to die" in record.cause
             assert "tried 2 times" in record.cause
         else:
             assert record.succeeded, "the second try succeeds"
@@ -107,7 +107,7 @@ def test_a_runner_that_does_not_return_is_killed_and_timed_out(bench: Bench, mon
     bench.run(fake_runners.HangingRunner)
     for record in bench.records():
         assert record.status is (EpisodeStatus.SUCCEEDED if record.spec.trial else EpisodeStatus.TIMED_OUT)
-        assert record.spec.trial or "did not return within 1 s" in record.cause
+        assert record.spec.trial or "exceeded 1 s" in record.cause
 
 
 def test_a_worker_that_cannot_start_ends_the_run_with_what_it_said(bench: Bench) -> None:
@@ -119,7 +119,7 @@ def test_a_worker_that_cannot_start_ends_the_run_with_what_it_said(bench: Bench)
 def test_a_stopping_rule_is_asked_after_each_trial_and_ends_the_run(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stopping, "PAUSE_SHARE", 0.0)
+    monkeypatch.setattr(stopping, "PAUSE_FACTOR", 0.0)
 
     class AfterOneTrial:
         seen: list[int] = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `compare`."""
+"""Command `compare`: finds changes between two experiments."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ REGRESSED = 1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compares two experiments; returns 0, 1 for a regression that --fail-on-regression asked for, 2 for an error."""
+    """Compares two experiments; returns 0, 1 for a regression with --fail-on-regression, 2 for an error."""
     return run_reporting(_parser(), arguments, _compare)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="compare",
-        description="Says what got better and what got worse between two experiments with the same factors. Episodes "
-        "with the same method, levels, trial and seed are compared in pairs.",
-        epilog="Exit code: 0; 1 with --fail-on-regression when something got worse; 2 when they cannot be compared.",
+        description="Finds improvements and regressions between two experiments with the same factors. Episodes with "
+        "the same method, levels, trial and seed are compared in pairs.",
+        epilog="Exit code: 0; 1 with --fail-on-regression after a regression; 2 if the experiments are not comparable.",
     )
     parser.add_argument("before", help="result database of the earlier experiment: a file, or a URL of SQLAlchemy")
-    parser.add_argument("after", nargs="?", help="that of the later one; default: the same database")
-    parser.add_argument("--experiment", metavar="NAME", help="the earlier experiment, where its database has several")
-    parser.add_argument("--with", dest="other", metavar="NAME", help="the later experiment; default: the same name")
+    parser.add_argument("after", nargs="?", help="database of the later experiment; default: the same database")
+    parser.add_argument("--experiment", metavar="NAME", help="earlier experiment, if its database has several")
+    parser.add_argument("--with", dest="other", metavar="NAME", help="later experiment; default: the same name")
     parser.add_argument("--into", type=Path, metavar="FILE", help="also write an HTML page")
-    parser.add_argument("--fail-on-regression", action="store_true", help="exit code 1 when something got worse")
+    parser.add_argument("--fail-on-regression", action="store_true", help="exit with code 1 after a regression")
     return parser
 
 
 def _compare(given: argparse.Namespace) -> int:
     if given.after is None and not (given.experiment and given.other and given.experiment != given.other):
-        raise ReportError("one database is given; name two of its experiments: --experiment NAME --with NAME")
+        raise ReportError("a single database needs two experiments; add --experiment NAME --with NAME")
     with (
         open_source(given.before, given.experiment) as before,
         open_source(given.after or given.before, given.other or given.experiment) as after,

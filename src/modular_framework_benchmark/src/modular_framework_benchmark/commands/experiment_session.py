@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs an experiment of a database from where it is to its end, and says what came out."""
+"""Runs a stored experiment from its current state to its end, and prints the results."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ COMMAND = "rosrun modular_framework_benchmark"
 
 @dataclass(frozen=True, slots=True)
 class SessionOptions:
-    """How the user wants an experiment to run.
+    """Options of a run.
 
     Attributes:
-        target: The database, as it was named.
-        workers: Episodes at the same time; None: as the file says.
-        scheduler: Address of a Dask scheduler; None: workers on this machine.
-        runner: MODULE:NAME of the user's own runner; empty for that of the mode.
-        disk_limit_gb: What the files of its episodes may take [GB].
+        target: Database as named by the user.
+        workers: Number of parallel episodes; None for the number in the experiment file.
+        scheduler: Address of a Dask scheduler; None for workers on this machine.
+        runner: MODULE:NAME of a user's runner; "" for the runner of the mode.
+        disk_limit_gb: Maximum size of the episodes' files [GB].
     """
 
     target: str
@@ -44,13 +44,13 @@ class SessionOptions:
 
 
 class ExperimentSession:
-    """One run of the pending episodes.
+    """A run of the pending episodes.
 
     Args:
-        database: Where the experiment is.
-        number: Its identifier there.
+        database: Database of the experiment.
+        number: Identifier of the experiment in the database.
         run: Mark of the run's processes.
-        options: How it is to run.
+        options: Options of the run.
         settings: Workers and stopping rule of the experiment.
     """
 
@@ -68,7 +68,7 @@ class ExperimentSession:
         self._folder = database.folder.resolve() / f"{stem}_episodes" / self._name
 
     def run(self) -> int:
-        """Runs it and prints the results; returns the exit code."""
+        """Runs the episodes and prints the results; returns the exit code."""
         make_runner = runner_factory(self._stored.description.mode, self._options.runner)
         rule = stopping_rule(self._settings.stopping)
         disk = DiskGuard(self._folder, self._options.disk_limit_gb * GB)
@@ -78,7 +78,7 @@ class ExperimentSession:
         def make_pool() -> Pool:
             logs = self._folder / "workers"
             if self._options.scheduler:
-                from modular_framework_benchmark.scheduling.dask_pool import DaskPool  # Dask takes a second to import
+                from modular_framework_benchmark.scheduling.dask_pool import DaskPool  # slow to import
 
                 return DaskPool(self._options.scheduler, make_runner, self._run_mark, logs)
             workers = min(self._options.workers or self._settings.workers, run.pending)
@@ -102,12 +102,12 @@ class ExperimentSession:
         resume = f"{COMMAND} resume {shlex.quote(self._shown)} --experiment {self._name}"
         if self._options.runner:
             resume += f" --runner {self._options.runner}"
-        print(f"\nstopped{why}; every episode that had ended is stored. To go on: {resume}", file=sys.stderr)
+        print(f"\nstopped{why}; every ended episode is stored. To continue: {resume}", file=sys.stderr)
         return exit_code
 
     def _print_results(self, end: RunEnd) -> int:
-        """Prints the first screen of the report and writes the page; fails when no episode says anything."""
-        from modular_framework_benchmark.commands.report_command import write_page  # takes seconds to import
+        """Prints the summary of the report and writes the page; returns an error if nothing was measured."""
+        from modular_framework_benchmark.commands.report_command import write_page  # slow to import
         from modular_framework_benchmark.reports.report_source import OpenedExperiment
         from modular_framework_benchmark.statistics.observations import unmeasured_reason
 
@@ -129,7 +129,7 @@ class ExperimentSession:
 
 
 class _Signals:
-    """Has SIGTERM and SIGHUP end a run as Ctrl-C does; one that is ignored, as nohup asks for, stays ignored."""
+    """Makes SIGTERM and SIGHUP end a run like Ctrl-C, unless they are ignored, as with nohup."""
 
     def __enter__(self) -> None:
         caught = [kind for kind in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(kind) is not signal.SIG_IGN]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `export`."""
+"""Command `export`: writes results for other programs."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from modular_framework_benchmark.results.errors import ExportError
 from modular_framework_benchmark.results.exported_tables import TableFormat, export_tables
 from modular_framework_benchmark.results.lerobot_export import DEFAULT_RATE, export_lerobot
 
-MOST_REASONS = 5
+MAX_REASONS = 5
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exports an experiment; returns 0, or 2 when it could not."""
+    """Exports an experiment; returns 0, or 2 after an error."""
     return run_reporting(_parser(), arguments, _export)
 
 
 def _export(given: argparse.Namespace) -> int:
     if given.lerobot is None and (given.rate is not None or given.where or given.succeeded):
-        raise ExportError("--rate, --where and --succeeded are for --lerobot; leave them out, or name its folder")
+        raise ExportError("--rate, --where and --succeeded require --lerobot; remove them, or add --lerobot FOLDER")
     with open_database(given.database, read_only=True) as database:
         number = find_experiment(database, given.experiment)
         for table_format in TableFormat:
@@ -43,18 +43,20 @@ def _export(given: argparse.Namespace) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = database_parser(
         "export",
-        "Writes the episodes of an experiment for other programs. Nothing that is there is overwritten.",
+        "Writes the episodes of an experiment for other programs. Existing files are not overwritten.",
     )
     kinds = parser.add_mutually_exclusive_group(required=True)
-    kinds.add_argument("--csv", type=Path, metavar="FOLDER", help="episodes and spans as CSV, what was run as JSON")
+    kinds.add_argument("--csv", type=Path, metavar="FOLDER", help="episodes and spans as CSV, description as JSON")
     kinds.add_argument("--parquet", type=Path, metavar="FOLDER", help="episodes and spans as Parquet")
-    kinds.add_argument("--lerobot", type=Path, metavar="FOLDER", help="recorded motions and videos, for learners")
-    learners = parser.add_argument_group("with --lerobot")
-    learners.add_argument("--rate", type=int, metavar="HZ", help=f"frames a second [{DEFAULT_RATE}]")
-    learners.add_argument(
-        "--where", action="append", default=[], metavar="FACTOR=LEVEL", help="only these; may be given several times"
+    kinds.add_argument(
+        "--lerobot", type=Path, metavar="FOLDER", help="recorded motions and videos for imitation learning"
     )
-    learners.add_argument("--succeeded", action="store_true", help="only episodes that succeeded")
+    learners = parser.add_argument_group("with --lerobot")
+    learners.add_argument("--rate", type=int, metavar="HZ", help=f"frame rate [{DEFAULT_RATE}]")
+    learners.add_argument(
+        "--where", action="append", default=[], metavar="FACTOR=LEVEL", help="only episodes at this level; repeatable"
+    )
+    learners.add_argument("--succeeded", action="store_true", help="only successful episodes")
     return parser
 
 
@@ -71,23 +73,23 @@ def _export_lerobot(database: ResultDatabase, number: int, given: argparse.Names
     summary = export_lerobot(database, number, given.lerobot, frames_per_second=rate, chosen=chosen)
     print(f"{given.lerobot}: {summary.episodes} episodes, {summary.frames} frames at {rate} Hz")
     if summary.skipped:
-        print(f"export: {len(summary.skipped)} episodes are left out:", file=sys.stderr)
-    for episode, reason in list(summary.skipped.items())[:MOST_REASONS]:
+        print(f"export: {len(summary.skipped)} episodes are omitted:", file=sys.stderr)
+    for episode, reason in list(summary.skipped.items())[:MAX_REASONS]:
         print(f"  episode {episode}: {reason}", file=sys.stderr)
 
 
 def _chosen_levels(given: Sequence[str], description: ExperimentDescription) -> Mapping[str, str]:
-    """Returns the levels that were asked for, by factor.
+    """Returns the requested levels, keyed by factor.
 
     Raises:
-        ExportError: There is no such factor or level.
+        ExportError: The experiment lacks a factor or level.
     """
     allowed = {factor.name: factor.levels for factor in description.factors}
     levels = {}
     for text in given:
         name, _, level = text.partition("=")
         if level not in allowed.get(name, ()):
-            listed = "; ".join(f"{factor}={' or '.join(found)}" for factor, found in allowed.items())
-            raise ExportError(f"--where {text}: the experiment has no such level; allowed: {listed}")
+            levels_text = "; ".join(f"{factor}={' or '.join(found)}" for factor, found in allowed.items())
+            raise ExportError(f"--where {text}: the experiment has no such level; allowed: {levels_text}")
         levels[name] = level
     return levels

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What runs the episodes of each mode, and what it can measure."""
+"""Runners and metrics of each mode."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ RUNNERS = {
     "kinematics": f"{_PACKAGE}.modes.ros_kinematics_runner:KinematicsEpisodeRunner",
     "grasps": f"{_PACKAGE}.modes.ros_grasp_runner:GraspEpisodeRunner",
 }
-"""MODULE:NAME of the factory of each mode's runner."""
+"""MODULE:NAME of each mode's runner factory."""
 COMPONENTS = {
     "task": {"task", "generation", "planning", "execution", "grasp"},
     "planning": {"planning"},
     "kinematics": {"kinematics"},
     "grasps": {"generation"},
 }
-"""The components whose metrics a mode has, beside success."""
+"""Components whose metrics a mode measures, in addition to success."""
 
 
 class RunnerError(Exception):
-    """There is nothing that runs the episodes; the message says what is missing."""
+    """The runner of the episodes cannot be loaded; the message names the missing part."""
 
 
 def known_metrics() -> dict[str, Mapping[str, Metric]]:
-    """Returns the metrics of each mode, by name; a mode without simulation measures all of them itself."""
-    from modular_framework_benchmark.metrics.registry import METRICS  # `resume` does without
+    """Returns the metrics of each mode by name; the modes without simulation measure all metrics themselves."""
+    from modular_framework_benchmark.metrics.registry import METRICS  # not needed by `resume`
 
     return {
         mode: {
@@ -48,14 +48,14 @@ def known_metrics() -> dict[str, Mapping[str, Metric]]:
 
 
 def runner_factory(mode: str, own: str = "") -> RunnerFactory:
-    """Returns what makes the runners of a mode.
+    """Returns the runner factory of a mode.
 
     Args:
-        mode: Of the experiment.
-        own: MODULE:NAME of a factory of the user's own; empty for that of the mode.
+        mode: Mode of the experiment.
+        own: MODULE:NAME of a user's factory; "" for the factory of the mode.
 
     Raises:
-        RunnerError: It cannot be imported.
+        RunnerError: The factory cannot be imported.
     """
     reference = own or RUNNERS[mode]
     module, _, name = reference.partition(":")
@@ -67,5 +67,5 @@ def runner_factory(mode: str, own: str = "") -> RunnerFactory:
             "correct --runner"
         ) from error
     if not callable(factory):
-        raise RunnerError(f"the runner {reference} is no class or function; correct --runner")
+        raise RunnerError(f"the runner {reference} is not a class or function; correct --runner")
     return factory  # type: ignore[no-any-return]

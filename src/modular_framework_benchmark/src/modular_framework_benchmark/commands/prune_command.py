@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `prune`: deletes files of finished episodes; what the database holds of the episodes stays."""
+"""Command `prune`: deletes files of finished episodes, but no data of the database."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ KINDS = {
     "log": ("log.txt",),
     "recording": ("trajectory.parquet", "tracking.parquet", "recording.json", "parameters.json", "task_records"),
 }
-"""Files of an episode, by the names that `--files` takes."""
+"""Files of an episode, keyed by the values of `--files`."""
 EVERYTHING = "all"
 DAY_S = 86400.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Deletes files of episodes, or says what it would delete; returns 0, or 2 when it could not."""
+    """Deletes files of episodes, or reports what would be deleted; returns 0, or 2 after an error."""
     return run_reporting(_parser(), arguments, _prune)
 
 
@@ -37,7 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = database_parser(
         "prune",
         "Deletes files of finished episodes. Their outcomes, metrics and spans stay in the database. Without --delete "
-        "nothing is deleted, and the command says what would be.",
+        "the command only reports what would be deleted.",
     )
     parser.add_argument(
         "--files",
@@ -45,11 +45,11 @@ def _parser() -> argparse.ArgumentParser:
         default=["bag", "video"],
         choices=[*KINDS, EVERYTHING],
         metavar="KIND",
-        help=f"what to delete: {', '.join(KINDS)}, or {EVERYTHING}: whole folders; default: bag video",
+        help=f"files to delete: {', '.join(KINDS)}, or {EVERYTHING}: whole folders; default: bag video",
     )
-    parser.add_argument("--older-than", type=float, default=0.0, metavar="DAYS", help="only episodes that are older")
-    parser.add_argument("--keep-failures", action="store_true", help="only episodes that succeeded")
-    parser.add_argument("--delete", action="store_true", help="delete them")
+    parser.add_argument("--older-than", type=float, default=0.0, metavar="DAYS", help="only episodes older than this")
+    parser.add_argument("--keep-failures", action="store_true", help="only successful episodes")
+    parser.add_argument("--delete", action="store_true", help="delete the files")
     return parser
 
 
@@ -67,14 +67,14 @@ def _prune(given: argparse.Namespace) -> int:
         try:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         except OSError as error:
-            raise ReportError(f"{path} cannot be deleted: {error.strerror}; what came before is deleted") from error
+            raise ReportError(f"{path} cannot be deleted: {error.strerror}; earlier files are deleted") from error
     verb, hint = ("deleted", "") if given.delete else ("would be deleted", "; add --delete to delete them")
     print(f"{name}: {size / GB:.3g} GB in {len(paths)} files and folders of {len(chosen)} episodes {verb}{hint}")
     return 0
 
 
 def _paths(episodes: pd.DataFrame, root: Path, kinds: Sequence[str]) -> list[Path]:
-    """Returns what is deleted; nothing outside the folder of the database."""
+    """Returns the paths to delete, restricted to the folder of the database."""
     found = []
     for text in episodes["folder"]:
         folder = (root / str(text)).resolve()

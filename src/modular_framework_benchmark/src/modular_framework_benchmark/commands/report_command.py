@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `report`."""
+"""Command `report`: writes the report of an experiment."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ TABLES = {"markdown": markdown_table, "latex": latex_table}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Reports an experiment; returns 0, or 2 when it could not."""
+    """Reports an experiment; returns 0, or 2 after an error."""
     return run_reporting(_parser(), arguments, _report)
 
 
 def write_page(opened: OpenedExperiment, into: Path) -> str:
-    """Writes the report page of an experiment; returns its first screen as text.
+    """Writes the report page of an experiment; returns its summary as text.
 
     Args:
-        opened: The experiment.
+        opened: Opened experiment.
         into: File of the page.
 
     Raises:
-        ReportError: It cannot be written.
-        ResultsError: The database cannot be read.
+        ReportError: The file is not writable.
+        ResultsError: The database is unreadable.
     """
     content = gather(opened.results_by_start, opened.source(into.absolute().parent))
     write_file(into, report_page(content, opened.database.label).encode())
@@ -45,19 +45,17 @@ def write_page(opened: OpenedExperiment, into: Path) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = database_parser(
         "report",
-        "Says which method is better, at what, and how sure that is: one HTML page from a result database. "
-        "With --figure or --table it writes that part alone.",
+        "Reports which method is better, in which metric, and with which confidence, as one HTML page. "
+        "With --figure or --table only that part is written.",
     )
-    parser.add_argument(
-        "--into", type=Path, metavar="FILE", help="what is written; default: named after the experiment"
-    )
+    parser.add_argument("--into", type=Path, metavar="FILE", help="output file; default: named after the experiment")
     parser.add_argument(
         "--figure",
         metavar="NAME[.png|.pdf]",
-        help="write this figure as an image, PNG if nothing is said; 'list' names those there are",
+        help="write this figure as an image, by default PNG; 'list' prints the names of the figures",
     )
     parser.add_argument(
-        "--mean-intervals", action="store_true", help="give differences of means of bounded metrics an interval"
+        "--mean-intervals", action="store_true", help="give mean differences of bounded metrics an interval"
     )
     parser.add_argument("--table", choices=sorted(TABLES), help="print the table of methods for a paper")
     return parser
@@ -65,10 +63,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def _report(given: argparse.Namespace) -> int:
     if given.figure and given.table:
-        raise ReportError("--figure and --table are both given; give one of them")
+        raise ReportError("--figure and --table are both given; remove one of them")
     figure, image_format = _figure_and_format(given.figure or "")
     if figure and figure != "list":
-        find_browser()  # before the work of a large database
+        find_browser()  # fails early, before a large database is read
     with open_source(given.database, given.experiment) as opened:
         name = opened.results.description.name
         into = given.into or Path(f"{name}_{figure}.{image_format}" if figure else f"{name}.html")
@@ -91,11 +89,11 @@ def _figure_and_format(text: str) -> tuple[str, str]:
     """Returns the name of a figure and the format of its image.
 
     Raises:
-        ReportError: There is no such format.
+        ReportError: The format is unknown.
     """
     name, _, ending = text.partition(".")
     if ending and ending not in FORMATS:
-        raise ReportError(f"--figure {text}: '{ending}' is no format; allowed: {', '.join(FORMATS)}")
+        raise ReportError(f"--figure {text}: '{ending}' is not a format; allowed: {', '.join(FORMATS)}")
     return name, ending or FORMATS[0]
 
 

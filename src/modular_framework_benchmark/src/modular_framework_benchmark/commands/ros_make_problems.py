@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command `make_problems`: random motion-planning problems for a robot."""
+"""Command `make_problems`: generates random motion planning problems for a robot."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from modular_framework_planning.errors import PlanningError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command; returns 2 with a message where it cannot."""
+    """Runs the command; returns 0, or 2 after an error."""
     parser = argparse.ArgumentParser(
         prog="make_problems",
-        description="Makes motion-planning problems for a robot: random boxes, free start and goal.",
+        description="Generates motion planning problems for a robot: random boxes, collision-free start and goal.",
     )
     parser.add_argument("robot", metavar="PACKAGE", help="MoveIt configuration package of the robot")
-    parser.add_argument("group", help="planning group that moves")
-    parser.add_argument("into", type=Path, metavar="FOLDER", help="where to write sceneNNNN.yaml and requestNNNN.yaml")
-    parser.add_argument("--count", type=_positive, default=20, help="how many problems [20]")
-    parser.add_argument("--boxes", type=_positive, default=8, help="boxes a problem has [8]")
-    parser.add_argument("--seed", type=int, default=1, help="the same seed gives the same problems [1]")
+    parser.add_argument("group", help="planning group")
+    parser.add_argument("into", type=Path, metavar="FOLDER", help="folder of sceneNNNN.yaml and requestNNNN.yaml")
+    parser.add_argument("--count", type=_positive, default=20, help="number of problems [20]")
+    parser.add_argument("--boxes", type=_positive, default=8, help="number of boxes per problem [8]")
+    parser.add_argument("--seed", type=int, default=1, help="seed that reproduces the problems [1]")
     options = parser.parse_args(arguments)
     try:
         robot = load_robot(options.robot)
@@ -40,5 +40,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _positive(text: str) -> int:
     value = int(text)
     if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} is not allowed; give 1 or more")
+        raise argparse.ArgumentTypeError(f"{value} is not allowed; use 1 or more")
     return value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The commands `run_experiment` and `resume`."""
+"""Commands `run_experiment` and `resume`."""
 
 from __future__ import annotations
 
@@ -36,43 +36,43 @@ USER_ERRORS = (ExperimentFault, ResultsError, RunLockError, RunnerError, Schedul
 
 
 class CommandError(Exception):
-    """The command cannot do what was asked for."""
+    """The command cannot be executed."""
 
 
 def run_experiment(arguments: Sequence[str]) -> int:
     """Runs the command `run_experiment`."""
     parser = argparse.ArgumentParser(
-        prog="run_experiment", description="Runs an experiment file, or goes on with it where it was ended."
+        prog="run_experiment", description="Runs an experiment file, or continues an interrupted run."
     )
-    parser.add_argument("file", type=Path, help=f"experiment file, or name of one in {API_PACKAGE}/experiments")
+    parser.add_argument("file", type=Path, help=f"experiment file, or its name in {API_PACKAGE}/experiments")
     parser.add_argument("--database", help="SQLite file or SQLAlchemy URL for the results; default: EXPERIMENT.db here")
-    parser.add_argument("--dry-run", action="store_true", help="check the file and show its episodes, run nothing")
+    parser.add_argument("--dry-run", action="store_true", help="check the file and list its episodes without running")
     _add_run_options(parser)
     return _guarded(_run, parser.parse_args(arguments))
 
 
 def resume(arguments: Sequence[str]) -> int:
     """Runs the command `resume`."""
-    parser = argparse.ArgumentParser(prog="resume", description="Goes on with an experiment that was ended early.")
+    parser = argparse.ArgumentParser(prog="resume", description="Continues an interrupted experiment.")
     parser.add_argument("database", help="SQLite file or SQLAlchemy URL with its results")
-    parser.add_argument("--experiment", help="its name; default: the only one that is not finished")
+    parser.add_argument("--experiment", help="name of the experiment; default: the only unfinished one")
     _add_run_options(parser)
     return _guarded(_resume, parser.parse_args(arguments))
 
 
 def _add_run_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--workers", type=int, help="episodes at the same time; default: that of the file")
+    parser.add_argument("--workers", type=int, help="number of parallel episodes; default: from the file")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
     parser.add_argument(
-        "--disk-limit", type=float, default=math.inf, metavar="GB", help="end cleanly before its files exceed this"
+        "--disk-limit", type=float, default=math.inf, metavar="GB", help="end cleanly before the files exceed this size"
     )
     parser.add_argument(
-        "--runner", default="", metavar="MODULE:NAME", help="what runs the episodes; default: the mode's"
+        "--runner", default="", metavar="MODULE:NAME", help="factory of the runner; default: from the mode"
     )
 
 
 def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
-    """Runs a command; turns errors into messages and exit codes."""
+    """Runs a command; converts errors to messages and exit codes."""
     try:
         if options.workers is not None and options.workers < 1:
             raise CommandError(f"--workers is {options.workers}; allowed: 1 or more")
@@ -91,14 +91,14 @@ def _guarded(command: Callable[[argparse.Namespace], int], options: argparse.Nam
 
 
 def _run(options: argparse.Namespace) -> int:
-    # imported where it is needed: `resume` does without roslaunch
+    # Imported here, because `resume` does not need roslaunch.
     from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
     from modular_framework_benchmark.modes.ros_setting_checks import setting_checks
 
     experiment = load_experiment(experiment_path(options.file), RosResourceLookup(), known_metrics(), setting_checks())
     episodes = plan_episodes(experiment)
     if options.dry_run:
-        from modular_framework_benchmark.statistics.planned_power import power_text  # takes a second to import
+        from modular_framework_benchmark.statistics.planned_power import power_text  # slow to import
 
         print(design_text(experiment, episodes))
         print(disk_text(experiment.description.mode, episodes))
@@ -109,16 +109,16 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def run_episodes(experiment: Experiment, episodes: Sequence[EpisodeSpec], options: SessionOptions) -> int:
-    """Runs episodes of an experiment, those that its database has not; returns the exit code.
+    """Runs the episodes that the database lacks; returns the exit code.
 
     Args:
-        experiment: What they belong to.
-        episodes: All that `plan_episodes` gives, or some of them.
-        options: How to run them.
+        experiment: Experiment of the episodes.
+        episodes: Episodes from `plan_episodes`, or some of them.
+        options: Options of the run.
 
     Raises:
-        Exception: One of `USER_ERRORS`; an episode that fails is none.
-        RecordNotStoredError: The database cannot be written.
+        Exception: One of `USER_ERRORS`; a failed episode is not an error.
+        RecordNotStoredError: The database is not writable.
         WorkerStartError: A worker cannot be started.
     """
     with RunLock(options.target) as lock, open_database(options.target, create=True) as database:
@@ -143,30 +143,30 @@ def _session(
     database: ResultDatabase, number: int, lock: RunLock, options: SessionOptions, experiment: Experiment | None
 ) -> ExperimentSession:
     if lock.ended_processes:
-        print(f"ended {lock.ended_processes} processes that an earlier run had left behind", file=sys.stderr)
+        print(f"ended {lock.ended_processes} processes of an earlier run", file=sys.stderr)
     (description,) = (one.description for one in database.experiments() if one.id == number)
     settings = settings_of(experiment, description)
     return ExperimentSession(database, number, lock.run, options, settings)
 
 
 def _unfinished(database: ResultDatabase, name: str | None, target: str) -> int:
-    """Returns the experiment to go on with."""
+    """Returns the identifier of the experiment to continue."""
     if name is not None:
         return database.find(name)
     stored = database.experiments()
-    open_ones = [one for one in stored if one.finished < one.planned]
-    if len(open_ones) == 1:
-        return open_ones[0].id
+    unfinished = [one for one in stored if one.finished < one.planned]
+    if len(unfinished) == 1:
+        return unfinished[0].id
     if len(stored) == 1:
         return stored[0].id
-    names = ", ".join(one.description.name for one in open_ones or stored)
-    count = f"{len(open_ones)} experiments that are not finished" if open_ones else "no experiment that is not finished"
+    names = ", ".join(one.description.name for one in unfinished or stored)
+    count = f"{len(unfinished)} unfinished experiments" if unfinished else "no unfinished experiment"
     shown = shown_target(target)
     raise CommandError(f"{shown} has {count}; name one with --experiment; allowed: {names or 'none, it is empty'}")
 
 
 def experiment_path(given: Path) -> Path:
-    """Returns the path of an experiment file: as given, or in the API package when it is only the name of one."""
+    """Returns the path of an experiment file: as given, or in the API package for a bare name."""
     if given.exists() or given.name != str(given):
         return given
     try:

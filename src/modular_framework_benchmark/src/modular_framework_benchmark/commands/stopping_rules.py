@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the text of a stored experiment says about running it: its workers and its stopping rule."""
+"""Execution settings of an experiment: workers and stopping rule."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """How an experiment is run, which does not decide its episodes."""
+    """Execution settings of an experiment, which do not determine its episodes."""
 
     workers: int
     stopping: Stopping
 
 
 def settings_of(experiment: Experiment | None, description: ExperimentDescription) -> RunSettings:
-    """Returns the settings of an experiment, or of the text that the database has of it."""
+    """Returns the settings of an experiment, or of its text in the database."""
     if experiment is not None:
         return RunSettings(experiment.workers, experiment.stopping)
     return RunSettings(*read_run_settings(description.text, description.metrics))
 
 
 def stopping_rule(stopping: Stopping) -> StoppingRule | None:
-    """Returns the rule that decides when an experiment ends; None for one that runs all its trials."""
+    """Returns the stopping rule of an experiment, or None for a fixed number of trials."""
     match stopping.kind:
         case StoppingKind.FIXED:
             return None
         case StoppingKind.SEQUENTIAL:
-            # imported where it is needed: the statistics take seconds to import
+            # Imported here, because the statistics are slow to import.
             from modular_framework_benchmark.statistics.stopping import AnytimeValid
 
             return AnytimeValid(stopping.metric, stopping.smallest_difference)

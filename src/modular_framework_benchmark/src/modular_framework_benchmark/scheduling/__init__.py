@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the episodes of an experiment on workers, each exactly once."""
+"""Distributes the episodes of an experiment to workers; each episode runs exactly once."""

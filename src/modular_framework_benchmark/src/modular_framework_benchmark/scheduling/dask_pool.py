@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Workers of a Dask cluster: each episode is a task, and only this process writes results.
+"""Worker pool on a Dask cluster: each episode is a task, and only this process writes results.
 
-A task runs its episode in a process of its own beside the Dask worker, as a local run does: ROS nodes need a main
-thread, and what an episode leaves behind ends with its process.
+A task runs its episode in a separate process beside the Dask worker, like a local run. ROS nodes need a main thread,
+and resources that an episode leaves open end with its process.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from modular_framework_benchmark.scheduling.local_pool import LocalPool, Schedul
 from modular_framework_benchmark.scheduling.worker_process import WorkerStartError
 
 POLL_S = 0.25
-"""Time between two looks of a task whether it is still wanted [s]."""
+"""Period of a task's check whether it was released [s]."""
 CONNECT_TIMEOUT_S = 20.0
 NO_WORKER_TIMEOUT_S = 120.0
 
@@ -32,8 +32,8 @@ class DaskPool:
     """Workers of a Dask cluster; implements `Pool`. Each thread of a Dask worker is a slot.
 
     Args:
-        address: Of the scheduler, such as tcp://127.0.0.1:8786.
-        make_runner: Makes the runners; its module has to be importable on the workers.
+        address: Address of the scheduler, such as tcp://127.0.0.1:8786.
+        make_runner: Factory of the runners, from a module that the workers can import.
         run: Mark of the run, see `marked_processes`.
         logs: Folder of the log files, on a file system that all workers share.
     """
@@ -51,7 +51,7 @@ class DaskPool:
         self._futures: dict[Any, tuple[str, EpisodeSpec, float]] = {}
 
     def free(self) -> list[str]:
-        """Returns the slots without a task: WORKER_ADDRESS#NUMBER."""
+        """Returns the slots without a task as WORKER_ADDRESS#NUMBER."""
         workers = self._client.scheduler_info(n_workers=-1)["workers"]
         slots = [f"{address}#{number}" for address, info in workers.items() for number in range(info["nthreads"])]
         taken = {slot for slot, _, _ in self._futures.values()}
@@ -59,7 +59,13 @@ class DaskPool:
         return free[: max(0, len(slots) - len(self._futures))]
 
     def submit(self, slot: str, spec: EpisodeSpec, folder: Path) -> None:
-        """Has an episode run, on the worker of that slot unless it is lost."""
+        """Submits an episode to the worker of a slot, or to another worker if it is lost.
+
+        Args:
+            slot: Free slot.
+            spec: Specification of the episode.
+            folder: Folder of the episode's files.
+        """
         future = self._client.submit(
             run_task, self._make_runner, self._run, self._logs, spec, folder,
             key=f"episode-{spec.number}-{uuid.uuid4().hex}",
@@ -68,7 +74,7 @@ class DaskPool:
         self._futures[future] = slot, spec, time.time()
 
     def wait(self, timeout_s: float) -> list[EpisodeRecord]:
-        """Returns the records of the episodes that have ended.
+        """Returns the records of ended episodes.
 
         Raises:
             WorkerStartError: A worker cannot run episodes of this experiment.
@@ -89,18 +95,18 @@ class DaskPool:
             return record
         except WorkerStartError:
             raise
-        except Exception as error:  # a lost worker, or whatever a task has raised
+        except Exception as error:  # a lost worker, or an error of the task
             cause = f"its Dask task failed: {type(error).__name__}: {error}"
             return unrun_record(spec, EpisodeStatus.BROKEN, cause, begun, time.time() - begun)
 
     def close(self) -> None:
-        """Ends the workers' processes, and leaves the scheduler."""
+        """Ends the workers' processes and disconnects from the scheduler."""
         if self._client.status == "running":
             self._client.run(close_runners, self._run)
         self._client.close()
 
     def kill(self) -> None:
-        """Takes the tasks back: they end their episodes, and the workers go on with other work."""
+        """Releases the tasks, which abort their episodes; the Dask workers stay available."""
         for future in self._futures:
             future.release()
         self._futures.clear()
@@ -108,11 +114,19 @@ class DaskPool:
 
 
 _pools: dict[tuple[str, int], LocalPool] = {}
-"""In a Dask worker: the process of each thread, kept from one episode to the next, by the run and the thread."""
+"""Process of each thread in a Dask worker, kept between episodes, keyed by run and thread."""
 
 
 def run_task(make_runner: RunnerFactory, run: str, logs: Path, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
-    """Runs an episode in a Dask worker, until it ends or is not wanted any more."""
+    """Runs an episode in a Dask worker until it ends or is released.
+
+    Args:
+        make_runner: Factory of the runners.
+        run: Mark of the run, see `marked_processes`.
+        logs: Folder of the log files.
+        spec: Specification of the episode.
+        folder: Folder of the episode's files.
+    """
     worker = distributed.get_worker()
     key = thread_state.key
     name = f"{worker.name}".replace("/", "_").replace(":", "_")
@@ -131,7 +145,7 @@ def run_task(make_runner: RunnerFactory, run: str, logs: Path, spec: EpisodeSpec
         pool.kill()
         raise
     pool.kill()
-    raise InterruptedError("the run that wanted this episode has ended")
+    raise InterruptedError("the run of this episode has ended")
 
 
 def _is_wanted(worker: Any, key: str) -> bool:

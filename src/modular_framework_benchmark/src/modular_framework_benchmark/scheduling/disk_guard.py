@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ends a run cleanly before the disk is full, or before its records take more than they may."""
+"""Ends a run cleanly before the disk is full or the records exceed their limit."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import shutil
 from pathlib import Path
 
 MIN_FREE_BYTES = 500e6
-"""What stays free on the disk, for the database, the report and everybody else."""
+"""Space to keep free on the disk for the database, the report and other users [B]."""
 GB = 1e9
 
 
 class DiskGuard:
-    """Watches the folders of episodes.
+    """Monitors the disk space of episodes.
 
     Args:
-        folder: Folder with the folders of the episodes; it need not be there yet.
-        limit_bytes: What all of them may take.
-        min_free_bytes: What has to stay free on their disk.
+        folder: Parent folder of the episodes' folders, which may be missing.
+        limit_bytes: Maximum size of all episodes [B].
+        min_free_bytes: Space to keep free on the disk [B].
     """
 
     def __init__(self, folder: Path, limit_bytes: float = math.inf, min_free_bytes: float = MIN_FREE_BYTES) -> None:
@@ -27,16 +27,16 @@ class DiskGuard:
         self._used, self._largest = sum(sizes), max(sizes, default=0)
 
     def ended(self, folder: Path) -> None:
-        """Counts the files of an episode that has ended."""
+        """Adds the files of an ended episode to the used space."""
         size = tree_size(folder)
         self._used += size
         self._largest = max(self._largest, size)
 
     def reason_to_stop(self, running: int) -> str:
-        """Returns why no further episode may begin; "" if one may.
+        """Returns the reason why no episode may start; "" if one may.
 
         Args:
-            running: Episodes that run: each is expected to take as much as the largest so far, and so is the next one.
+            running: Number of running episodes; each is assumed to need as much space as the largest episode so far.
         """
         expected = (running + 1) * self._largest
         if self._used + expected > self._limit_bytes:
@@ -47,10 +47,10 @@ class DiskGuard:
         there = next(path for path in (self._folder, *self._folder.parents) if path.is_dir())
         free = shutil.disk_usage(there).free
         if free - expected < self._min_free_bytes:
-            return f"the disk of {there} is almost full: {free / GB:.3g} GB are free"
+            return f"the disk of {there} is almost full: {free / GB:.3g} GB free"
         return ""
 
 
 def tree_size(folder: Path) -> int:
-    """Returns the size of all files below a folder [B]."""
+    """Returns the total size of the files in a folder [B]."""
     return sum(path.lstat().st_size for path in folder.rglob("*") if not path.is_dir()) if folder.is_dir() else 0

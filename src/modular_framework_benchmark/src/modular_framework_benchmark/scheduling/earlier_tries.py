@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Notes each try of an episode in a file beside its folder, so that a try that was killed leaves a trace."""
+"""Log of an episode's attempts, in a file beside its folder, so that a killed attempt leaves a trace."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import platform
 from pathlib import Path
 
 EARLIER_TRIES = "earlier_tries"
-"""Part of the snapshot with a text for each try that gave no record."""
+"""Snapshot part with a text for each attempt without a record."""
 
 
 def begin_try(folder: Path) -> list[str]:
-    """Notes that a try begins; returns the texts of the earlier ones.
+    """Logs the start of an attempt; returns the texts of earlier attempts.
 
     Args:
-        folder: Of the episode; what is above it is there.
+        folder: Folder of the episode, whose parent exists.
     """
     earlier = _notes(folder).read_text(encoding="utf-8").splitlines() if _notes(folder).is_file() else []
     now = datetime.datetime.now(datetime.UTC).isoformat(" ", "seconds")
@@ -24,12 +24,12 @@ def begin_try(folder: Path) -> list[str]:
 
 
 def end_try(folder: Path, cause: str) -> None:
-    """Notes why the last try ended without a record."""
+    """Logs why the latest attempt ended without a record."""
     _add(folder, f": {' '.join(cause.split())}")
 
 
 def forget_tries(folder: Path) -> None:
-    """Removes the notes of an episode whose record is stored."""
+    """Removes the log of an episode whose record is stored."""
     _notes(folder).unlink(missing_ok=True)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives the episodes out in their order, those that can share a running stack to the same worker."""
+"""Queue of episodes that assigns episodes with a common stack to the same worker."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from modular_framework_benchmark.records.episode import EpisodeSpec
 
 
 class EpisodeQueue:
-    """The episodes that are still to be run.
+    """Queue of the remaining episodes.
 
     Args:
-        episodes: In the order of the run.
+        episodes: Episodes in the order of the run.
     """
 
     def __init__(self, episodes: Iterable[EpisodeSpec]) -> None:
@@ -24,23 +24,23 @@ class EpisodeQueue:
             if not self._groups or self._groups[-1][0] != stack:
                 self._groups.append((stack, deque()))
             self._groups[-1][1].append(spec)
-        self._groups.reverse()  # the next one is the last of the list, from where it is taken off at no cost
+        self._groups.reverse()  # pop() removes the last element in constant time
         self._owned: dict[str, deque[EpisodeSpec]] = {}
-        self._running: dict[str, str] = {}  # the stack of the last episode of each slot
+        self._running: dict[str, str] = {}  # stack of each slot's latest episode
 
     def __len__(self) -> int:
         return sum(len(group) for _, group in self._groups) + sum(len(group) for group in self._owned.values())
 
     def next_for(self, slot: str, alone: bool = False) -> EpisodeSpec | None:
-        """Returns the next episode for a slot; None when there is none left for it.
+        """Returns the next episode for a slot, or None without an episode for it.
 
-        A slot goes through the episodes of one stack, then takes the next ones that no other slot has. At the end it
-        helps the slot that has most left. It leaves that slot its last episode where it would have to start another
-        stack for it: the other one has it running.
+        A slot runs the episodes of one stack, then those of the next unassigned stack. Without an unassigned stack, it
+        helps the slot with most remaining episodes. It leaves that slot the last episode if it would have to start
+        another stack for it.
 
         Args:
             slot: Name of the slot.
-            alone: Whether no other slot runs an episode; then this one takes whatever is left.
+            alone: Whether no other slot runs an episode, so that this slot takes any remaining episode.
         """
         own = self._owned.get(slot)
         if not own and self._groups:

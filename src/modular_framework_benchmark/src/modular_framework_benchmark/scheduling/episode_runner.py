@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a mode provides to the workers: something that runs one episode after the other."""
+"""Interface between modes and workers: a runner runs one episode after another."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSp
 
 
 class EpisodeRunner(Protocol):
-    """Runs episodes in one worker process, in its main thread."""
+    """Runs episodes in the main thread of a worker process."""
 
     def run(self, spec: EpisodeSpec, folder: Path) -> EpisodeRecord:
-        """Runs an episode, within its time limit.
+        """Runs an episode within its time limit.
 
         Args:
-            spec: What to run.
-            folder: Where its files go; is there, and empty.
+            spec: Specification of the episode.
+            folder: Existing empty folder for the episode's files.
 
         Returns:
-            What it gave; a launch that dies is a record with status BROKEN, not an exception.
+            Record of the episode; a launch that dies gives status BROKEN instead of an exception.
         """
 
     def close(self) -> None:
-        """Ends what it keeps running between episodes; may be called twice."""
+        """Ends processes that are kept between episodes; repeated calls are allowed."""
 
 
 RunnerFactory = Callable[[], EpisodeRunner]
-"""Makes the runner of a worker. It is pickled: a class, or a function of a module."""
+"""Factory of a worker's runner. It must be picklable: a class, or a function of a module."""
 
 
 def unrun_record(
     spec: EpisodeSpec, status: EpisodeStatus, cause: str, begun: float, wall_s: float, worker: str = ""
 ) -> EpisodeRecord:
-    """Returns the record of an episode whose runner gave none.
+    """Returns the record of an episode without a record from its runner.
 
     Args:
-        spec: The episode.
-        status: How it ended.
-        cause: Why.
-        begun: When it started [s since 1970].
-        wall_s: How long it took [s].
-        worker: Who ran it.
+        spec: Specification of the episode.
+        status: Final status.
+        cause: Cause of the failure.
+        begun: Start time [s since 1970].
+        wall_s: Real duration [s].
+        worker: Name of the worker.
     """
     names = [str(one if isinstance(one, str) else one["name"]) for one in spec.settings.get("metrics", ())]
     return EpisodeRecord(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the pending episodes of an experiment of a database, each exactly once."""
+"""Runs the pending episodes of a stored experiment, each exactly once."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ POLL_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class RunEnd:
-    """How a run ended.
+    """Result of a run.
 
     Attributes:
-        episodes: How many episodes it ran.
-        stopped_because: Why the stopping rule ended it early; empty when it did not.
-        disk_full: Why the disk ended it early; empty when it did not.
+        episodes: Number of episodes that ran.
+        stopped_because: Reason of the stopping rule for an early end; "" for none.
+        disk_full: Reason of the disk guard for an early end; "" for none.
     """
 
     episodes: int
@@ -41,14 +41,14 @@ class RunEnd:
 
 
 class ExperimentRun:
-    """Gives the pending episodes to a pool, and writes each record as it comes.
+    """Distributes the pending episodes to a pool and writes each record when it arrives.
 
     Args:
-        database: Where the experiment is, and the records go.
-        experiment: Its identifier there.
-        folder: Where the folders of the episodes are made; below the folder of the database.
-        rule: When to stop; None: when all episodes have ended.
-        disk: Ends the run before the disk is full; None: at the default limit.
+        database: Database of the experiment and its records.
+        experiment: Identifier of the experiment in the database.
+        folder: Parent folder of the episodes' folders, below the folder of the database.
+        rule: Stopping rule; None to run all episodes.
+        disk: Disk guard; None for the default limit.
     """
 
     def __init__(
@@ -66,18 +66,18 @@ class ExperimentRun:
 
     @property
     def pending(self) -> int:
-        """Returns how many episodes are still to be run."""
+        """Returns the number of remaining episodes."""
         return len(self._pending)
 
     def run(self, make_pool: Callable[[], Pool], progress: Progress) -> RunEnd:
-        """Runs the episodes; whatever ends it early, an exception or a signal, ends the running episodes too.
+        """Runs the episodes; an early end through an exception or a signal also ends the running episodes.
 
         Args:
-            make_pool: Makes the workers; not called when there is nothing to do.
-            progress: Shows how far it is.
+            make_pool: Factory of the workers, not called without pending episodes.
+            progress: Display of the progress.
 
         Raises:
-            RecordNotStoredError: The database cannot be written; the record that was to be written is kept in a file.
+            RecordNotStoredError: The database is not writable; the record is saved in a file.
             WorkerStartError: A worker cannot be started.
         """
         if not self._pending:
@@ -104,7 +104,7 @@ class ExperimentRun:
         return RunEnd(progress.ended, reason, self._disk_full) if len(queue) else RunEnd(progress.ended)
 
     def _fill(self, pool: Pool, queue: EpisodeQueue, running: int) -> int:
-        """Gives an episode to each free slot that can take one while the disk has room; returns how many run then."""
+        """Submits an episode to each suitable free slot while the disk has space; returns the running episodes."""
         for slot in pool.free():
             self._disk_full = self._disk_full or self._disk.reason_to_stop(running)
             if self._disk_full:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Workers on this machine: processes that run one episode each at a time."""
+"""Worker pool on this machine: processes that run one episode each at a time."""
 
 from __future__ import annotations
 
@@ -16,43 +16,49 @@ from modular_framework_benchmark.scheduling.episode_runner import RunnerFactory,
 from modular_framework_benchmark.scheduling.worker_process import Running, WorkerProcess
 
 GRACE_S = 60.0
-"""Time a runner has beyond the limit of its episode, before it is killed: to start, stop and write [s]."""
-TRIES = 2
-"""How often an episode is started whose worker dies."""
+"""Time beyond an episode's limit after which its runner is killed, for starting, stopping and writing [s]."""
+MAX_TRIES = 2
+"""Maximum number of attempts of an episode whose worker dies."""
 
 
 class SchedulerError(Exception):
-    """A pool of workers elsewhere cannot be used; the message says why and what to do."""
+    """A remote worker pool is unusable; the message gives the reason and the remedy."""
 
 
 class Pool(Protocol):
-    """Runs episodes on workers, each of which has one or several slots."""
+    """Runs episodes on workers with one or several slots each."""
 
     def free(self) -> list[str]:
-        """Returns the slots that can take an episode."""
+        """Returns the free slots."""
 
     def submit(self, slot: str, spec: EpisodeSpec, folder: Path) -> None:
-        """Has an episode run, in that slot if it can."""
+        """Submits an episode, to the given slot if possible.
+
+        Args:
+            slot: Free slot.
+            spec: Specification of the episode.
+            folder: Folder of the episode's files.
+        """
 
     def wait(self, timeout_s: float) -> list[EpisodeRecord]:
-        """Returns the records of episodes that have ended, as soon as there is one, or none after a time."""
+        """Returns the records of ended episodes as soon as there is one, or none after the timeout [s]."""
 
     def close(self) -> None:
-        """Ends the workers, which are idle."""
+        """Ends the idle workers."""
 
     def kill(self) -> None:
-        """Ends the workers and what they run, at once; may be called twice."""
+        """Kills the workers and their episodes; repeated calls are allowed."""
 
 
 class LocalPool:
     """Worker processes on this machine; implements `Pool`.
 
     Args:
-        make_runner: Makes the runner of each worker.
-        workers: How many episodes run at the same time.
+        make_runner: Factory of the workers' runners.
+        workers: Number of episodes that run in parallel.
         run: Mark of the run, see `marked_processes`.
         logs: Folder of the workers' log files.
-        prefix: What the names of the workers begin with.
+        prefix: Prefix of the workers' names.
     """
 
     def __init__(self, make_runner: RunnerFactory, workers: int, run: str, logs: Path, prefix: str = "worker_") -> None:
@@ -65,22 +71,27 @@ class LocalPool:
         return [name for name, worker in self._workers.items() if worker is None or worker.running is None]
 
     def submit(self, slot: str, spec: EpisodeSpec, folder: Path) -> None:
-        """Has an idle worker run an episode; starts the worker if there is none yet.
+        """Runs an episode on an idle worker, which is started if necessary.
+
+        Args:
+            slot: Name of the worker.
+            spec: Specification of the episode.
+            folder: Folder of the episode's files.
 
         Raises:
             WorkerStartError: The worker cannot be started.
         """
-        self._begin(slot, spec, folder, tries=1)
+        self._start_episode(slot, spec, folder, tries=1)
 
-    def _begin(self, slot: str, spec: EpisodeSpec, folder: Path, tries: int) -> None:
+    def _start_episode(self, slot: str, spec: EpisodeSpec, folder: Path, tries: int) -> None:
         if slot not in self._ready:
-            self._start(slot)
+            self._start_worker(slot)
         worker = self._workers[slot]
         assert worker is not None
         worker.begin(spec, folder, tries)
 
-    def _start(self, slot: str) -> None:
-        """Waits until a worker is ready; all of them are launched at once, so that they import together."""
+    def _start_worker(self, slot: str) -> None:
+        """Waits until a worker is ready; launches all workers at once, so that they import in parallel."""
         for name, worker in self._workers.items():
             if worker is None:
                 launched = WorkerProcess(name, self._make_runner, self._run, self._logs / f"{name}.log")
@@ -92,19 +103,19 @@ class LocalPool:
         self._ready.add(slot)
 
     def wait(self, timeout_s: float) -> list[EpisodeRecord]:
-        """Returns the records of episodes that have ended. An episode whose worker died runs again, once.
+        """Returns the records of ended episodes. An episode whose worker died is repeated once.
 
         Raises:
-            WorkerStartError: A worker that died cannot be started again.
+            WorkerStartError: A worker that died cannot be restarted.
         """
         busy = {worker.connection: worker for worker in self._workers.values() if worker and worker.running}
         ready = wait(list(busy), timeout_s)
-        records = [self._after(worker) for connection, worker in busy.items() if connection in ready]
-        records += [self._over_limit(worker) for connection, worker in busy.items() if connection not in ready]
+        records = [self._finish(worker) for connection, worker in busy.items() if connection in ready]
+        records += [self._kill_overdue(worker) for connection, worker in busy.items() if connection not in ready]
         return [record for record in records if record is not None]
 
-    def _after(self, worker: WorkerProcess) -> EpisodeRecord | None:
-        """Returns the record of a worker that has one; starts the episode of one that has died again."""
+    def _finish(self, worker: WorkerProcess) -> EpisodeRecord | None:
+        """Returns the record of a worker, or restarts its episode if the worker died."""
         running = worker.running
         assert running is not None
         record = worker.finish()
@@ -113,19 +124,19 @@ class LocalPool:
         cause = worker.cause_of_death()
         self._end(worker)
         end_try(running.folder, cause)
-        if running.tries < TRIES:
-            self._begin(worker.name, running.spec, running.folder, running.tries + 1)
+        if running.tries < MAX_TRIES:
+            self._start_episode(worker.name, running.spec, running.folder, running.tries + 1)
             return None
-        return self._unrun(running, worker, EpisodeStatus.BROKEN, f"{cause} (it was tried {running.tries} times)")
+        return self._unrun(running, worker, EpisodeStatus.BROKEN, f"{cause} (after {running.tries} attempts)")
 
-    def _over_limit(self, worker: WorkerProcess) -> EpisodeRecord | None:
+    def _kill_overdue(self, worker: WorkerProcess) -> EpisodeRecord | None:
         running = worker.running
         assert running is not None
         limit_s = float(running.spec.settings.get("time_limit", float("inf"))) + GRACE_S
         if time.monotonic() - running.started < limit_s:
             return None
         self._end(worker)
-        cause = f"the runner did not return within {limit_s:g} s, {GRACE_S:g} s more than the time limit; it was killed"
+        cause = f"the runner exceeded {limit_s:g} s, the time limit plus {GRACE_S:g} s; it was killed"
         return self._unrun(running, worker, EpisodeStatus.TIMED_OUT, cause)
 
     def _unrun(self, running: Running, worker: WorkerProcess, status: EpisodeStatus, cause: str) -> EpisodeRecord:
@@ -138,11 +149,11 @@ class LocalPool:
         self._ready.discard(worker.name)
 
     def close(self) -> None:
-        """Ends the workers; those that are idle end what they keep running by themselves."""
+        """Ends the workers; idle workers end their own processes."""
         self._end_all(WorkerProcess.close)
 
     def kill(self) -> None:
-        """Ends the workers and what they run."""
+        """Kills the workers and their episodes."""
         self._end_all(WorkerProcess.kill)
 
     def _end_all(self, end: Callable[[WorkerProcess], None]) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds and ends the processes that a worker has started, wherever they moved to.
+"""Finds and kills all processes that a worker started, regardless of their process groups.
 
-A process group is not enough: roslaunch puts each node into a session of its own. So a worker has a mark in its
-environment, which every process inherits that is started below it.
+Process groups are not sufficient, because roslaunch starts each node in a new session. A worker therefore has a mark in
+its environment, which all its descendants inherit.
 """
 
 from __future__ import annotations
@@ -14,18 +14,22 @@ __all__ = ["MARK", "end_marked_processes", "marked_processes"]
 
 
 def marked_processes(mark: str) -> list[int]:
-    """Returns the identifiers of the other processes whose mark begins with a text.
+    """Returns the ids of other processes whose mark starts with a text.
 
     Args:
-        mark: RUN/ for all processes of a run, or RUN/WORKER/ for those of one worker.
+        mark: RUN/ for all processes of a run, or RUN/WORKER/ for those of a worker.
     """
     return processes_with(MARK, mark, prefix=True)
 
 
 def end_marked_processes(mark: str, timeout_s: float = 10.0) -> int:
-    """Kills the processes that `marked_processes` returns, until there are none; returns how many there were.
+    """Kills the processes of `marked_processes` until none remains; returns their number.
+
+    Args:
+        mark: See `marked_processes`.
+        timeout_s: Maximum duration [s].
 
     Raises:
-        TimeoutError: Some are still there after `timeout_s` [s].
+        TimeoutError: Processes remain after the timeout.
     """
     return kill_processes_with(MARK, mark, prefix=True, timeout_s=timeout_s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows how far an experiment is: a bar on a terminal, a line now and then elsewhere."""
+"""Displays the progress of an experiment: a bar on a terminal, periodic lines elsewhere."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ STATUS_WORDS = {
 
 
 class Progress:
-    """Counts episodes and shows the counts.
+    """Counts episodes and displays the counts.
 
     Args:
-        total: How many episodes the experiment has.
-        finished: How many of them had ended before this run.
-        stream: Where to show it.
-        clock: Gives the time [s].
+        total: Number of episodes of the experiment.
+        finished: Number of episodes that ended before this run.
+        stream: Stream of the display.
+        clock: Clock [s].
     """
 
     def __init__(self, total: int, finished: int, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
@@ -41,21 +41,27 @@ class Progress:
 
     @property
     def ended(self) -> int:
-        """Returns how many episodes ended in this run."""
+        """Returns the number of episodes that ended in this run."""
         return sum(self._counts.values())
 
     def add(self, record: EpisodeRecord) -> None:
-        """Counts an episode that has ended; tells what is broken at once."""
+        """Counts an ended episode; reports broken and invalid episodes immediately."""
         self._counts[record.status] += 1
         episode = f"episode {record.spec.number} ({record.spec.key})"
         if record.status in (EpisodeStatus.BROKEN, EpisodeStatus.INVALID):
             self._line(f"{episode} is {STATUS_WORDS[record.status]}: {record.cause}")
         elif record.snapshot.get(EARLIER_TRIES):
-            self._line(f"{episode} ran again after a try without a record: {'; '.join(record.snapshot[EARLIER_TRIES])}")
+            self._line(
+                f"{episode} was repeated after attempts without a record: {'; '.join(record.snapshot[EARLIER_TRIES])}"
+            )
         self.show()
 
     def show(self, *, now: bool = False) -> None:
-        """Shows the counts, if that is due."""
+        """Displays the counts if the period has passed.
+
+        Args:
+            now: Whether to ignore the period.
+        """
         time_s = self._clock()
         period_s = BAR_PERIOD_S if self._is_terminal else LINE_PERIOD_S
         if not now and time_s - self._shown < period_s:
@@ -68,27 +74,27 @@ class Progress:
         self._stream.flush()
 
     def end(self) -> None:
-        """Shows the counts for the last time."""
+        """Displays the final counts."""
         self.show(now=True)
         if self._is_terminal:
             self._stream.write("\n")
             self._stream.flush()
 
     def text(self) -> str:
-        """Returns the counts and the time left in words."""
+        """Returns the counts and the remaining time as text."""
         done = self._before + self.ended
         counts = ", ".join(f"{self._counts[status]} {word}" for status, word in STATUS_WORDS.items())
         before = f" ({self._before} before)" if self._before else ""
-        return f"{done} of {self._total} episodes{before}: {counts}; {self._time_left(self._total - done)}"
+        return f"{done} of {self._total} episodes{before}: {counts}; {self._remaining_time(self._total - done)}"
 
-    def _time_left(self, left: int) -> str:
-        if left <= 0:
+    def _remaining_time(self, remaining: int) -> str:
+        if remaining <= 0:
             return "done"
         if self.ended == 0:
-            return "time left: not known yet"
-        seconds = (self._clock() - self._start) / self.ended * left
+            return "remaining time unknown"
+        seconds = (self._clock() - self._start) / self.ended * remaining
         hours, rest = divmod(round(seconds), 3600)
-        return f"about {hours}:{rest // 60:02}:{rest % 60:02} left"
+        return f"about {hours}:{rest // 60:02}:{rest % 60:02} remaining"
 
     def _bar(self) -> str:
         filled = BAR_WIDTH * (self._before + self.ended) // max(self._total, 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets one run at a time use a database from this machine, and ends what a killed one has left behind."""
+"""Lock that allows one run per database on this machine, and kills processes left by a killed run."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class RunLockError(Exception):
 
 
 class RunLock:
-    """Held while a run uses a database.
+    """Lock of a database during a run.
 
     Args:
         target: Path of the database file, or its URL.
-        folder: Where the files of the locks are; by default the framework's own folder.
+        folder: Folder of the lock files; the framework's folder by default.
     """
 
     def __init__(self, target: str, folder: Path | None = None) -> None:
@@ -34,10 +34,10 @@ class RunLock:
         self._handle = -1
 
     def __enter__(self) -> Self:
-        """Takes the lock, and ends the processes of an earlier run that was killed.
+        """Acquires the lock and kills the processes of an earlier run that was killed.
 
         Raises:
-            RunLockError: Another run holds it, or processes of an earlier one cannot be ended.
+            RunLockError: Another run holds the lock, or processes of an earlier run cannot be killed.
         """
         self._file.parent.mkdir(parents=True, exist_ok=True)
         self._handle = os.open(self._file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)

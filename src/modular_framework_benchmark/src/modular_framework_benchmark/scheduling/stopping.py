@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says after each trial whether an experiment goes on."""
+"""Applies a stopping rule after each trial of an experiment."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ from modular_framework_benchmark.records.results import ExperimentResults
 if TYPE_CHECKING:  # the statistics take seconds to import
     from modular_framework_benchmark.statistics.stopping import StoppingRule
 
-PAUSE_SHARE = 10.0
-"""After a look at the results, none for this many times as long as it took: looking must not cost the run."""
+PAUSE_FACTOR = 10.0
+"""Pause between interim analyses as a multiple of their duration, which bounds their cost."""
 
 
 class TrialWatch:
-    """Asks a stopping rule when all episodes of a trial have ended.
+    """Applies a stopping rule when all episodes of a trial have ended.
 
     Args:
-        rule: The rule; None for one that never stops.
-        load: Loads the results so far.
-        pending: The episodes that are still to be run.
+        rule: Stopping rule; None to run all episodes.
+        load: Function that loads the results so far.
+        pending: Remaining episodes.
     """
 
     def __init__(
         self, rule: StoppingRule | None, load: Callable[[], ExperimentResults], pending: Iterable[EpisodeSpec]
     ) -> None:
         self._rule, self._load = rule, load
-        self._left: dict[int, int] = {}
+        self._remaining: dict[int, int] = {}
         for spec in pending:
-            self._left[spec.trial] = self._left.get(spec.trial, 0) + 1
-        self._look = rule is not None  # the results of an earlier run may be enough
-        self._next_look = 0.0
+            self._remaining[spec.trial] = self._remaining.get(spec.trial, 0) + 1
+        self._is_due = rule is not None  # results of an earlier run may suffice
+        self._next_time = 0.0
 
     def ended(self, spec: EpisodeSpec) -> None:
-        """Notes that an episode has ended."""
-        self._left[spec.trial] -= 1
-        self._look = self._look or self._left[spec.trial] == 0
+        """Counts an ended episode."""
+        self._remaining[spec.trial] -= 1
+        self._is_due = self._is_due or self._remaining[spec.trial] == 0
 
     def reason_to_stop(self) -> str:
-        """Asks the rule, if a trial has ended since it was asked last, and that is long enough ago.
+        """Applies the rule if a trial has ended since the last call and the pause has passed.
 
         Returns:
-            Why the experiment stops; empty when it goes on.
+            Reason to stop the experiment; "" to continue.
         """
-        if self._rule is None or not self._look or time.monotonic() < self._next_look:
+        if self._rule is None or not self._is_due or time.monotonic() < self._next_time:
             return ""
         start = time.monotonic()
         decision = self._rule.decide(self._load())
         end = time.monotonic()
-        self._look, self._next_look = False, end + PAUSE_SHARE * (end - start)
+        self._is_due, self._next_time = False, end + PAUSE_FACTOR * (end - start)
         return decision.reason if decision.stop else ""

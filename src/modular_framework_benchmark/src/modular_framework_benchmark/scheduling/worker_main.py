@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The program of a worker process: `python -m modular_framework_benchmark.scheduling.worker_main CONNECTION LIFELINE`.
+"""Program of a worker process: `python -m modular_framework_benchmark.scheduling.worker_main CONNECTION LIFELINE`.
 
-It makes its runner, and then runs one episode after the other as they come through the connection. When the process
-that started it is gone, it ends what it has started, and itself.
+The process creates its runner and then runs the episodes that arrive through the connection. When its parent process
+has ended, it kills its descendants and itself.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ EXIT_NO_RUNNER = 3
 
 
 def main(arguments: list[str]) -> int:
-    """Runs episodes until it is told to end."""
+    """Runs episodes until the parent requests the end."""
     connection = Connection(int(arguments[0]))
     threading.Thread(target=_end_with_parent, args=(int(arguments[1]),), daemon=True).start()
     try:
-        # behind its own: catkin packages put their sources in front, where their generated messages are missing
+        # Appended, because catkin packages prepend their sources, which lack generated messages.
         sys.path += [path for path in connection.recv() if path not in sys.path]
         make_runner: RunnerFactory = connection.recv()
         runner = make_runner()
     except EOFError:
         return 0
-    except Exception:  # whatever the mode's code raises is told to the one who started the worker
+    except Exception:  # any error of the mode's code is reported to the parent
         connection.send(traceback.format_exc())
         return EXIT_NO_RUNNER
     connection.send(None)
@@ -61,8 +61,13 @@ def _serve(connection: Connection, runner: EpisodeRunner, make_runner: RunnerFac
 def run_episode(runner: EpisodeRunner, spec: EpisodeSpec, folder: Path) -> tuple[EpisodeRecord, bool]:
     """Runs an episode in an empty folder.
 
+    Args:
+        runner: Runner of the worker.
+        spec: Specification of the episode.
+        folder: Folder of the episode's files.
+
     Returns:
-        Its record, and whether the runner can be used again: not after an exception.
+        The record, and whether the runner is reusable, which it is not after an exception.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -74,7 +79,7 @@ def run_episode(runner: EpisodeRunner, spec: EpisodeSpec, folder: Path) -> tuple
         if earlier:
             record = dataclasses.replace(record, snapshot={**record.snapshot, EARLIER_TRIES: earlier})
         return record, True
-    except Exception as error:  # a fault of the mode's code or of a user's: the others can run
+    except Exception as error:  # a fault of mode or user code, which must not stop other episodes
         traceback.print_exc()
         with contextlib.suppress(Exception):
             runner.close()
@@ -83,7 +88,7 @@ def run_episode(runner: EpisodeRunner, spec: EpisodeSpec, folder: Path) -> tuple
 
 
 def _end_with_parent(lifeline: int) -> None:
-    """Waits until the other end of a pipe is closed: by the parent, or by its death."""
+    """Waits until the other end of a pipe is closed by the parent or by its death."""
     while os.read(lifeline, 1):
         pass
     _end_with_children()

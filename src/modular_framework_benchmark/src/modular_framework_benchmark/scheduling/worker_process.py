@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A worker process as the scheduler sees it: start it, give it an episode, see what became of it, end it."""
+"""Handle of a worker process: starts the process, submits episodes, detects its death, ends it."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from modular_framework_benchmark.scheduling.episode_runner import RunnerFactory
 from modular_framework_benchmark.scheduling.marked_processes import MARK, end_marked_processes
 
 START_TIMEOUT_S = 120.0
-"""Longest time until a worker is ready: imports, on a busy machine [s]."""
+"""Maximum time until a worker is ready, which includes imports on a busy machine [s]."""
 CLOSE_TIMEOUT_S = 60.0
 
 
 class WorkerStartError(Exception):
-    """A worker cannot run episodes of this experiment; the message has what it said."""
+    """A worker cannot run episodes of this experiment; the message contains its output."""
 
 
 @dataclass(frozen=True, slots=True)
 class Running:
-    """The episode that a worker runs.
+    """Running episode of a worker.
 
     Attributes:
-        spec: The episode.
-        folder: Where its files go.
-        begun: When it started [s since 1970].
-        started: The same by the monotonic clock [s].
-        tries: How often it was started.
+        spec: Specification of the episode.
+        folder: Folder of the episode's files.
+        begun: Start time [s since 1970].
+        started: Start time by the monotonic clock [s].
+        tries: Number of attempts.
     """
 
     spec: EpisodeSpec
@@ -48,13 +48,13 @@ class Running:
 
 
 class WorkerProcess:
-    """A process of its own session, that runs one episode at a time.
+    """A process in its own session that runs one episode at a time.
 
     Args:
-        name: Names it in records and in its log file.
-        make_runner: Makes its runner.
+        name: Name in records and of the log file.
+        make_runner: Factory of the runner.
         run: Mark of the run, see `marked_processes`.
-        log_file: Gets what the worker prints.
+        log_file: File of the worker's output.
     """
 
     def __init__(self, name: str, make_runner: RunnerFactory, run: str, log_file: Path) -> None:
@@ -67,7 +67,7 @@ class WorkerProcess:
         self._lifeline = -1
 
     def launch(self) -> None:
-        """Starts the process; `wait_until_ready` has to be called before it can run episodes."""
+        """Starts the process; call `wait_until_ready` before submitting episodes."""
         ours, theirs = socket.socketpair()
         watched, self._lifeline = os.pipe()
         self._log_file.parent.mkdir(parents=True, exist_ok=True)
@@ -89,34 +89,40 @@ class WorkerProcess:
             self._connection.send(self._make_runner)
 
     def wait_until_ready(self) -> None:
-        """Waits until it can run episodes.
+        """Waits until the worker is ready.
 
         Raises:
-            WorkerStartError: It cannot.
+            WorkerStartError: The worker cannot run episodes.
         """
         try:
             problem = self.connection.recv() if self.connection.poll(START_TIMEOUT_S) else "it does not answer"
         except (EOFError, OSError):
-            problem = f"it ended: {self._last_words()}"
+            problem = f"it ended: {self._last_output()}"
         if problem is not None:
             self.kill()
             raise WorkerStartError(f"worker {self.name} cannot start: {problem.strip()}; its log is {self._log_file}")
 
     @property
     def connection(self) -> Connection:
-        """Returns what becomes readable when the worker has a record, or has ended."""
+        """Returns the connection, which becomes readable when the worker sends a record or ends."""
         if self._connection is None:
             raise RuntimeError("the worker was not started")
         return self._connection
 
     def begin(self, spec: EpisodeSpec, folder: Path, tries: int = 1) -> None:
-        """Has the worker run an episode; one that has died meanwhile is seen by `finish`."""
+        """Submits an episode; `finish` detects a worker that has died meanwhile.
+
+        Args:
+            spec: Specification of the episode.
+            folder: Folder of the episode's files.
+            tries: Number of this attempt.
+        """
         self.running = Running(spec, folder, time.time(), time.monotonic(), tries)
         with contextlib.suppress(OSError):
             self.connection.send((spec, folder))
 
     def finish(self) -> EpisodeRecord | None:
-        """Returns the record of the episode that has ended; None when the worker has died instead."""
+        """Returns the record of the ended episode, or None if the worker has died."""
         try:
             record: EpisodeRecord = self.connection.recv()
         except (EOFError, OSError):
@@ -125,7 +131,7 @@ class WorkerProcess:
         return record
 
     def cause_of_death(self) -> str:
-        """Returns how a worker ended that did so by itself, and what it printed last."""
+        """Returns the cause of a worker's unexpected end, with its last output."""
         code: int | None = None
         if self._process is not None:
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -133,18 +139,18 @@ class WorkerProcess:
         how = "was lost" if code is None else f"ended with exit code {code}"
         if code is not None and code < 0:
             how = f"was killed by signal {signal.Signals(-code).name}"
-        return f"the worker process {how}; it said last: {self._last_words()}"
+        return f"the worker process {how}; its last output: {self._last_output()}"
 
-    def _last_words(self) -> str:
+    def _last_output(self) -> str:
         try:
             lines = self._log_file.read_text(encoding="utf-8", errors="replace").splitlines()
         except OSError:
             return "nothing"
-        said = [line.strip() for line in lines[-50:] if line.strip() and not line.startswith("---- ")]
-        return said[-1][:500] if said else "nothing"
+        output = [line.strip() for line in lines[-50:] if line.strip() and not line.startswith("---- ")]
+        return output[-1][:500] if output else "nothing"
 
     def close(self) -> None:
-        """Has an idle worker end what it runs, and itself; kills it when it does not."""
+        """Requests the end of an idle worker, and kills it after a timeout."""
         if self._connection is not None and self._process is not None and self.running is None:
             with contextlib.suppress(OSError, subprocess.TimeoutExpired):
                 self._connection.send(None)
@@ -152,7 +158,7 @@ class WorkerProcess:
         self.kill()
 
     def kill(self) -> None:
-        """Ends the worker and everything it has started, at once; may be called twice."""
+        """Kills the worker and all its descendants; repeated calls are allowed."""
         end_marked_processes(self._mark)
         if self._process is not None:
             self._process.kill()
