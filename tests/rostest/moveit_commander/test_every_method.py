@@ -216,7 +216,7 @@ def test_settings(arm: MoveGroupCommander) -> None:
 
 def test_path_constraints_by_name(arm: MoveGroupCommander, tmp_path: Path) -> None:
     other = MoveGroupCommander("panda_arm")
-    with pytest.raises(MoveItCommanderException, match="MongoDB is not spoken"):
+    with pytest.raises(MoveItCommanderException, match="MongoDB is not supported"):
         other.set_constraints_database("localhost", 33829)
     upright = Constraints(name="upright", orientation_constraints=[OrientationConstraint(link_name="panda_link8")])
     storage = ConstraintsStorage(str(tmp_path / "warehouse.sqlite"))

@@ -63,14 +63,14 @@ def test_the_file_is_laid_out_as_the_plugin_documents_it(tmp_path: Path) -> None
 
 def test_what_is_no_file_of_constraints_is_refused_with_a_reason(tmp_path: Path) -> None:
     for place in ("localhost", str(tmp_path / "no_folder" / "some.sqlite")):
-        with pytest.raises(MoveItCommanderException, match="MongoDB is not spoken"):
+        with pytest.raises(MoveItCommanderException, match="MongoDB is not supported"):
             ConstraintsStorage(place)
     (tmp_path / "text.sqlite").write_text("this is no database, but it is long enough to look like a file of one")
     with pytest.raises(MoveItCommanderException, match="text.sqlite"):
         ConstraintsStorage(str(tmp_path / "text.sqlite"))
     with sqlite3.connect(tmp_path / "old.sqlite") as database:
         database.execute("PRAGMA user_version = 9")
-    with pytest.raises(MoveItCommanderException, match="layout 9, 10 is needed"):
+    with pytest.raises(MoveItCommanderException, match="schema 9, 10 is needed"):
         ConstraintsStorage(str(tmp_path / "old.sqlite"))
     with pytest.raises(MoveItCommanderException, match="no name"):
         ConstraintsStorage(str(tmp_path / "new.sqlite")).add_constraints(Constraints())

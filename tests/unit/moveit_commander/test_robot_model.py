@@ -148,7 +148,7 @@ def test_lists_name_every_variable_or_every_active_joint(model: RobotModel) -> N
         (
             URDF,
             SRDF.replace('<group name="hand"/></group>', '<group name="nobody"/></group>'),
-            "'nobody', which is not",
+            "unknown group 'nobody'",
         ),
         (URDF, SRDF.replace('<group name="hand"/></group>', '<group name="all"/></group>'), "contains itself"),
     ],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Commands a move_group node: groups, planning scene and robot, over topics, services and actions only."""
+"""Client of a move_group node for groups, planning scene and robot, over topics, services and actions only."""
 
 from moveit_commander.constraints_storage import ConstraintsStorage
 from moveit_commander.exception import MoveItCommanderException

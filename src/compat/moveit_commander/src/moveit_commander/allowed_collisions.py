@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gives moveit_msgs/AllowedCollisionMatrix its methods set_default and set_allowed, as the public library does."""
+"""Adds the methods set_default and set_allowed of the public library to moveit_msgs/AllowedCollisionMatrix."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from moveit_commander.exception import MoveItCommanderException
 
 
 def set_default(acm: AllowedCollisionMatrix, obj: str, allow: bool) -> None:
-    """Returns whether an object may touch everything that has no entry of its own with it."""
+    """Sets whether an object may touch everything without an entry for the pair.
+
+    Args:
+        acm: Matrix to change.
+        obj: Name of the object.
+        allow: Whether contact is allowed.
+    """
     if obj in acm.default_entry_names:
         acm.default_entry_values[acm.default_entry_names.index(obj)] = allow
     else:
@@ -18,17 +24,23 @@ def set_default(acm: AllowedCollisionMatrix, obj: str, allow: bool) -> None:
 
 
 def set_allowed(acm: AllowedCollisionMatrix, obj: str, other: str | None = None, allow: bool = True) -> None:
-    """Returns whether two objects or links may touch; without `other`: the object's default.
+    """Sets whether two objects or links may touch.
+
+    Args:
+        acm: Matrix to change.
+        obj: Name of an object or link.
+        other: Name of the other object or link; None for the default of `obj`.
+        allow: Whether contact is allowed.
 
     Raises:
-        MoveItCommanderException: `other` has no entry in the acm.
+        MoveItCommanderException: The matrix has no entry for `other`.
     """
     if other is None:
         set_default(acm, obj, allow)
         return
     if other not in acm.entry_names:
         raise MoveItCommanderException(
-            f"collision matrix: '{other}' has no entry; those there are: {', '.join(acm.entry_names)}"
+            f"collision matrix: '{other}' has no entry; the entries are: {', '.join(acm.entry_names)}"
         )
     if obj not in acm.entry_names:
         _add_entry(acm, obj)
@@ -40,7 +52,7 @@ def set_allowed(acm: AllowedCollisionMatrix, obj: str, other: str | None = None,
 
 
 def _add_entry(acm: AllowedCollisionMatrix, obj: str) -> None:
-    """Returns a row and a column for an object, filled with the defaults in force."""
+    """Adds a row and a column for an object, filled with the default entries."""
     defaults = dict(zip(acm.default_entry_names, acm.default_entry_values, strict=True))
     row = [bool(defaults.get(obj, defaults.get(name, False))) for name in acm.entry_names]
     for entry, enabled in zip(acm.entry_values, row, strict=True):

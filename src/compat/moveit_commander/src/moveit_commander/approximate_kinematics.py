@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint values that bring a link as near to a pose as it gets, where inverse kinematics has no solution."""
+"""Approximate inverse kinematics: joint values that minimise the pose error of a link without an exact solution."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from moveit_commander.chain_jacobian import jacobian, link_pose
 from moveit_commander.joints import Joint
 
 STEPS = 200
-DAMPING = 0.02  # [m]; of the least squares: joints move gently where the arm is stretched
-WIDEST_STEP = 0.3  # [rad or m]
+DAMPING = 0.02  # [m]; damps joint motion near singularities
+MAX_STEP = 0.3  # [rad or m]
 STANDSTILL = 1e-6
 
 
@@ -27,33 +27,33 @@ def nearest_values(
     rotation: Rotation,
     position: Any,
 ) -> dict[str, float]:
-    """Moves joints within their bounds, by damped least squares, to the smallest pose error found on the way.
+    """Returns joint positions within bounds with the smallest pose error found by damped least squares.
 
     Args:
-        chain: joints from the base to the link, fixed ones included.
-        free: those that may move, none of them mimic.
-        start: positions of the robot's joints [rad or m].
-        complete: adds the positions of mimic joints.
-        rotation: of the link in the base's frame.
-        position: of the link in the base's frame, shape (3,) [m].
+        chain: Joints from the base to the link, including fixed joints.
+        free: Joints that may move, without mimic joints.
+        start: Positions of the robot's joints [rad or m].
+        complete: Function that adds the positions of mimic joints.
+        rotation: Target rotation of the link in the base frame.
+        position: Target position of the link in the base frame, shape (3,) [m].
 
     Returns:
-        Positions of the free joints; the error adds metres and radians as inverse kinematics does.
+        Positions of the free joints. The error sums metres and radians, as in inverse kinematics.
     """
     movable = [joint.name for joint in chain if joint.movable]
     values = {joint.name: joint.bounded(start[joint.name]) for joint in free}
-    best, least = dict(values), math.inf
+    best, min_error = dict(values), math.inf
     for _ in range(STEPS):
         full_positions = complete({**start, **values})
         current_rotation, current_position = link_pose(chain, full_positions)
         rotation_error = (rotation * current_rotation.inv()).as_rotvec()
         error = np.concatenate([np.asarray(position) - current_position, rotation_error])
-        if float(np.linalg.norm(error)) < least:
-            best, least = dict(values), float(np.linalg.norm(error))
+        if float(np.linalg.norm(error)) < min_error:
+            best, min_error = dict(values), float(np.linalg.norm(error))
         full = jacobian(chain, full_positions, (0.0, 0.0, 0.0))
         columns = np.column_stack([_column(full, movable, chain, joint) for joint in free])
         step = columns.T @ np.linalg.solve(columns @ columns.T + DAMPING**2 * np.eye(6), error)
-        step *= min(1.0, WIDEST_STEP / max(float(np.abs(step).max()), STANDSTILL))
+        step *= min(1.0, MAX_STEP / max(float(np.abs(step).max()), STANDSTILL))
         moved = {
             joint.name: min(max(values[joint.name] + float(change), joint.lower), joint.upper)
             if joint.kind != "continuous"
@@ -67,13 +67,15 @@ def nearest_values(
 
 
 def _column(full: Any, movable: Sequence[str], chain: Sequence[Joint], joint: Joint) -> Any:
-    """Returns how a joint, and those of the chain that mimic it, move the link."""
-    gains = {
+    """Returns the Jacobian column of a joint, including the chain's joints that mimic it, shape (6,)."""
+    factors = {
         item.name: item.multiplier if item.leader == joint.name else 1.0
         for item in chain
         if joint.name in (item.name, item.leader)
     }
-    return sum((gain * full[:, movable.index(name)] for name, gain in gains.items() if name in movable), np.zeros(6))
+    return sum(
+        (factor * full[:, movable.index(name)] for name, factor in factors.items() if name in movable), np.zeros(6)
+    )
 
 
 def rotation_and_position(pose: Sequence[float]) -> tuple[Rotation, Any]:

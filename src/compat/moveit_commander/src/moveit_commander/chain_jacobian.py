@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Jacobian and end pose of a chain of joints, from the robot's description."""
+"""Jacobian and forward kinematics of a joint chain from the robot's description."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from moveit_commander.joints import Joint
 
 
 def jacobian(chain: Sequence[Joint], positions: Mapping[str, float], reference_point: Sequence[float]) -> Any:
-    """Returns the velocity of a point of the last link per joint velocity, in the frame of the first joint's parent.
+    """Returns the Jacobian of a point of the last link, in the parent frame of the first joint.
 
     Args:
-        chain: joints from the base to the tip, fixed ones included.
-        positions: of the movable ones [rad or m].
-        reference_point: the point in the frame of the last link [m].
+        chain: Joints from the base to the tip, including fixed joints.
+        positions: Positions of the movable joints [rad or m].
+        reference_point: Point in the frame of the last link [m].
 
     Returns:
-        Array of shape (6, movable joints): linear [m/s], then angular [rad/s].
+        Array of shape (6, movable joints): linear rows [m or m/rad], then angular rows.
     """
     axes, rotation, position = _walk(chain, positions)
     point = position + rotation.apply(reference_point)
@@ -35,13 +35,13 @@ def jacobian(chain: Sequence[Joint], positions: Mapping[str, float], reference_p
 
 
 def link_pose(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[Rotation, Any]:
-    """Returns the rotation and position [m] of the last link in the frame of the first joint's parent link."""
+    """Returns the rotation and position [m] of the last link in the parent frame of the first joint."""
     _, rotation, position = _walk(chain, positions)
     return rotation, position
 
 
 def _walk(chain: Sequence[Joint], positions: Mapping[str, float]) -> tuple[list[tuple[Joint, Any, Any]], Rotation, Any]:
-    """Returns each movable joint with its axis and origin, and the pose of the last link, in the base frame."""
+    """Returns the axis and origin of each movable joint, and the pose of the last link, in the base frame."""
     rotation, position = Rotation.identity(), np.zeros(3)
     axes: list[tuple[Joint, Any, Any]] = []
     for joint in chain:

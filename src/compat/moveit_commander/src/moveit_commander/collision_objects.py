@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Builds collision objects: primitives, planes and meshes from files."""
+"""Collision objects from primitives, planes and mesh files."""
 
 from __future__ import annotations
 
@@ -14,12 +14,22 @@ from moveit_commander.exception import MoveItCommanderException
 
 
 def existing(name: str) -> CollisionObject:
-    """Returns an object that refers to one that is in the scene already."""
+    """Returns an object that refers to an existing object of the scene."""
     return CollisionObject(id=name, operation=CollisionObject.ADD)
 
 
 def primitive(name: str, pose: PoseStamped, kind: int, dimensions: Sequence[float]) -> CollisionObject:
-    """Returns an object of one primitive; `kind` and `dimensions` [m] as in shape_msgs/SolidPrimitive."""
+    """Returns an object of one primitive.
+
+    Args:
+        name: Id of the object.
+        pose: Pose of the primitive.
+        kind: Type in shape_msgs/SolidPrimitive.
+        dimensions: Dimensions in shape_msgs/SolidPrimitive [m].
+
+    Raises:
+        MoveItCommanderException: A dimension is not above 0.
+    """
     sizes = [float(size) for size in dimensions]
     if any(not size > 0.0 for size in sizes):
         raise MoveItCommanderException(f"object '{name}': sizes {sizes} m; every size must be above 0")
@@ -29,7 +39,14 @@ def primitive(name: str, pose: PoseStamped, kind: int, dimensions: Sequence[floa
 
 
 def plane(name: str, pose: PoseStamped, normal: Sequence[float], offset: float) -> CollisionObject:
-    """Returns the plane normal . p + offset = 0 in the frame of the pose [m]."""
+    """Returns the plane normal . p + offset = 0 in the frame of the pose.
+
+    Args:
+        name: Id of the object.
+        pose: Pose of the plane.
+        normal: Normal vector of the plane.
+        offset: Offset of the plane [m].
+    """
     item = CollisionObject(header=pose.header, id=name, operation=CollisionObject.ADD)
     item.planes = [Plane([float(value) for value in (*normal, offset)])]
     item.plane_poses = [pose.pose]
@@ -37,10 +54,16 @@ def plane(name: str, pose: PoseStamped, normal: Sequence[float], offset: float) 
 
 
 def mesh(name: str, pose: PoseStamped, filename: str, scale: Sequence[float]) -> CollisionObject:
-    """Returns the triangles of a mesh file (STL, OBJ, PLY, DAE), scaled along x, y, z.
+    """Returns an object with the triangles of a mesh file (STL, OBJ, PLY, DAE).
+
+    Args:
+        name: Id of the object.
+        pose: Pose of the mesh.
+        filename: Path or file:// URI of the mesh.
+        scale: Scaling factors along x, y, z.
 
     Raises:
-        MoveItCommanderException: the file is not there, cannot be read whole, or holds no triangle.
+        MoveItCommanderException: The file is missing, incomplete, or contains no triangle.
     """
     try:
         loaded = read_mesh(str(filename).removeprefix("file://"), tuple(float(factor) for factor in scale))
@@ -57,11 +80,11 @@ def mesh(name: str, pose: PoseStamped, filename: str, scale: Sequence[float]) ->
 
 def _empty(name: str, pose: PoseStamped) -> CollisionObject:
     item = CollisionObject(header=pose.header, id=name, operation=CollisionObject.ADD)
-    item.pose = Pose(pose.pose.position, _turn(pose.pose.orientation))
+    item.pose = Pose(pose.pose.position, _orientation_or_identity(pose.pose.orientation))
     return item
 
 
-def _turn(orientation: Quaternion) -> Quaternion:
-    """Returns an orientation; all zeros means the identity."""
-    turned = any((orientation.x, orientation.y, orientation.z, orientation.w))
-    return orientation if turned else Quaternion(0.0, 0.0, 0.0, 1.0)
+def _orientation_or_identity(orientation: Quaternion) -> Quaternion:
+    """Returns the orientation, or the identity if all components are zero."""
+    nonzero = any((orientation.x, orientation.y, orientation.z, orientation.w))
+    return orientation if nonzero else Quaternion(0.0, 0.0, 0.0, 1.0)

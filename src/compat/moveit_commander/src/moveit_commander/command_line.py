@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The terminal: reads commands, completes them, shows the answers in colours."""
+"""Command line: reads and completes commands, and prints coloured answers."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ COLOURS = {
     MoveGroupInfoLevel.DEBUG: "\033[94m",
     MoveGroupInfoLevel.INFO: "",
 }
-PLAIN = "\033[0m"
-LEAVE = ("q", "quit", "exit")
+RESET_COLOUR = "\033[0m"
+QUIT_WORDS = ("q", "quit", "exit")
 
 
 def completions(keywords: Mapping[str, Sequence[str]], line: str, text: str) -> list[str]:
-    """Returns the words that may stand where `text`, the last word of `line`, stands."""
+    """Returns the completions of `text`, the last word of `line`."""
     before = line[: len(line) - len(text)].split()
     words = keywords if not before else keywords.get(before[0].lower(), ())
     return sorted(word + " " for word in words if word.startswith(text))
@@ -42,11 +42,11 @@ def _completer(interpreter: MoveGroupCommandInterpreter) -> Callable[[str, int],
 
 
 def _show(level: int, text: str, colours: bool) -> None:
-    print(f"{COLOURS[level]}{text}{PLAIN}" if colours and COLOURS[level] else text, flush=True)
+    print(f"{COLOURS[level]}{text}{RESET_COLOUR}" if colours and COLOURS[level] else text, flush=True)
 
 
-def _converse(interpreter: MoveGroupCommandInterpreter) -> int:
-    """Executes lines until the end; returns how many failed."""
+def _execute_lines(interpreter: MoveGroupCommandInterpreter) -> int:
+    """Executes lines until the end of input; returns the number of failed lines."""
     colours, failures = sys.stdout.isatty(), 0
     readline.set_completer(_completer(interpreter))
     readline.parse_and_bind("tab: complete")
@@ -56,7 +56,7 @@ def _converse(interpreter: MoveGroupCommandInterpreter) -> int:
             line = input(f"{group.get_name() if group else ''}> " if sys.stdin.isatty() else "").strip()
         except (EOFError, KeyboardInterrupt):
             break
-        if line.lower() in LEAVE:
+        if line.lower() in QUIT_WORDS:
             break
         if line:
             level, text = interpreter.execute(line)
@@ -66,7 +66,7 @@ def _converse(interpreter: MoveGroupCommandInterpreter) -> int:
 
 
 def main() -> int:
-    """Runs the command line; returns 0 when every command worked, 1 when one did not, 2 when it could not begin."""
+    """Runs the command line; returns 0 if all commands succeeded, 1 after a failed command, 2 without move_group."""
     roscpp_initialize(sys.argv)
     rospy.init_node("move_group_interface_cmdline", anonymous=True, disable_signals=True)
     parser = argparse.ArgumentParser(description="Commands move_group from a terminal.")
@@ -84,6 +84,6 @@ def main() -> int:
         return 2
     if sys.stdin.isatty():
         print("Type help to see all commands, quit to leave.")
-    failures = _converse(interpreter)
+    failures = _execute_lines(interpreter)
     roscpp_shutdown()
     return 1 if failures else 0

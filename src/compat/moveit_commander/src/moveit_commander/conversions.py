@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns messages into lists of numbers and bytes, and back."""
+"""Converts messages to lists of numbers or bytes, and back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from moveit_commander.exception import MoveItCommanderException
 
 
 def msg_to_string(msg: Any) -> bytes:
-    """Serializes a message."""
+    """Returns the serialized message."""
     buffer = BytesIO()
     msg.serialize(buffer)
     return buffer.getvalue()
@@ -29,9 +29,9 @@ def msg_from_string(msg: Any, data: bytes) -> None:
 
 
 def rpy_from_quaternion(quaternion: Sequence[float]) -> list[float]:
-    """Returns the turns about the fixed axes x, y, z [rad] of a quaternion xyzw; at pitch +-pi/2 the yaw is 0."""
-    if not math.hypot(*quaternion) >= 1e-9:  # NaN neither
-        raise MoveItCommanderException(f"quaternion {list(quaternion)} has no length; a unit quaternion is needed")
+    """Returns the rotations about the fixed axes x, y, z [rad] of a quaternion (xyzw); at pitch +-pi/2 the yaw is 0."""
+    if not math.hypot(*quaternion) >= 1e-9:  # also refuses NaN
+        raise MoveItCommanderException(f"quaternion {list(quaternion)} has zero length; a unit quaternion is needed")
     return list(rotations.rpy_from_quaternion(quaternion))
 
 
@@ -42,7 +42,7 @@ def pose_to_list(pose_msg: Pose) -> list[float]:
 
 
 def list_to_pose(pose_list: Sequence[float]) -> Pose:
-    """Builds a pose from [x, y, z, roll, pitch, yaw] or [x, y, z, qx, qy, qz, qw] [m, rad]."""
+    """Returns a pose from [x, y, z, roll, pitch, yaw] or [x, y, z, qx, qy, qz, qw] [m, rad]."""
     values = [float(value) for value in pose_list]
     if len(values) == 6:
         values = [*values[:3], *quaternion_from_rpy(*values[3:])]
@@ -55,7 +55,7 @@ def list_to_pose(pose_list: Sequence[float]) -> Pose:
 
 
 def list_to_pose_stamped(pose_list: Sequence[float], target_frame: str) -> PoseStamped:
-    """As list_to_pose, in a frame and of this moment."""
+    """Returns a pose as in list_to_pose, in a frame and stamped with the current time."""
     message = PoseStamped(pose=list_to_pose(pose_list))
     message.header.frame_id = target_frame
     message.header.stamp = rospy.Time.now()
@@ -69,7 +69,7 @@ def transform_to_list(trf_msg: Transform) -> list[float]:
 
 
 def list_to_transform(trf_list: Sequence[float]) -> Transform:
-    """Builds a transform from [x, y, z, qx, qy, qz, qw] [m]."""
+    """Returns a transform from [x, y, z, qx, qy, qz, qw] [m]."""
     if len(trf_list) != 7:
         raise MoveItCommanderException(
             f"a transform list has {len(trf_list)} numbers; 7 (x, y, z, qx, qy, qz, qw) are needed"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes a goal of joints or of a pose as the constraints a planning request carries."""
+"""Converts joint and pose goals to the constraints of a planning request."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from shape_msgs.msg import SolidPrimitive
 
 
 def joint_goal(positions: Mapping[str, float], tolerance: float) -> Constraints:
-    """Constrains every joint at its position within a tolerance [rad or m]."""
+    """Returns constraints of every joint to its position within a tolerance [rad or m]."""
     return Constraints(
         joint_constraints=[
             JointConstraint(
@@ -23,7 +23,13 @@ def joint_goal(positions: Mapping[str, float], tolerance: float) -> Constraints:
 
 
 def position_goal(link: str, pose: PoseStamped, tolerance_m: float) -> PositionConstraint:
-    """Constrains the link's origin within a sphere about the pose's position."""
+    """Returns the constraint of a link's origin to a sphere around a position.
+
+    Args:
+        link: Name of the link.
+        pose: Pose whose position is the centre of the sphere.
+        tolerance_m: Radius of the sphere [m].
+    """
     constraint = PositionConstraint(header=pose.header, link_name=link, weight=1.0)
     constraint.constraint_region.primitives = [SolidPrimitive(SolidPrimitive.SPHERE, [tolerance_m])]
     constraint.constraint_region.primitive_poses = [Pose(pose.pose.position, Quaternion(0.0, 0.0, 0.0, 1.0))]
@@ -31,7 +37,13 @@ def position_goal(link: str, pose: PoseStamped, tolerance_m: float) -> PositionC
 
 
 def orientation_goal(link: str, pose: PoseStamped, tolerance_rad: float) -> OrientationConstraint:
-    """Constrains the orientation of the link to that of the pose within a tolerance about each axis."""
+    """Returns the constraint of a link's orientation.
+
+    Args:
+        link: Name of the link.
+        pose: Pose with the target orientation.
+        tolerance_rad: Tolerance about each axis [rad].
+    """
     return OrientationConstraint(
         header=pose.header,
         orientation=pose.pose.orientation,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The commands of the command line for one planning group: each is one method, all are in one table."""
+"""Commands of the command line for a planning group: one method per command, and a table of all commands."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class MoveGroupInfoLevel:
-    """The kind of an answer."""
+    """Level of an answer."""
 
     FAIL = 1
     WARN = 2
@@ -48,7 +48,7 @@ DIRECTIONS = {
 RANDOM = ("rand", "random")
 TRUE = ("1", "t", "true")
 GROUND_SIZE = (3.0, 3.0, 0.1)
-GROUND_GAP = 1.0e-4  # [m] below the robot, which would touch it otherwise
+GROUND_GAP = 1.0e-4  # [m] below the robot, to avoid contact
 VALUE = r"[\d.eE+\-]+"
 COPY = re.compile(r"(\w+)\s*=\s*(\w+)")
 VECTOR = re.compile(rf"(\w+)\s*=\s*\[((?:\s*{VALUE}[\s,]*)*)\]")
@@ -57,10 +57,13 @@ ELEMENT = re.compile(rf"(\w+)\s*\[\s*(\d+)\s*\]\s*=\s*({VALUE})")
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """The arguments and the method of one command.
+    """Usage and method of a command.
 
     Attributes:
-        usage: the line help shows, with the numbers of arguments it allows in `counts`.
+        usage: Usage line of the help.
+        text: Description in the help.
+        counts: Allowed numbers of arguments.
+        run: Method that executes the command.
     """
 
     usage: str
@@ -70,22 +73,28 @@ class Command:
 
 
 def report(succeeded: bool, success: str, failure: str) -> Answer:
-    """Returns an answer that reports success or failure."""
+    """Returns an answer that reports success or failure.
+
+    Args:
+        succeeded: Whether the command succeeded.
+        success: Text for success.
+        failure: Text for failure.
+    """
     return (MoveGroupInfoLevel.SUCCESS, success) if succeeded else (MoveGroupInfoLevel.FAIL, failure)
 
 
 def info(text: object) -> Answer:
-    """Returns an answer to a question."""
+    """Returns an informational answer."""
     return MoveGroupInfoLevel.INFO, str(text)
 
 
 def vector(values: Sequence[float]) -> str:
-    """Writes joint values as commands take them: [0.1 0.2]."""
+    """Returns joint values in the syntax of commands: [0.1 0.2]."""
     return f"[{' '.join(str(value) for value in values)}]"
 
 
 def number(word: str) -> float:
-    """Reads a number; raises MoveItCommanderException."""
+    """Returns the number that a word represents; raises MoveItCommanderException otherwise."""
     try:
         return float(word)
     except ValueError:
@@ -93,7 +102,7 @@ def number(word: str) -> float:
 
 
 class GroupCommands:
-    """Executes commands for one group."""
+    """Executes commands for a planning group."""
 
     def __init__(self, group: MoveGroupCommander, scene: PlanningSceneInterface, root_link: str) -> None:
         self.group = group
@@ -102,7 +111,7 @@ class GroupCommands:
         self._plan: RobotTrajectory | None = None
 
     def execute(self, line: str) -> Answer:
-        """Executes one line; raises MoveItCommanderException."""
+        """Executes a line; raises MoveItCommanderException."""
         words = line.split()
         command = COMMANDS.get(words[0].lower())
         if command is not None and len(words) - 1 in command.counts:
@@ -136,7 +145,7 @@ class GroupCommands:
         return MoveGroupInfoLevel.WARN, f"Unknown command: '{line}'; type help"
 
     def allow(self, words: Words) -> Answer:
-        """Switches replanning or looking around."""
+        """Enables or disables replanning or looking around."""
         switches = {
             "look": self.group.allow_looking,
             "looking": self.group.allow_looking,
@@ -155,7 +164,7 @@ class GroupCommands:
         return MoveGroupInfoLevel.SUCCESS, f"Constrained to {words[0]}" if words else "Cleared path constraints"
 
     def current(self, _: Words) -> Answer:
-        """Shows joint values and the end effector's pose."""
+        """Returns the joint values and the end effector's pose."""
         text = f"joints = [{', '.join(str(value) for value in self.group.get_current_joint_values())}]"
         link = self.group.get_end_effector_link()
         if link:
@@ -164,7 +173,7 @@ class GroupCommands:
         return info(text)
 
     def group_state(self, _: Words) -> Answer:
-        """Shows the state as the SRDF writes it."""
+        """Returns the current state in the syntax of the SRDF."""
         values = zip(self.group._group_names(), self.group.get_current_joint_values(), strict=True)
         lines = [f'        <joint name="{name}" value="{value}"/>' for name, value in values]
         return info(
@@ -174,24 +183,24 @@ class GroupCommands:
         )
 
     def database(self, words: Words) -> Answer:
-        """Chooses the file of constraints, or returns which it is."""
+        """Selects the file of constraints, and returns its path."""
         if words:
             self.group.set_constraints_database(words[0], int(number(words[1])) if len(words) > 1 else 33829)
         path = self.database_path()
         return info("Not connected to a database" if path is None else f"Connected to {path}")
 
     def database_path(self) -> str | None:
-        """Returns the file of constraints; None where none is chosen."""
+        """Returns the path of the file of constraints; None if none is selected."""
         storage = self.group.constraints_storage
         return None if storage is None else str(storage.path)
 
     def delete(self, words: Words) -> Answer:
-        """Forgets joint values."""
+        """Removes remembered joint values."""
         self.group.forget_joint_values(words[0])
         return OK
 
     def eef(self, _: Words) -> Answer:
-        """Names the end effector link."""
+        """Returns the end effector link."""
         return info(self.group.get_end_effector_link() or "There is no end effector defined")
 
     def run_plan(self, _: Words) -> Answer:
@@ -245,11 +254,11 @@ class GroupCommands:
         return info("Added ground")
 
     def identify(self, _: Words) -> Answer:
-        """Names the group."""
+        """Returns the name of the group."""
         return info(self.group.get_name())
 
     def joints(self, _: Words) -> Answer:
-        """Lists the joints."""
+        """Returns the joints."""
         return info("\n".join(f"{index} = {name}" for index, name in enumerate(self.group.get_joints())))
 
     def pick(self, words: Words) -> Answer:
@@ -261,7 +270,7 @@ class GroupCommands:
         return report(self.group.place(words[0]), f"Placed object {words[0]}", f"Failed to place object {words[0]}")
 
     def plan(self, words: Words) -> Answer:
-        """Plans to a named or random state, or shows the last plan."""
+        """Plans to a named or random state, or returns the last plan."""
         if not words:
             return info("No previous plan" if self._plan is None else self._plan)
         self._set_named(words)
@@ -274,7 +283,7 @@ class GroupCommands:
         )
 
     def planner(self, words: Words) -> Answer:
-        """Chooses a planner."""
+        """Selects a planner."""
         self.group.set_planner_id(words[0])
         return MoveGroupInfoLevel.SUCCESS, f"Planner is now {words[0]}"
 
@@ -289,13 +298,13 @@ class GroupCommands:
         return MoveGroupInfoLevel.SUCCESS, f"Remembered current joint values under the name {words[0]}"
 
     def rotate(self, words: Words) -> Answer:
-        """Turns the end effector to roll, pitch, yaw."""
+        """Moves the end effector to roll, pitch, yaw [rad]."""
         self.group.set_rpy_target([number(word) for word in words])
         text = " ".join(words)
         return report(self.group.go(), f"Rotation complete: {text}", f"Failed while rotating to {text}")
 
     def show(self, words: Words) -> Answer:
-        """Shows remembered joint values."""
+        """Returns remembered joint values."""
         known = self.group.get_remembered_joint_values()
         if words and words[0] not in known:
             raise MoveItCommanderException(f"'{words[0]}' is not known; known: {', '.join(known) or 'none'}")
@@ -308,19 +317,19 @@ class GroupCommands:
         return OK
 
     def time(self, words: Words) -> Answer:
-        """Shows or sets the planning time."""
+        """Sets or returns the planning time [s]."""
         if words:
             self.group.set_planning_time(number(words[0]))
         return info(self.group.get_planning_time())
 
     def tolerance(self, words: Words) -> Answer:
-        """Shows or sets the tolerance of goals."""
+        """Sets or returns the goal tolerances."""
         if words:
             self.group.set_goal_tolerance(number(words[0]))
         return info("Joint = {:.6g}, Position = {:.6g}, Orientation = {:.6g}".format(*self.group.get_goal_tolerance()))
 
     def variables(self, _: Words) -> Answer:
-        """Names the remembered joint values."""
+        """Returns the names of the remembered joint values."""
         return info(f"[{' '.join(self.group.get_remembered_joint_values())}]")
 
     def wait(self, words: Words) -> Answer:

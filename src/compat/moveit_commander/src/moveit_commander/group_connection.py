@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base of a group's commander: the group's description, the robot's state and the servers."""
+"""Base class of a group's commander: description of the group, state of the robot, and connection to move_group."""
 
 from __future__ import annotations
 
@@ -39,16 +39,22 @@ CODE_NAMES = {
 
 
 def code_text(code: MoveItErrorCodes) -> str:
-    """Returns the name of an error code, for messages."""
+    """Returns the name of an error code with its number."""
     return f"{CODE_NAMES.get(code.val, 'unknown code')} ({code.val})"
 
 
 def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotState) -> PoseStamped:
-    """Returns the pose of a link, an attached object or a subframe in a state, by compute_fk.
+    """Returns the pose of a link, an attached object or a subframe in a state, from compute_fk.
+
+    Args:
+        servers: Clients of move_group.
+        frame: Frame of the returned pose.
+        link: Name of the link, object or subframe.
+        state: State of the robot.
 
     Raises:
-        ServerError: compute_fk is not there.
-        MoveItCommanderException: it refuses the request.
+        ServerError: The service compute_fk is not available.
+        MoveItCommanderException: The service rejects the request.
     """
     request = GetPositionFKRequest(fk_link_names=[link], robot_state=state)
     request.header.frame_id = frame
@@ -62,10 +68,10 @@ def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotStat
 
 
 def held_frames(servers: Servers) -> dict[str, str]:
-    """Returns the links that hold the attached objects and their subframes, by name of the object or subframe.
+    """Returns the holding link of each attached object and its subframes, keyed by object or subframe name.
 
     Raises:
-        ServerError: get_planning_scene is not there.
+        ServerError: The service get_planning_scene is not available.
     """
     request = GetPlanningSceneRequest(PlanningSceneComponents(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS))
     state = servers.call("get_planning_scene", GetPlanningScene, request).scene.robot_state
@@ -77,7 +83,7 @@ def held_frames(servers: Servers) -> dict[str, str]:
 
 
 class GroupConnection:
-    """One planning group and the move_group node that plans for it."""
+    """A planning group with its connection to a move_group node."""
 
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         self._state: CurrentState = current_state(robot_description, ns)
@@ -95,19 +101,19 @@ class GroupConnection:
         return self._group.name
 
     def get_joints(self) -> list[str]:
-        """Returns the names of the group's joints, fixed and mimic ones included."""
+        """Returns the names of the group's joints, including fixed and mimic joints."""
         return [joint.name for joint in self._group.joints]
 
     def get_active_joints(self) -> list[str]:
-        """Returns the names of the group's joints that move by themselves."""
+        """Returns the names of the group's active joints, neither fixed nor mimic."""
         return [joint.name for joint in self._group.active_joints]
 
     def get_variable_names(self) -> list[str]:
-        """Returns the names of the numbers that describe the group's state, "joint/variable" of a base that moves."""
+        """Returns the names of the group's variables; those of a planar or floating joint are "joint/variable"."""
         return self._group_names()
 
     def get_variable_count(self) -> int:
-        """Returns how many numbers describe the group's state, mimic joints included."""
+        """Returns the number of the group's variables, including mimic joints."""
         return len(self._group.variables)
 
     def has_end_effector_link(self) -> bool:
@@ -115,32 +121,32 @@ class GroupConnection:
         return bool(self._end_effector_link)
 
     def get_end_effector_link(self) -> str:
-        """Returns the end effector link, which pose targets are for; "" if there is none."""
+        """Returns the end effector link, the default link of pose targets; "" for none."""
         return self._end_effector_link
 
     def set_end_effector_link(self, link_name: str) -> None:
-        """Sets the end effector link, which may be an attached object or a subframe ("object/subframe").
+        """Sets the end effector link: a link, an attached object or a subframe ("object/subframe").
 
         Raises:
-            MoveItCommanderException: the robot has no such link and holds no such object.
+            MoveItCommanderException: The robot has no such link and holds no such object.
         """
         self._require_frame(link_name, "Unable to set end effector link")
         self._end_effector_link = link_name
 
     def get_pose_reference_frame(self) -> str:
-        """Returns the frame of pose targets that name none."""
+        """Returns the default frame of pose targets."""
         return self._pose_reference_frame
 
     def set_pose_reference_frame(self, reference_frame: str) -> None:
-        """Sets the frame of pose targets that name none."""
+        """Sets the default frame of pose targets."""
         self._pose_reference_frame = reference_frame
 
     def get_planning_frame(self) -> str:
-        """Returns the frame in which planning is done."""
+        """Returns the planning frame."""
         return self._model.planning_frame
 
     def get_interface_description(self) -> PlannerInterfaceDescription:
-        """Returns the first planner interface of move_group: its name and planner ids."""
+        """Returns the name and planner ids of move_group's first planner interface."""
         answer = self._servers.call("query_planner_interface", QueryPlannerInterfaces, QueryPlannerInterfacesRequest())
         if not answer.planner_interfaces:
             raise ServerError("service query_planner_interface: the list is empty; move_group has no planning pipeline")
@@ -156,14 +162,14 @@ class GroupConnection:
         return self._state.message(self._group_names())
 
     def get_current_state_bounded(self) -> RobotState:
-        """Returns the robot's current state, each joint brought within its bounds."""
+        """Returns the robot's current state with each joint within its bounds."""
         return self.enforce_bounds(self.get_current_state())
 
     def enforce_bounds(self, robot_state_msg: RobotState) -> RobotState:
-        """Returns a state with each joint wrapped or cut off to its bounds; the given one stays as it is.
+        """Returns a copy of a state with each joint wrapped or clipped to its bounds.
 
         Raises:
-            genpy.DeserializationError: the state names no joint; as in MoveIt, whose message is then empty.
+            genpy.DeserializationError: The state names no joint; MoveIt deserializes an empty message then.
         """
         if not robot_state_msg.joint_state.name and not robot_state_msg.is_diff:
             raise genpy.DeserializationError(
@@ -190,13 +196,13 @@ class GroupConnection:
 
     def _pose_of(self, link: str, state: RobotState) -> PoseStamped:
         link = self._link(link, "get the pose of")
-        state.is_diff = link not in self._model.links  # with the attached objects, which the state does not have
+        state.is_diff = link not in self._model.links  # keeps the attached objects, which the state lacks
         pose = forward_kinematics(self._servers, self._model.planning_frame, link, state)
         pose.header.stamp = rospy.Time.now()
         return pose
 
     def _link(self, link: str, purpose: str) -> str:
-        """Returns the link a command is for; raises MoveItCommanderException if there is none."""
+        """Returns the given link or the end effector link; raises MoveItCommanderException without one."""
         chosen = link or self._end_effector_link
         if not chosen:
             raise MoveItCommanderException(
@@ -207,7 +213,7 @@ class GroupConnection:
         return chosen
 
     def _require_frame(self, name: str, failure: str) -> None:
-        """Checks that the robot has a link, or holds an object or a subframe, of a name."""
+        """Raises MoveItCommanderException unless the robot has the link, or holds the object or subframe."""
         if name in self._model.links:
             return
         held = held_frames(self._servers)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint targets of a group: values, names, random states, and joint values found from a pose."""
+"""Joint targets of a group: joint values, named states, random states, and inverse kinematics of a pose."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from moveit_commander.robot_model import group_values
 
 
 class Target(Enum):
-    """Which kind of target a plan goes to: the one set last."""
+    """Kind of the active target, which is the target set last."""
 
     JOINT = auto()
     POSE = auto()
@@ -32,7 +32,7 @@ class Target(Enum):
 
 
 class GroupJointTargets(GroupSettings):
-    """Joint targets of a group; a refused target leaves the one before in force."""
+    """Joint targets of a group; a rejected target leaves the previous target active."""
 
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         super().__init__(name, robot_description, ns, wait_for_servers)
@@ -52,14 +52,14 @@ class GroupJointTargets(GroupSettings):
         """Sets a joint target.
 
         Args:
-            arg1: a list with every variable of the group; a dict or JointState with some of them; the name of one
-                joint or variable; or a Pose or PoseStamped, which compute_ik turns into joint values at once.
-            arg2: with a joint's name: its value, or a list with one for each of its variables. With a pose: the link it
-                is for (str), or whether a solution nearby will do (bool).
-            arg3: with a pose: the other one of these two.
+            arg1: A list with every variable of the group; a dict or JointState with some variables; the name of a
+                joint or variable; or a Pose or PoseStamped, which compute_ik immediately converts to joint values.
+            arg2: For a joint name, its value or a list of values per variable. For a pose, the link (str), or whether
+                an approximate solution suffices (bool).
+            arg3: For a pose, the remaining one of link and approximation.
 
         Raises:
-            MoveItCommanderException: a joint or a link is unknown, a value is out of bounds, the pose has no solution.
+            MoveItCommanderException: A joint or link is unknown, a value is out of bounds, or the pose has no solution.
         """
         if isinstance(arg1, Pose | PoseStamped):
             self._set_from_pose(arg1, *link_and_approximate(arg2, arg3))
@@ -87,29 +87,29 @@ class GroupJointTargets(GroupSettings):
             )
 
     def set_random_target(self) -> None:
-        """Sets a joint target drawn evenly within the bounds."""
+        """Sets a joint target sampled uniformly within the bounds."""
         self._set_values(self._model.random_values(self._group, self._random))
 
     def get_random_joint_values(self) -> list[float]:
-        """Returns joint values drawn evenly within the bounds [rad or m]."""
+        """Returns joint values sampled uniformly within the bounds [rad or m]."""
         return list(self._model.random_values(self._group, self._random).values())
 
     def get_random_pose(self, end_effector_link: str = "") -> PoseStamped:
-        """Returns the pose of a link, or of the end effector link, at joint values drawn within the bounds."""
+        """Returns the pose of a link (default: the end effector link) at joint values sampled within the bounds."""
         self._link(end_effector_link, "get the pose of")
         drawn = self._state.positions(self._group_names()) | self._model.random_values(self._group, self._random)
         return self._pose_of(end_effector_link, self._state.message_of(drawn))
 
     def get_named_targets(self) -> list[str]:
-        """Returns the names of joint targets: those of the SRDF and those remembered."""
+        """Returns the names of the joint targets in the SRDF and of remembered joint values."""
         return sorted({*self._group.states, *self._remembered})
 
     def set_named_target(self, name: str) -> None:
-        """Sets a joint target by a name of the SRDF or one given to remember_joint_values."""
+        """Sets a joint target by a name of the SRDF or of remembered joint values."""
         self._set_values(self.get_named_target_values(name))
 
     def get_named_target_values(self, target: str) -> dict[str, float]:
-        """Returns the joint values of a named target by joint [rad or m]."""
+        """Returns the joint values of a named target [rad or m], keyed by joint."""
         if target in self._remembered:
             return group_values(self._group, self._remembered[target])
         if target not in self._group.states:
@@ -120,17 +120,17 @@ class GroupJointTargets(GroupSettings):
         return dict(self._group.states[target])
 
     def remember_joint_values(self, name: str, values: Iterable[float] | None = None) -> None:
-        """Keeps joint values under a name; none given: the present ones."""
+        """Stores joint values under a name; without values, the current ones."""
         kept = self.get_current_joint_values() if values is None else [float(value) for value in values]
         group_values(self._group, kept)
         self._remembered[name] = kept
 
     def get_remembered_joint_values(self) -> dict[str, list[float]]:
-        """Returns the kept joint values by name [rad or m]."""
+        """Returns the remembered joint values [rad or m], keyed by name."""
         return {name: list(values) for name, values in self._remembered.items()}
 
     def forget_joint_values(self, name: str) -> None:
-        """Drops kept joint values; an unknown name is no error."""
+        """Removes remembered joint values; an unknown name is ignored."""
         self._remembered.pop(name, None)
 
     def _set_values(self, values: Mapping[str, Any]) -> None:
@@ -155,7 +155,7 @@ class GroupJointTargets(GroupSettings):
         self._active_target = Target.JOINT
 
     def _values_of_joint(self, name: str, value: Any) -> dict[str, float]:
-        """Names the value of a joint, or one for each variable of a planar or floating one."""
+        """Returns the values of a joint's variables, keyed by variable."""
         if value is None:
             raise MoveItCommanderException(f"Joint value expected when joint name specified ('{name}')")
         values = list(value) if isinstance(value, Iterable) else [value]
@@ -171,15 +171,15 @@ class GroupJointTargets(GroupSettings):
     def _set_from_pose(self, pose: Pose | PoseStamped, link: str, approximate: bool) -> None:
         stamped = pose if isinstance(pose, PoseStamped) else PoseStamped(pose=pose)
         request = GetPositionIKRequest()
-        asked = request.ik_request
-        asked.group_name, asked.ik_link_name = self._group.name, self._link(link, "set the pose for")
-        asked.pose_stamped.pose = stamped.pose
-        asked.pose_stamped.header.frame_id = stamped.header.frame_id or self.get_pose_reference_frame()
-        asked.robot_state = self._state.message_of(self._joint_target)
-        asked.robot_state.is_diff = True
+        ik_request = request.ik_request
+        ik_request.group_name, ik_request.ik_link_name = self._group.name, self._link(link, "set the pose for")
+        ik_request.pose_stamped.pose = stamped.pose
+        ik_request.pose_stamped.header.frame_id = stamped.header.frame_id or self.get_pose_reference_frame()
+        ik_request.robot_state = self._state.message_of(self._joint_target)
+        ik_request.robot_state.is_diff = True
         answer = self._servers.call("compute_ik", GetPositionIK, request)
         if answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and approximate:
-            self._set_values(self._nearest_to(asked.ik_link_name, asked.pose_stamped))
+            self._set_values(self._nearest_values(ik_request.ik_link_name, ik_request.pose_stamped))
             return
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
             raise MoveItCommanderException(
@@ -190,8 +190,8 @@ class GroupJointTargets(GroupSettings):
         found, wanted = self._state.values_of(answer.solution), set(self._group_names())
         self._set_values({name: value for name, value in found.items() if name in wanted})
 
-    def _nearest_to(self, link: str, pose: PoseStamped) -> dict[str, float]:
-        """Returns joint values near the current target that bring a link as near to a pose as they can."""
+    def _nearest_values(self, link: str, pose: PoseStamped) -> dict[str, float]:
+        """Returns joint values near the current target that minimise the pose error of a link."""
         start = {**self._state.positions(self._group_names()), **self._joint_target}
         moved = [joint for joint in self._group.active_joints if joint.movable]
         base = next(joint.parent for joint in self._group.joints if joint.movable)
@@ -216,7 +216,7 @@ class GroupJointTargets(GroupSettings):
 
 
 def link_and_approximate(*arguments: Any) -> tuple[str, bool]:
-    """Sorts the optional arguments of a pose target by their types."""
+    """Returns the link and the approximation flag from the optional arguments of a pose target."""
     link, approximate = "", False
     for argument in arguments:
         match argument:

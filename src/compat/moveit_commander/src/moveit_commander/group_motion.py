@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans and moves a group: plan, go, execute, straight lines, stop."""
+"""Planning and execution of a group: plan, go, execute, Cartesian paths, stop."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from moveit_commander.group_connection import EXECUTE_ACTION, MOVE_ACTION, code_
 from moveit_commander.group_pose_targets import GroupPoseTargets
 from moveit_commander.servers import ACTION_TIMEOUT_S, is_heard
 
-ANSWER_MARGIN_S = 30.0  # beyond the planning time: queueing, smoothing, collision checks
+ANSWER_MARGIN_S = 30.0  # beyond the planning time, for queueing, smoothing and collision checks
 MOTION_TIMEOUT_S = 600.0
 
 
 class GroupMotion(GroupPoseTargets):
-    """The methods of a group that plan or move.
+    """Planning and execution methods of a group.
 
     Publishes: trajectory_execution_event (std_msgs/String).
     """
@@ -42,45 +42,45 @@ class GroupMotion(GroupPoseTargets):
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         super().__init__(name, robot_description, ns, wait_for_servers)
         self._events = rospy.Publisher(ns_join(ns, "trajectory_execution_event"), String, queue_size=1)
-        self._events.impl.set_queue_size(None)  # stop() returns when it is sent: a script may end right after it
+        self._events.impl.set_queue_size(None)  # synchronous, because a script may end right after stop()
 
     def plan(self, joints: Any = None) -> tuple[bool, RobotTrajectory, float, MoveItErrorCodes]:
         """Plans to the target.
 
         Args:
-            joints: a target to set before: the name of remembered joint values, a Pose, or what
-                set_joint_value_target takes; None keeps the target.
+            joints: Target to set first: the name of remembered joint values, a Pose, or an argument of
+                set_joint_value_target; None keeps the current target.
 
         Returns:
-            Whether it worked, the trajectory, the planning time [s], and the error code.
+            Success, trajectory, planning time [s] and error code.
         """
         if isinstance(joints, str):
-            self.set_joint_value_target(self._recalled(joints))
+            self.set_joint_value_target(self._named_values(joints))
         elif isinstance(joints, Pose | PoseStamped):
             self.set_pose_target(joints)
         elif joints is not None:
             self.set_joint_value_target(joints)
         goal = self._goal(plan_only=True)
         result = self._servers.action(MOVE_ACTION, MoveGroupAction).run(goal, self._planning_limit_s())
-        worked = self._judge(result.error_code, "plan")
+        worked = self._check_result(result.error_code, "plan")
         return worked, result.planned_trajectory, result.planning_time, result.error_code
 
     def go(self, joints: Any = None, wait: bool = True) -> bool:
-        """Plans to the target and moves there.
+        """Plans to the target and executes the motion.
 
         Args:
-            joints: as for plan; a bool stands for `wait`.
-            wait: False: answer as soon as the goal is sent.
+            joints: Target as for plan; a bool stands for `wait`.
+            wait: Whether to wait for the end of the motion.
 
         Returns:
-            Whether the group is there; with wait=False, whether the goal was sent.
+            Whether the group reached the target; with wait=False, whether the goal was sent.
         """
         if isinstance(joints, bool):
             wait, joints = joints, None
         elif isinstance(joints, Pose | PoseStamped):
             self.set_pose_target(joints)
         elif isinstance(joints, str):
-            self.set_joint_value_target(self._recalled(joints))
+            self.set_joint_value_target(self._named_values(joints))
         elif joints is not None:
             self.set_joint_value_target(joints)
         caller, goal = self._servers.action(MOVE_ACTION, MoveGroupAction), self._goal(plan_only=False)
@@ -88,10 +88,10 @@ class GroupMotion(GroupPoseTargets):
             caller.send(goal)
             return True
         result = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S)
-        return self._judge(result.error_code, "go")
+        return self._check_result(result.error_code, "go")
 
     def execute(self, trajectory: RobotTrajectory | JointTrajectory, wait: bool = True) -> bool:
-        """Moves along a trajectory that was planned before; returns what go returns."""
+        """Executes a planned trajectory; returns the result as go does."""
         if isinstance(trajectory, JointTrajectory):
             trajectory = RobotTrajectory(joint_trajectory=trajectory)
         if not isinstance(trajectory, RobotTrajectory):
@@ -106,30 +106,30 @@ class GroupMotion(GroupPoseTargets):
         points = trajectory.joint_trajectory.points
         duration_s = points[-1].time_from_start.to_sec() if points else 0.0
         result = caller.run(ExecuteTrajectoryGoal(trajectory), max(MOTION_TIMEOUT_S, 10.0 * duration_s))
-        return self._judge(result.error_code, "execute")
+        return self._check_result(result.error_code, "execute")
 
     def stop(self) -> None:
-        """Stops the motion that runs, if any; also right after this commander was made."""
+        """Stops the current motion, also immediately after the construction of this commander."""
         if is_heard(self._events):
             self._events.publish(String("stop"))
 
     def compute_cartesian_path(
         self, waypoints: Sequence[Any], eef_step: float, *options: Any, **named_options: Any
     ) -> tuple[RobotTrajectory, float]:
-        """Follows straight lines with the end effector link.
+        """Computes a path of straight lines for the end effector link.
 
         Args:
-            waypoints: poses to pass, in the pose reference frame: Pose or lists of 6 or 7 numbers [m, rad].
-            eef_step: longest step along the lines [m].
-            *options: [jump_threshold,] [avoid_collisions=True,] [path_constraints=None], by position; older scripts
-                give the jump threshold (a number), newer ones do not.
-            **named_options: the same, by name.
+            waypoints: Poses in the pose reference frame: Pose, or lists of 6 or 7 numbers [m, rad].
+            eef_step: Maximum step along the lines [m].
+            *options: Positional [jump_threshold,] [avoid_collisions=True,] [path_constraints=None]; the jump threshold
+                (a number) exists only in older versions.
+            **named_options: The same options by name.
 
         Returns:
-            The path and the share of it that was found, in [0, 1]; -1 when move_group could not begin.
+            The path and the computed fraction of the lines in [0, 1], or -1 after an error of move_group.
 
         Raises:
-            ServerError: move_group does not offer the service compute_cartesian_path.
+            ServerError: The service compute_cartesian_path is not available.
         """
         jump_threshold, avoid_collisions, constraints = cartesian_options(options, named_options)
         request = GetCartesianPathRequest(
@@ -148,12 +148,12 @@ class GroupMotion(GroupPoseTargets):
         request.header.stamp = rospy.Time.now()
         answer = self._servers.call("compute_cartesian_path", GetCartesianPath, request)
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
-            self._judge(answer.error_code, "compute_cartesian_path")
+            self._check_result(answer.error_code, "compute_cartesian_path")
             return RobotTrajectory(), -1.0
         return answer.solution, answer.fraction
 
-    def _recalled(self, name: str) -> dict[str, float]:
-        """Returns joint values of a remembered or named target."""
+    def _named_values(self, name: str) -> dict[str, float]:
+        """Returns the joint values of a remembered or named target."""
         return self.get_named_target_values(name)
 
     def _goal(self, plan_only: bool) -> MoveGroupGoal:
@@ -170,7 +170,7 @@ class GroupMotion(GroupPoseTargets):
     def _planning_limit_s(self) -> float:
         return self._planning_time_s * max(1, self._attempts) + ANSWER_MARGIN_S + ACTION_TIMEOUT_S
 
-    def _judge(self, code: MoveItErrorCodes, what: str) -> bool:
+    def _check_result(self, code: MoveItErrorCodes, what: str) -> bool:
         if code.val == MoveItErrorCodes.SUCCESS:
             return True
         rospy.logwarn(
@@ -180,7 +180,7 @@ class GroupMotion(GroupPoseTargets):
 
 
 def cartesian_options(options: Sequence[Any], named: dict[str, Any]) -> tuple[float, bool, Constraints]:
-    """Sorts the options of both public signatures: with a jump threshold before the others, and without."""
+    """Returns the options of both public signatures, with and without a leading jump threshold."""
     names = ["avoid_collisions", "path_constraints"]
     if options and isinstance(options[0], int | float) and not isinstance(options[0], bool):
         names.insert(0, "jump_threshold")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Objects of a group: attach and detach, pick and place."""
+"""Objects of a group: attach, detach, pick and place."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PLACE_KINDS = "Pose, PoseStamped, PlaceLocation, list of PoseStamped or list of 
 
 
 class GroupObjects(GroupMotion):
-    """Objects in the hand of a group.
+    """Object methods of a group.
 
     Publishes: attached_collision_object (moveit_msgs/AttachedCollisionObject).
     """
@@ -45,12 +45,12 @@ class GroupObjects(GroupMotion):
         """Attaches an object of the scene to a link.
 
         Args:
-            object_name: id of the object.
-            link_name: the link; "" for the end effector link, or the group's first link if it has none.
-            touch_links: links that may touch it; none: the link itself.
+            object_name: Id of the object.
+            link_name: Link; "" for the end effector link, or the group's first link without an end effector.
+            touch_links: Links that may touch the object; empty for the link only.
 
         Returns:
-            Whether the request was sent; whether move_group could apply it shows in the scene.
+            Whether the request was sent; the scene shows whether move_group applied it.
         """
         link = link_name or self._end_effector_link or next(iter(self._group.links), "")
         if not link:
@@ -61,7 +61,7 @@ class GroupObjects(GroupMotion):
         return self._publish([message])
 
     def detach_object(self, name: str = "") -> bool:
-        """Detaches what a link of the group holds, or the object of that name, or all the group holds ("")."""
+        """Detaches all objects of a link of the group, the object with this id, or all objects of the group ("")."""
         links = [name] if name in self._group.links else list(self._group.links) if not name else []
         messages = [AttachedCollisionObject(link_name=link) for link in links] or [AttachedCollisionObject()]
         for message in messages:
@@ -70,12 +70,16 @@ class GroupObjects(GroupMotion):
         return self._publish(messages)
 
     def pick(self, object_name: str, grasp: Grasp | Sequence[Grasp] = (), plan_only: bool = False) -> int:
-        """Picks an object by one of the grasps. Returns the error code.
+        """Picks an object with one of the grasps and returns the error code.
 
-        None given: those of the service plan_grasps; where nobody plans any, move_group answers for a pick without.
+        Args:
+            object_name: Id of the object.
+            grasp: Grasp or grasps. Without grasps, the service plan_grasps generates them; if it is not available,
+                move_group plans the pick without grasps.
+            plan_only: Whether to plan without execution.
 
         Raises:
-            ServerError: move_group does not offer the action pickup.
+            ServerError: The action pickup is not available.
         """
         grasps = [grasp] if isinstance(grasp, Grasp) else list(grasp)
         caller = self._servers.action("pickup", PickupAction)
@@ -94,15 +98,20 @@ class GroupObjects(GroupMotion):
             planning_options=self._options(plan_only),
         )
         code = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S).error_code
-        self._judge(code, "pick")
+        self._check_result(code, "pick")
         return int(code.val)
 
     def place(self, object_name: str, location: Any = None, plan_only: bool = False) -> bool:
-        """Places an attached object at a pose, at one of several locations, or (None) anywhere.
+        """Places an attached object; returns whether it succeeded.
+
+        Args:
+            object_name: Id of the object.
+            location: Pose, or list of alternative locations; None for any location.
+            plan_only: Whether to plan without execution.
 
         Raises:
-            ServerError: move_group does not offer the action place.
-            MoveItCommanderException: the location is of another type.
+            ServerError: The action place is not available.
+            MoveItCommanderException: The location has an unsupported type.
         """
         goal = PlaceGoal(
             group_name=self._group.name,
@@ -117,14 +126,14 @@ class GroupObjects(GroupMotion):
         )
         caller = self._servers.action("place", PlaceAction)
         result = caller.run(goal, self._planning_limit_s() + MOTION_TIMEOUT_S)
-        return self._judge(result.error_code, "place")
+        return self._check_result(result.error_code, "place")
 
     def _place_locations(self, location: Any) -> list[PlaceLocation]:
         given = location if isinstance(location, list) else [] if location is None else [location]
         return [item if isinstance(item, PlaceLocation) else self._place_location(item) for item in given]
 
     def _place_location(self, pose: Any) -> PlaceLocation:
-        """Returns a location approached down the planning frame's z and left against the link's x."""
+        """Returns a location with approach along -z of the planning frame and retreat along -x of the link."""
         if not isinstance(pose, Pose | PoseStamped):
             raise MoveItCommanderException(f"Parameter location must be a {PLACE_KINDS} object; got {type(pose)}")
         location = PlaceLocation(place_pose=self._stamped(pose))
@@ -144,7 +153,9 @@ class GroupObjects(GroupMotion):
             answer = self._servers.call("plan_grasps", GraspPlanning, request)
         except ServerError as error:
             rospy.logwarn(
-                "pick of '%s': no grasp is given and nobody plans one (%s); give grasps to pick()", object_name, error
+                "pick of '%s': no grasp is given and no service plans one (%s); give grasps to pick()",
+                object_name,
+                error,
             )
             return []
         if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.grasps:

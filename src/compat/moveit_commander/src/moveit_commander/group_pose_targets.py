@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pose targets of a group: poses, positions and orientations of its end effector link."""
+"""Pose targets of a group: poses, positions and orientations of a link."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ PoseLike = Pose | PoseStamped | Sequence[float]
 
 
 class GroupPoseTargets(GroupJointTargets):
-    """Pose targets of a group, by link, and the planning request made of the target set last."""
+    """Pose targets of a group by link, and the planning request of the active target."""
 
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         super().__init__(name, robot_description, ns, wait_for_servers)
         self._pose_targets: dict[str, list[PoseStamped]] = {}
 
     def set_pose_target(self, pose: PoseLike, end_effector_link: str = "") -> None:
-        """Sets the pose a link, or the end effector link, shall reach.
+        """Sets the target pose of a link.
 
         Args:
             pose: Pose, PoseStamped, [x, y, z, roll, pitch, yaw] or [x, y, z, qx, qy, qz, qw] [m, rad].
-            end_effector_link: the link; "" for the end effector link.
+            end_effector_link: Link; "" for the end effector link.
         """
         self.set_pose_targets([pose], end_effector_link)
 
     def set_pose_targets(self, poses: Sequence[PoseLike], end_effector_link: str = "") -> None:
-        """Sets several poses; reaching any one of them is enough."""
+        """Sets alternative target poses of a link."""
         link = self._link(end_effector_link, "set poses for")
         if not poses:
             raise MoveItCommanderException("Unable to set target poses: the list is empty")
@@ -43,7 +43,7 @@ class GroupPoseTargets(GroupJointTargets):
         self._active_target = Target.POSE
 
     def set_position_target(self, xyz: Sequence[float], end_effector_link: str = "") -> None:
-        """Sets the position a link shall reach [m], with any orientation."""
+        """Sets the target position of a link [m], with any orientation."""
         link = self._link(end_effector_link, "set the pose for")
         if len(xyz) != 3:
             raise MoveItCommanderException(f"Expected [x, y, z]; got {len(xyz)} numbers")
@@ -51,7 +51,7 @@ class GroupPoseTargets(GroupJointTargets):
         self._active_target = Target.POSITION
 
     def set_orientation_target(self, q: Sequence[float], end_effector_link: str = "") -> None:
-        """Sets the orientation a link shall reach (quaternion xyzw), at any position."""
+        """Sets the target orientation of a link (quaternion xyzw), at any position."""
         link = self._link(end_effector_link, "set the pose for")
         if len(q) != 4:
             raise MoveItCommanderException(f"Expected [qx, qy, qz, qw]; got {len(q)} numbers")
@@ -60,19 +60,19 @@ class GroupPoseTargets(GroupJointTargets):
         self._active_target = Target.ORIENTATION
 
     def set_rpy_target(self, rpy: Sequence[float], end_effector_link: str = "") -> None:
-        """Sets the orientation a link shall reach ([roll, pitch, yaw] [rad]), at any position."""
+        """Sets the target orientation of a link ([roll, pitch, yaw] [rad]), at any position."""
         self._link(end_effector_link, "set the pose for")
         if len(rpy) != 3:
             raise MoveItCommanderException(f"Expected [roll, pitch, yaw]; got {len(rpy)} numbers")
         self.set_orientation_target(conversions.quaternion_from_rpy(*rpy), end_effector_link)
 
     def shift_pose_target(self, axis: int, value: float, end_effector_link: str = "") -> None:
-        """Sets the link's current pose, moved along or rotated about one axis, as the target.
+        """Sets the current pose of a link, translated along or rotated about one axis, as the target.
 
         Args:
-            axis: 0 to 5: x, y, z, roll, pitch, yaw.
-            value: how far [m or rad].
-            end_effector_link: the link; "" for the end effector link.
+            axis: Index from 0 to 5: x, y, z, roll, pitch, yaw.
+            value: Translation [m] or rotation [rad].
+            end_effector_link: Link; "" for the end effector link.
         """
         if axis not in range(6):
             raise MoveItCommanderException(f"An axis value between 0 and 5 expected; got {axis}")
@@ -84,7 +84,7 @@ class GroupPoseTargets(GroupJointTargets):
         self.set_pose_target(conversions.list_to_pose_stamped(numbers, pose.header.frame_id), end_effector_link)
 
     def clear_pose_target(self, end_effector_link: str) -> None:
-        """Removes the pose targets of one link."""
+        """Removes the pose targets of a link."""
         self._pose_targets.pop(end_effector_link or self._end_effector_link, None)
 
     def clear_pose_targets(self) -> None:
@@ -92,7 +92,7 @@ class GroupPoseTargets(GroupJointTargets):
         self._pose_targets.clear()
 
     def construct_motion_plan_request(self) -> MotionPlanRequest:
-        """Returns the planning request of the current settings and the target set last."""
+        """Returns the planning request for the current settings and the active target."""
         return MotionPlanRequest(
             group_name=self._group.name,
             num_planning_attempts=self._attempts,
@@ -111,12 +111,12 @@ class GroupPoseTargets(GroupJointTargets):
         )
 
     def _limited_link(self) -> str:
-        """Returns the link of the speed limit; "" for no limit, and for the tip if the end effector is held."""
+        """Returns the speed-limited link; "" without a limit, and for the tip while it is a held object."""
         tip = self._end_effector_link if self._end_effector_link in self._model.links else ""
         return (self._speed_limited_link or tip) if self._speed_limit > 0.0 else ""
 
     def _goals(self) -> list[Constraints]:
-        """Returns the goals: the k-th holds the k-th pose of every link."""
+        """Returns the goal constraints; the k-th goal contains the k-th pose of every link."""
         if self._active_target is Target.JOINT:
             active = {item.name: self._joint_target[item.name] for item in self._group.active_variables}
             return [joint_goal(active, self._joint_tolerance)]

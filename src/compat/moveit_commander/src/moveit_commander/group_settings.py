@@ -13,13 +13,13 @@ from moveit_commander.exception import MoveItCommanderException
 from moveit_commander.group_connection import GroupConnection
 
 NO_DATABASE = (
-    "no database of constraints is chosen: call set_constraints_database with the path of an SQLite file, "
-    "or give the moveit_msgs/Constraints message itself"
+    "no database of constraints is selected: call set_constraints_database with the path of an SQLite file, "
+    "or give the moveit_msgs/Constraints message"
 )
 
 
 class GroupSettings(GroupConnection):
-    """The settings that go into every planning request of a group."""
+    """Settings of every planning request of a group."""
 
     def __init__(self, name: str, robot_description: str, ns: str, wait_for_servers: float) -> None:
         super().__init__(name, robot_description, ns, wait_for_servers)
@@ -43,11 +43,11 @@ class GroupSettings(GroupConnection):
         self.constraints_storage: ConstraintsStorage | None = None
 
     def set_start_state_to_current_state(self) -> None:
-        """Starts plans at the current state."""
+        """Plans from the current state."""
         self._start_state = RobotState(is_diff=True)
 
     def set_start_state(self, msg: RobotState) -> None:
-        """Starts plans at a given state (moveit_msgs/RobotState)."""
+        """Plans from a given state."""
         self._start_state = msg
 
     def get_goal_tolerance(self) -> tuple[float, float, float]:
@@ -59,7 +59,7 @@ class GroupSettings(GroupConnection):
         return self._joint_tolerance
 
     def get_goal_position_tolerance(self) -> float:
-        """Returns the radius of the sphere about a position goal [m]."""
+        """Returns the radius of the tolerance sphere of position goals [m]."""
         return self._position_tolerance
 
     def get_goal_orientation_tolerance(self) -> float:
@@ -67,7 +67,7 @@ class GroupSettings(GroupConnection):
         return self._orientation_tolerance
 
     def set_goal_tolerance(self, value: float) -> None:
-        """Sets all three tolerances to one number."""
+        """Sets all three tolerances to one value."""
         self._joint_tolerance = self._position_tolerance = self._orientation_tolerance = value
 
     def set_goal_joint_tolerance(self, value: float) -> None:
@@ -75,7 +75,7 @@ class GroupSettings(GroupConnection):
         self._joint_tolerance = value
 
     def set_goal_position_tolerance(self, value: float) -> None:
-        """Sets the radius of the sphere about a position goal [m]."""
+        """Sets the radius of the tolerance sphere of position goals [m]."""
         self._position_tolerance = value
 
     def set_goal_orientation_tolerance(self, value: float) -> None:
@@ -83,27 +83,27 @@ class GroupSettings(GroupConnection):
         self._orientation_tolerance = value
 
     def allow_looking(self, value: bool) -> None:
-        """Returns whether move_group may look around with its sensors while it moves."""
+        """Sets whether move_group may look around with its sensors during motions."""
         self._looking = bool(value)
 
     def allow_replanning(self, value: bool) -> None:
-        """Returns whether move_group may plan again when the scene changes on the way."""
+        """Sets whether move_group may replan when the scene changes during a motion."""
         self._replanning = bool(value)
 
     def get_known_constraints(self) -> list[str]:
-        """Returns the names of the group's constraints in the database; none where no database is chosen."""
+        """Returns the names of the group's constraints in the database; empty without a database."""
         storage = self.constraints_storage
         return [] if storage is None else storage.get_known_constraints(self._model.name, self._group.name)
 
     def set_constraints_database(self, host: str, port: int) -> None:
-        """Chooses the database set_path_constraints takes names from.
+        """Selects the database of named path constraints.
 
         Args:
-            host: path of an SQLite file, as MoveIt's plugin warehouse_ros_sqlite takes it; ConstraintsStorage fills it.
-            port: not needed for a file.
+            host: Path of an SQLite file of the plugin warehouse_ros_sqlite; ConstraintsStorage writes such files.
+            port: Ignored for a file.
 
         Raises:
-            MoveItCommanderException: it is no such file.
+            MoveItCommanderException: The path is not a file of constraints.
         """
         self.constraints_storage = ConstraintsStorage(host)
 
@@ -112,10 +112,10 @@ class GroupSettings(GroupConnection):
         return self._path_constraints
 
     def set_path_constraints(self, value: Constraints | str | None) -> None:
-        """Sets the path constraints, as a message or by its name in the database; None clears it.
+        """Sets the path constraints as a message or by name in the database; None clears them.
 
         Raises:
-            MoveItCommanderException: the database has no such name, or none is chosen, or the type is another one.
+            MoveItCommanderException: The name is unknown, no database is selected, or the type is unsupported.
         """
         if value is None:
             self.clear_path_constraints()
@@ -150,37 +150,37 @@ class GroupSettings(GroupConnection):
         self._trajectory_constraints = TrajectoryConstraints()
 
     def set_planning_time(self, seconds: float) -> None:
-        """Sets how long a planner may search [s]; times not above 0 change nothing, as in MoveIt."""
+        """Sets the planning time [s]; as in MoveIt, times of 0 or less are ignored."""
         if seconds > 0.0:
             self._planning_time_s = float(seconds)
 
     def get_planning_time(self) -> float:
-        """Returns how long a planner may search [s]."""
+        """Returns the planning time [s]."""
         return self._planning_time_s
 
     def set_planning_pipeline_id(self, planning_pipeline: str) -> None:
-        """Chooses the planning pipeline (e.g. ompl); "" is move_group's default. Clears the planner id."""
+        """Selects the planning pipeline (e.g. ompl), "" for move_group's default, and clears the planner id."""
         if planning_pipeline != self._pipeline_id:
             self._pipeline_id, self._planner_id = planning_pipeline, ""
 
     def get_planning_pipeline_id(self) -> str:
-        """Returns the planning pipeline; "" is move_group's default."""
+        """Returns the planning pipeline; "" for move_group's default."""
         return self._pipeline_id
 
     def set_planner_id(self, planner_id: str) -> None:
-        """Chooses a planner of the pipeline (e.g. RRTConnect); "" is the group's default."""
+        """Selects a planner of the pipeline (e.g. RRTConnect); "" for the group's default."""
         self._planner_id = planner_id
 
     def get_planner_id(self) -> str:
-        """Returns the chosen planner; "" is the group's default."""
+        """Returns the selected planner; "" for the group's default."""
         return self._planner_id
 
     def set_num_planning_attempts(self, num_planning_attempts: int) -> None:
-        """Sets how many plans are made, the shortest of which is returned."""
+        """Sets the number of plans, of which the shortest is returned."""
         self._attempts = int(num_planning_attempts)
 
     def set_workspace(self, ws: Sequence[float]) -> None:
-        """Bounds the workspace [m]: [], [min x, min y, max x, max y] or [min x, y, z, max x, y, z]."""
+        """Sets the workspace [m]: [], [min x, min y, max x, max y] or [min x, y, z, max x, y, z]."""
         values = [float(value) for value in ws]
         if len(values) not in (0, 4, 6):
             raise MoveItCommanderException(f"Expected 0, 4 or 6 values in list specifying workspace; got {len(values)}")
@@ -194,31 +194,31 @@ class GroupSettings(GroupConnection):
         self._workspace = box
 
     def set_max_velocity_scaling_factor(self, value: float) -> None:
-        """Sets the share of the joints' top velocities to use, in (0, 1]."""
-        self._velocity_scaling = _share(value, "velocity")
+        """Sets the fraction of the maximum joint velocities, in (0, 1]."""
+        self._velocity_scaling = _scaling_factor(value, "velocity")
 
     def set_max_acceleration_scaling_factor(self, value: float) -> None:
-        """Sets the share of the joints' top accelerations to use, in (0, 1]."""
-        self._acceleration_scaling = _share(value, "acceleration")
+        """Sets the fraction of the maximum joint accelerations, in (0, 1]."""
+        self._acceleration_scaling = _scaling_factor(value, "acceleration")
 
     def limit_max_cartesian_link_speed(self, speed: float, link_name: str = "") -> None:
-        """Bounds the speed of a link, or of the end effector link [m/s]."""
+        """Limits the speed of a link (default: the end effector link) [m/s]."""
         if not (math.isfinite(speed) and speed > 0.0):
             raise MoveItCommanderException(f"Expected speed value to be greater than 0; got {speed} m/s")
         self._speed_limit, self._speed_limited_link = float(speed), link_name
 
     def clear_max_cartesian_link_speed(self) -> None:
-        """Clears the bound on a link's speed."""
+        """Removes the speed limit of a link."""
         self._speed_limit, self._speed_limited_link = 0.0, ""
 
     def set_support_surface_name(self, value: str) -> None:
-        """Sets the object that objects are picked from and placed on."""
+        """Sets the object that supports picked and placed objects."""
         self._support_surface = value
 
 
-def _share(value: float, what: str) -> float:
+def _scaling_factor(value: float, limit: str) -> float:
     if not 0.0 < value <= 1.0:
         raise MoveItCommanderException(
-            f"Expected value in the range from 0 to 1 for scaling factor; got {value} for {what}, allowed is (0, 1]"
+            f"Expected value in the range from 0 to 1 for scaling factor; got {value} for {limit}, allowed is (0, 1]"
         )
     return float(value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Commands as text, for people at a terminal and files of commands: MoveGroupCommandInterpreter."""
+"""Text commands for terminals and command files: MoveGroupCommandInterpreter."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ GENERAL = {
     "help": ("help", "this list"),
 }
 ALIASES = {"which": "id", "groups": "use"}
-FOLDER = Path("cmd")  # files here are commands by their names
+FOLDER = Path("cmd")  # its files are commands by name
 
 
 class MoveGroupCommandInterpreter:
-    """Executes lines of text for one group at a time."""
+    """Executes command lines for one group at a time."""
 
     DEFAULT_FILENAME = "move_group.cfg"
     GO_DIRS = DIRECTIONS
@@ -50,15 +50,15 @@ class MoveGroupCommandInterpreter:
         self._traces = False
 
     def get_active_group(self) -> MoveGroupCommander | None:
-        """Returns the group that is commanded, if any."""
+        """Returns the active group, if any."""
         return self._groups[self._name].group if self._name else None
 
     def get_loaded_groups(self) -> list[str]:
-        """Returns the groups that were used so far."""
+        """Returns the groups used so far."""
         return list(self._groups)
 
     def execute(self, cmd: str) -> Answer:
-        """Executes a line; returns a level of MoveGroupInfoLevel and what to show. It never raises for a bad line."""
+        """Executes a line; returns a MoveGroupInfoLevel and a text, also for an invalid line."""
         line = self.resolve_command_alias(cmd.strip())
         if not line:
             return OK
@@ -68,31 +68,31 @@ class MoveGroupCommandInterpreter:
         group = self.get_active_group()
         if group is None:
             return MoveGroupInfoLevel.WARN, (
-                "No group is commanded yet; say: use <group>, with one of "
+                "No group is active yet; enter: use <group>, with one of "
                 f"{', '.join(self._robot.get_group_names())}\n\n{self.get_help()}"
             )
         return self.execute_group_command(group, line)
 
     def resolve_command_alias(self, cmdorig: str) -> str:
-        """Returns the command another name stands for."""
+        """Returns the command of an alias."""
         return ALIASES.get(cmdorig.lower(), cmdorig)
 
     def execute_generic_command(self, cmd: str) -> Answer | None:
-        """Executes a command that concerns no group in particular; None: it is not one."""
+        """Executes a command that is independent of groups; returns None for other commands."""
         try:
             return self._execute_generic(cmd)
         except MoveItCommanderException as error:
             return MoveGroupInfoLevel.WARN, str(error)
 
     def execute_group_command(self, g: MoveGroupCommander, cmdorig: str) -> Answer:
-        """Executes a command for a group."""
+        """Executes a command of a group."""
         try:
             return self._commands_of(g).execute(cmdorig)
         except MoveItCommanderException as error:
             return MoveGroupInfoLevel.WARN, str(error)
 
     def _execute_generic(self, line: str) -> Answer | None:
-        if os.path.isfile(f"{FOLDER}/{line}"):  # a line may be longer than a file name can be, and begin with a slash
+        if os.path.isfile(f"{FOLDER}/{line}"):  # tolerates overlong lines and leading slashes
             return self._load([f"{FOLDER}/{line}"])
         words = line.split()
         first = words[0].lower()
@@ -134,14 +134,14 @@ class MoveGroupCommandInterpreter:
         return OK
 
     def _load(self, words: Words) -> Answer:
-        """Executes a file; it ends at the first line that is not understood or not done."""
+        """Executes the lines of a file until the first invalid or failed line."""
         path = Path(words[0] if words else self.DEFAULT_FILENAME)
         in_folder = f"{FOLDER}/{path}"
         if not os.path.isfile(path) and os.path.isfile(in_folder):
             path = Path(in_folder)
         try:
             lines = path.read_text().splitlines()
-        except (OSError, ValueError) as error:  # no text, or no name of a file
+        except (OSError, ValueError) as error:  # not a text file, or an invalid file name
             raise MoveItCommanderException(f"Unable to load {path}: {error}") from error
         for number, line in enumerate(lines, 1):
             command = line.partition("#")[0].strip()
@@ -168,7 +168,7 @@ class MoveGroupCommandInterpreter:
         return OK
 
     def get_help(self) -> str:
-        """Returns all commands, a line each."""
+        """Returns all commands, one per line."""
         rows = [
             *GENERAL.values(),
             *((item.usage, item.text) for item in dict.fromkeys(COMMANDS.values())),
@@ -177,7 +177,7 @@ class MoveGroupCommandInterpreter:
         return "\n".join(["Known commands:", *(f"  {usage:<32} {text}" for usage, text in rows)])
 
     def get_keywords(self) -> dict[str, list[str]]:
-        """Returns what may follow each command, for completion."""
+        """Returns the possible arguments of each command, for completion."""
         group = self.get_active_group()
         known = list(group.get_remembered_joint_values()) if group else []
         states = list(group.get_named_targets()) if group else []

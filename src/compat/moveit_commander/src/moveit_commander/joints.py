@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One joint of the robot model, made from the URDF, the SRDF's virtual joint, or their entries in joint_limits.yaml."""
+"""Joint of the robot model, from the URDF, the SRDF's virtual joint and joint_limits.yaml."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ QUATERNION_W = "rot_w"
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint; bounds [rad or m], origin [m, rad] in the parent link, axis in the joint's own frame.
+    """A joint with bounds [rad or m], origin [m, rad] in the parent link, and axis in the joint frame.
 
-    A planar or floating one has `parts`: one joint for each of its variables, called "joint/variable". `neutral` is
-    where a joint is that nobody has placed.
+    A planar or floating joint has `parts`, one joint per variable named "joint/variable". `neutral` is the initial
+    position.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Joint:
 
     @property
     def variables(self) -> tuple[Joint, ...]:
-        """Returns what has a position of its own: itself, the parts of a planar or floating joint, or nothing."""
+        """Returns the variables: the parts of a planar or floating joint, the joint if movable, or nothing."""
         return self.parts or ((self,) if self.movable else ())
 
     @property
@@ -56,29 +56,35 @@ class Joint:
 
     @property
     def active(self) -> bool:
-        """Whether it moves by itself: neither fixed nor mimic."""
+        """Whether the joint moves independently: neither fixed nor mimic."""
         return bool(self.parts) or (self.movable and not self.leader)
 
     @property
     def default(self) -> float:
-        """The neutral position, or the middle of the bounds where that is out of them."""
+        """The neutral position, or the middle of the bounds if the neutral position is outside."""
         return self.neutral if self.lower <= self.neutral <= self.upper else (self.lower + self.upper) / 2.0
 
     def admits(self, value: float, tolerance: float = 0.0) -> bool:
-        """Returns whether a position keeps the bounds; a continuous joint has none."""
+        """Returns whether a position is within the bounds; any finite position of a continuous joint is."""
         if not math.isfinite(value):
             return False
         return self.kind == "continuous" or self.lower - tolerance <= value <= self.upper + tolerance
 
     def bounded(self, value: float) -> float:
-        """Returns the position, wrapped to (-pi, pi] or cut off at the bounds."""
+        """Returns the position wrapped to (-pi, pi] or clipped to the bounds."""
         if self.kind == "continuous":
             return math.remainder(value, 2.0 * math.pi)
         return min(max(value, self.lower), self.upper)
 
 
 def root_joint(virtual: VirtualJoint | None, root_link: str, limits: Mapping[str, Any]) -> Joint:
-    """Returns the joint above the root link: that of the SRDF, with its limits of joint_limits.yaml, or a fixed one."""
+    """Returns the joint above the root link: the SRDF's virtual joint with limits, or a fixed joint.
+
+    Args:
+        virtual: Virtual joint of the SRDF, or None.
+        root_link: Root link of the robot.
+        limits: Entries of joint_limits.yaml, keyed by joint.
+    """
     if virtual is None:
         return Joint(ASSUMED_ROOT_JOINT, "fixed", "", root_link)
     parts = tuple(_part(virtual, name, limits) for name in virtual.variables)
@@ -86,7 +92,7 @@ def root_joint(virtual: VirtualJoint | None, root_link: str, limits: Mapping[str
 
 
 def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
-    """Returns one variable of a virtual joint, with MoveIt's bounds or those of joint_limits.yaml."""
+    """Returns a variable of a virtual joint, with MoveIt's bounds or those of joint_limits.yaml."""
     variable = name.rpartition("/")[2]
     bound = math.pi if variable == "theta" else 1.0 if variable.startswith("rot_") else math.inf
     part = Joint(
@@ -98,8 +104,8 @@ def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
         bound,
         neutral=1.0 if variable == QUATERNION_W else 0.0,
     )
-    of_joint = limits.get(joint.name) or {}  # the parameter server splits "joint/variable" at the slash
-    entry = limits.get(name) or (of_joint.get(variable) if isinstance(of_joint, Mapping) else None) or {}
+    joint_limits = limits.get(joint.name) or {}  # the parameter server splits "joint/variable" at the slash
+    entry = limits.get(name) or (joint_limits.get(variable) if isinstance(joint_limits, Mapping) else None) or {}
     if not entry.get("has_position_limits", False):
         return part
     lower, upper = float(entry.get("min_position", -bound)), float(entry.get("max_position", bound))
@@ -107,12 +113,12 @@ def _part(joint: VirtualJoint, name: str, limits: Mapping[str, Any]) -> Joint:
 
 
 def is_quaternion(variable: Joint) -> bool:
-    """Returns whether a variable is one of the four numbers of a floating joint's rotation."""
+    """Returns whether a variable is a quaternion component of a floating joint."""
     return variable.name.rpartition("/")[2].startswith("rot_")
 
 
 def joint_of(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
-    """Returns a joint of the URDF within its limits; raises RobotModelError for what is no number."""
+    """Returns a joint of the URDF with its limits; raises RobotModelError for invalid numbers."""
     try:
         return _limited(joint, limits.get(joint.name) or {})
     except (ValueError, TypeError, AttributeError) as error:
@@ -123,7 +129,7 @@ def joint_of(joint: urdf_robot.Joint, limits: Mapping[str, Any]) -> Joint:
 
 
 def _limited(joint: urdf_robot.Joint, entry: Mapping[str, Any]) -> Joint:
-    """The joint within the limits of the description, or those that its entry in joint_limits.yaml puts in place."""
+    """Returns a joint with the limits of the description, overridden by its entry in joint_limits.yaml."""
     is_endless = joint.kind == "continuous"
     limits, _ = overwritten(joint.name, described_limits(joint), entry, is_endless)
     lower, upper = (-math.pi, math.pi) if is_endless else (limits.lower, limits.upper)

@@ -19,7 +19,7 @@ from moveit_commander.trajectory_timing import ALGORITHMS, Limits, distinct, ret
 
 
 class MoveGroupCommander(GroupObjects):
-    """Plans and moves one planning group of a robot, through the move_group node."""
+    """Plans and executes motions of a planning group through the move_group node."""
 
     def __init__(
         self, name: str, robot_description: str = "robot_description", ns: str = "", wait_for_servers: float = 5.0
@@ -27,13 +27,13 @@ class MoveGroupCommander(GroupObjects):
         """Connects to move_group.
 
         Args:
-            name: the planning group.
-            robot_description: parameter with the robot's URDF; SRDF and limits are beside it.
-            ns: namespace of move_group's endpoints and of joint_states.
-            wait_for_servers: how long to wait for move_group [s]; 0: for ever.
+            name: Planning group.
+            robot_description: Parameter of the robot's URDF; SRDF and limits are beside it.
+            ns: Namespace of move_group's endpoints and of joint_states.
+            wait_for_servers: Timeout of the connection [s]; 0 waits forever.
 
         Raises:
-            RobotModelError: no such group or no description (a RuntimeError too).
+            RobotModelError: The group or the description does not exist (a RuntimeError too).
             ServerError: move_group did not answer in time (a RuntimeError too).
         """
         super().__init__(name, robot_description, ns, wait_for_servers)
@@ -44,18 +44,18 @@ class MoveGroupCommander(GroupObjects):
         """Returns the 6 x n Jacobian of the group's last link, in the frame of the group's base link.
 
         Args:
-            joint_values: positions of the group's variables [rad or m].
-            reference_point: point of the last link, in its frame [m]; None: its origin.
+            joint_values: Positions of the group's variables [rad or m].
+            reference_point: Point of the last link in its frame [m]; None for its origin.
 
         Raises:
-            MoveItCommanderException: the group is not a chain, or the values do not fit it.
+            MoveItCommanderException: The group is not a chain, or the number of values is wrong.
         """
         if not self._group.is_chain:
             raise MoveItCommanderException(f"get_jacobian_matrix: group '{self._group.name}' is not a chain")
         if any(joint.parts for joint in self._group.joints):
             raise MoveItCommanderException(
-                f"get_jacobian_matrix: group '{self._group.name}' has a planar or floating joint; ask a group of "
-                "revolute and prismatic joints alone"
+                f"get_jacobian_matrix: group '{self._group.name}' has a planar or floating joint; use a group of "
+                "revolute and prismatic joints only"
             )
         chain = self._model.chain(self._group.joints[0].parent, self._group.tip)
         positions = self._model.complete(group_values(self._group, joint_values))
@@ -70,18 +70,18 @@ class MoveGroupCommander(GroupObjects):
         acceleration_scaling_factor: float = 1.0,
         algorithm: str = "iterative_time_parameterization",
     ) -> RobotTrajectory:
-        """Returns the trajectory with new times, velocities and accelerations; its waypoints stay.
+        """Returns the trajectory with the same waypoints but new times, velocities and accelerations.
 
         Args:
-            ref_state_in: state of the other joints; not needed here.
-            traj_in: the trajectory; points equal to the one before are left out.
-            velocity_scaling_factor: share of the top velocities, in (0, 1].
-            acceleration_scaling_factor: share of the top accelerations, in (0, 1].
-            algorithm: one of MoveIt's names; all are one time-optimal algorithm here. Another one is an error on the
-                log, and the answer is empty, as in MoveIt.
+            ref_state_in: State of the other joints, which is ignored.
+            traj_in: Trajectory; repeated points are removed.
+            velocity_scaling_factor: Fraction of the maximum velocities, in (0, 1].
+            acceleration_scaling_factor: Fraction of the maximum accelerations, in (0, 1].
+            algorithm: One of MoveIt's names, which all select the same time-optimal algorithm. As in MoveIt, an
+                unknown name logs an error and returns an empty trajectory.
 
         Raises:
-            MoveItCommanderException: an argument has another type, a joint is unknown, the positions of a point are
+            MoveItCommanderException: An argument has a wrong type, a joint is unknown, the positions of a point are
                 not one finite number per joint, or a limit is not above 0.
         """
         for name, value, kind in (
@@ -146,7 +146,7 @@ class MoveGroupCommander(GroupObjects):
 
 
 def _factor(kind: str, value: float) -> float:
-    """Returns the scaling factor; as in MoveIt, one that is not in (0, 1] is 1, with a warning."""
+    """Returns the scaling factor; as in MoveIt, a factor outside (0, 1] is replaced by 1 with a warning."""
     if 0.0 < value <= 1.0:
         return value
     rospy.logwarn("retime_trajectory: %s_scaling_factor is %s; allowed is 0 < factor <= 1; 1 is used", kind, value)

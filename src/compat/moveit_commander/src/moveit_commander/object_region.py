@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks whether a collision object lies within a box."""
+"""Tests whether a collision object lies within a box."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A box along the axes of a frame, bounds included [m]."""
+    """A closed box aligned with the axes of a frame [m]."""
 
     low: Vector
     high: Vector
 
     def contains(self, point: Vector) -> bool:
-        """Returns whether a point is in the box."""
+        """Returns whether a point is within the box."""
         return all(low <= value <= high for low, value, high in zip(self.low, point, self.high, strict=True))
 
 
 def inside(item: CollisionObject, region: Region) -> bool:
-    """Returns whether the origin of every shape of an object (without shapes: its own) is in the region."""
+    """Returns whether the origins of all shapes of an object (or its own without shapes) are within the region."""
     shapes = [*item.primitive_poses, *item.mesh_poses, *item.plane_poses]
     points = [transform_point(item.pose, pose.position) for pose in shapes]
     origin = item.pose.position
@@ -33,7 +33,7 @@ def inside(item: CollisionObject, region: Region) -> bool:
 
 
 def transform_point(pose: Pose, point: Point) -> Vector:
-    """Returns a point given in the frame of a pose, in the frame the pose is given in."""
+    """Returns a point of a pose's frame in the parent frame of the pose."""
     orientation = pose.orientation
     quaternion = [orientation.x, orientation.y, orientation.z, orientation.w]
     rotation = Rotation.from_quat(quaternion if any(quaternion) else [0.0, 0.0, 0.0, 1.0])

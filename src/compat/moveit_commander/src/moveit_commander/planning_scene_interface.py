@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes and reads the planning scene of move_group: PlanningSceneInterface."""
+"""Modifies and reads the planning scene of move_group: PlanningSceneInterface."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ Vector = Sequence[float]
 class PlanningSceneInterface:
     """Adds, attaches, removes and lists objects.
 
-    Synchronous: each change is in force when the method returns, by the service apply_planning_scene. Otherwise
+    In synchronous mode, the service apply_planning_scene applies each change before the method returns. Otherwise
     changes are published on collision_object and attached_collision_object.
     """
 
     def __init__(self, ns: str = "", synchronous: bool = True) -> None:
-        """Connects to move_group when it is first used; without `synchronous`, advertises the topics.
+        """Creates the interface; connects to move_group on the first call, or advertises the topics.
 
         Args:
-            ns: namespace of move_group's endpoints.
-            synchronous: whether methods wait for move_group.
+            ns: Namespace of move_group's endpoints.
+            synchronous: Whether methods wait for move_group.
         """
         ensure_node()
         self._servers = Servers(ns)
@@ -56,7 +56,7 @@ class PlanningSceneInterface:
             )
 
     def add_object(self, collision_object: CollisionObject) -> None:
-        """Adds an object, or replaces the one with its id."""
+        """Adds an object, or replaces the object with the same id."""
         self._submit(collision_object)
 
     def add_sphere(self, name: str, pose: PoseStamped, radius: float = 1) -> None:
@@ -72,7 +72,7 @@ class PlanningSceneInterface:
         self._submit(self.make_cone(name, pose, height, radius))
 
     def add_mesh(self, name: str, pose: PoseStamped, filename: str, size: Vector = (1, 1, 1)) -> None:
-        """Adds the mesh of a file, scaled by `size` along x, y, z."""
+        """Adds a mesh file scaled along x, y, z."""
         self._submit(self.make_mesh(name, pose, filename, size))
 
     def add_box(self, name: str, pose: PoseStamped, size: Vector = (1, 1, 1)) -> None:
@@ -89,12 +89,12 @@ class PlanningSceneInterface:
         link: str | None = None,
         touch_links: Names | None = None,
     ) -> None:
-        """Attaches a new object, or (by its name) one of the scene, to a link.
+        """Attaches a new object or an object of the scene to a link.
 
         Args:
-            object: the object or its name.
-            link: the link it is fixed to; None: the one of the AttachedCollisionObject.
-            touch_links: links that may touch it; None: the link itself.
+            object: New object, or id of an object of the scene.
+            link: Link; None for the link of the AttachedCollisionObject.
+            touch_links: Links that may touch the object; None for the link only.
         """
         if isinstance(object, str):
             object = collision_objects.existing(object)  # noqa: A001
@@ -113,7 +113,7 @@ class PlanningSceneInterface:
         size: Vector = (1, 1, 1),
         touch_links: Names | None = None,
     ) -> None:
-        """Attaches a mesh of a file; without pose and file: the object of that name."""
+        """Attaches a mesh file; without pose and file, the object with this id."""
         new = self.make_mesh(name, pose, filename, size) if pose is not None and filename else name
         self.attach_object(new, link, touch_links)
 
@@ -125,13 +125,13 @@ class PlanningSceneInterface:
         size: Vector = (1, 1, 1),
         touch_links: Names | None = None,
     ) -> None:
-        """Attaches a box [m]; without pose: the object of that name."""
+        """Attaches a box [m]; without pose, the object with this id."""
         self.attach_object(name if pose is None else self.make_box(name, pose, size), link, touch_links)
 
     def attach_sphere(
         self, link: str, name: str, pose: PoseStamped | None = None, radius: float = 1, touch_links: Names | None = None
     ) -> None:
-        """Attaches a sphere [m]; without pose: the object of that name."""
+        """Attaches a sphere [m]; without pose, the object with this id."""
         self.attach_object(name if pose is None else self.make_sphere(name, pose, radius), link, touch_links)
 
     def attach_cylinder(
@@ -143,26 +143,26 @@ class PlanningSceneInterface:
         radius: float = 1,
         touch_links: Names | None = None,
     ) -> None:
-        """Attaches a cylinder [m]; without pose: the object of that name."""
+        """Attaches a cylinder [m]; without pose, the object with this id."""
         self.attach_object(name if pose is None else self.make_cylinder(name, pose, height, radius), link, touch_links)
 
     def clear(self) -> None:
-        """Removes every object from the scene, attached ones too."""
+        """Removes every object from the scene, including attached objects."""
         self.remove_attached_object()
         self.remove_world_object()
 
     def remove_world_object(self, name: str | None = None) -> None:
-        """Removes one object, or (None) all that are not attached."""
+        """Removes an object, or (None) all objects that are not attached."""
         self._submit(CollisionObject(id=name or "", operation=CollisionObject.REMOVE))
 
     def remove_attached_object(self, link: str | None = None, name: str | None = None) -> None:
-        """Detaches an object, or all of a link, or all; they stay in the scene as objects of the world."""
+        """Detaches an object, all objects of a link, or all objects; they stay in the world."""
         attached = AttachedCollisionObject(link_name=link or "")
         attached.object.id, attached.object.operation = name or "", CollisionObject.REMOVE
         self._submit(attached)
 
     def get_known_object_names(self, with_type: bool = False) -> list[str]:
-        """Returns the names of the world's objects; with_type: only those with a type."""
+        """Returns the ids of the world's objects; with_type restricts them to objects with a type."""
         return [
             item.id
             for item in self._world(PlanningSceneComponents.WORLD_OBJECT_NAMES)
@@ -172,7 +172,7 @@ class PlanningSceneInterface:
     def get_known_object_names_in_roi(
         self, minx: float, miny: float, minz: float, maxx: float, maxy: float, maxz: float, with_type: bool = False
     ) -> list[str]:
-        """As get_known_object_names, of objects whose shapes all have their origin in a box, planning frame [m]."""
+        """Returns the ids of objects whose shapes all have their origin in a box of the planning frame [m]."""
         region = Region((minx, miny, minz), (maxx, maxy, maxz))
         return [
             item.id
@@ -181,11 +181,11 @@ class PlanningSceneInterface:
         ]
 
     def get_object_poses(self, object_ids: Names) -> dict[str, Pose]:
-        """Returns the poses of objects in the planning frame, by name; unknown names are left out."""
+        """Returns the poses of objects in the planning frame, keyed by id; unknown ids are skipped."""
         return {name: item.pose for name, item in self.get_objects(list(object_ids)).items() if name in object_ids}
 
     def get_objects(self, object_ids: Names = ()) -> dict[str, CollisionObject]:
-        """Returns the objects of the world by name; none named: all of them."""
+        """Returns objects of the world, keyed by id; without ids, all objects."""
         return {
             item.id: item
             for item in self._world(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
@@ -193,7 +193,7 @@ class PlanningSceneInterface:
         }
 
     def get_attached_objects(self, object_ids: Names = ()) -> dict[str, AttachedCollisionObject]:
-        """Returns the attached objects by name; none named: all of them."""
+        """Returns attached objects, keyed by id; without ids, all attached objects."""
         scene = self.get_planning_scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
         return {
             item.object.id: item
@@ -202,43 +202,43 @@ class PlanningSceneInterface:
         }
 
     def get_planning_scene(self, components: int) -> PlanningScene:
-        """Returns parts of move_group's scene: bits of moveit_msgs/PlanningSceneComponents."""
+        """Returns the components of move_group's scene selected by bits of moveit_msgs/PlanningSceneComponents."""
         request = GetPlanningSceneRequest(PlanningSceneComponents(components))
         return self._servers.call("get_planning_scene", GetPlanningScene, request).scene
 
     def apply_planning_scene(self, planning_scene_message: PlanningScene) -> bool:
-        """Changes the scene; returns whether move_group accepted it."""
+        """Applies a change of the scene; returns whether move_group accepted it."""
         request = ApplyPlanningSceneRequest(planning_scene_message)
         return bool(self._servers.call("apply_planning_scene", ApplyPlanningScene, request).success)
 
     @staticmethod
     def make_box(name: str, pose: PoseStamped, size: Vector) -> CollisionObject:
-        """Builds a box [m]."""
+        """Returns a box [m]."""
         return collision_objects.primitive(name, pose, SolidPrimitive.BOX, size)
 
     @staticmethod
     def make_mesh(name: str, pose: PoseStamped, filename: str, scale: Vector = (1, 1, 1)) -> CollisionObject:
-        """Builds an object of a mesh file."""
+        """Returns an object of a mesh file."""
         return collision_objects.mesh(name, pose, filename, scale)
 
     @staticmethod
     def make_sphere(name: str, pose: PoseStamped, radius: float) -> CollisionObject:
-        """Builds a sphere [m]."""
+        """Returns a sphere [m]."""
         return collision_objects.primitive(name, pose, SolidPrimitive.SPHERE, [radius])
 
     @staticmethod
     def make_cylinder(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
-        """Builds a cylinder [m]."""
+        """Returns a cylinder [m]."""
         return collision_objects.primitive(name, pose, SolidPrimitive.CYLINDER, [height, radius])
 
     @staticmethod
     def make_cone(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
-        """Builds a cone [m]."""
+        """Returns a cone [m]."""
         return collision_objects.primitive(name, pose, SolidPrimitive.CONE, [height, radius])
 
     @staticmethod
     def make_plane(name: str, pose: PoseStamped, normal: Vector = (0, 0, 1), offset: float = 0) -> CollisionObject:
-        """Builds a plane."""
+        """Returns a plane."""
         return collision_objects.plane(name, pose, normal, offset)
 
     def _world(self, components: int) -> list[CollisionObject]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""RobotCommander: the joints, links, groups and current state of the robot."""
+"""RobotCommander: joints, links, groups and current state of the robot."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from moveit_commander.servers import Servers
 
 
 class _RobotPart:
-    """Something of a robot that has a name."""
+    """A named part of a robot."""
 
     def __init__(self, robot: RobotCommander, name: str) -> None:
         self._robot = robot
         self._name = name
 
     def name(self) -> str:
-        """Returns its name."""
+        """Returns the name."""
         return self._name
 
 
 class Joint(_RobotPart):
-    """A joint with its bounds and its present value [rad or m], lists of these if it has several variables, or none."""
+    """A joint with its bounds and current value [rad or m]; lists for several variables, [] for a fixed joint."""
 
     def variable_count(self) -> int:
-        """Returns how many numbers describe its position."""
+        """Returns the number of variables."""
         return len(self._robot._model.joints[self._name].variables)
 
     def bounds(self) -> list[Any]:
-        """Returns [lower, upper], a list of these for several variables, [] of a fixed joint."""
+        """Returns [lower, upper]; a list of bounds for several variables, [] for a fixed joint."""
         limits = [[item.lower, item.upper] for item in self._robot._model.joints[self._name].variables]
         return limits[0] if len(limits) == 1 else limits
 
     def min_bound(self) -> float | list[float]:
-        """Returns the lower bound; [] of a fixed joint."""
+        """Returns the lower bound; [] for a fixed joint."""
         return self._bound(0)
 
     def max_bound(self) -> float | list[float]:
-        """Returns the upper bound; [] of a fixed joint."""
+        """Returns the upper bound; [] for a fixed joint."""
         return self._bound(1)
 
     def _bound(self, number: int) -> float | list[float]:
@@ -54,21 +54,24 @@ class Joint(_RobotPart):
         return [pair[number] for pair in limits] if self.variable_count() != 1 else float(limits[number])
 
     def value(self) -> float | list[float]:
-        """Returns where it is now; [] of a fixed joint."""
+        """Returns the current value; [] for a fixed joint."""
         names = [item.name for item in self._robot._model.joints[self._name].variables]
         if not names:
             return []
         positions = self._robot._state.positions(names)
         if any(name not in positions for name in names):
-            raise MoveItCommanderException(f"tf does not show where joint {self._name} is; publish its transform")
+            raise MoveItCommanderException(f"tf has no transform of joint {self._name}; publish its transform")
         values = [positions[name] for name in names]
         return values[0] if len(values) == 1 else values
 
     def move(self, position: float | list[float], wait: bool = True) -> bool:
-        """Moves it, by the smallest group that has it; the group's other joints stay. Returns as go does.
+        """Moves the joint with the smallest group that contains it; other joints of the group stay.
+
+        Returns:
+            The result of `MoveGroupCommander.go`.
 
         Raises:
-            MoveItCommanderException: no group has it, or the position is out of bounds.
+            MoveItCommanderException: No group contains the joint, or the position is out of bounds.
         """
         group = self._robot.get_default_owner_group(self._name)
         if group is None:
@@ -83,12 +86,12 @@ class Link(_RobotPart):
     """A link with its current pose."""
 
     def pose(self) -> PoseStamped:
-        """Returns where it is now, in the planning frame."""
+        """Returns the current pose in the planning frame."""
         return self._robot._link_pose(self._name)
 
 
 class RobotCommander:
-    """Answers questions about a robot; groups, joints and links are attributes too (robot.arm, robot.elbow_joint)."""
+    """Access to a robot; groups, joints and links are also attributes (robot.arm, robot.elbow_joint)."""
 
     Joint = Joint
     Link = Link
@@ -97,11 +100,11 @@ class RobotCommander:
         """Reads the robot's description.
 
         Args:
-            robot_description: parameter with the URDF; SRDF and limits are beside it.
-            ns: namespace of move_group's endpoints and of joint_states.
+            robot_description: Parameter of the URDF; SRDF and limits are beside it.
+            ns: Namespace of move_group's endpoints and of joint_states.
 
         Raises:
-            RobotModelError: a description is missing or cannot be read (a RuntimeError too).
+            RobotModelError: A description is missing or invalid (a RuntimeError too).
         """
         self._robot_description = robot_description
         self._ns = ns
@@ -111,29 +114,29 @@ class RobotCommander:
         self._groups: dict[str, MoveGroupCommander] = {}
 
     def get_planning_frame(self) -> str:
-        """Returns the frame in which planning is done."""
+        """Returns the planning frame."""
         return self._model.planning_frame
 
     def get_robot_name(self) -> str:
-        """Returns the name in the robot's description."""
+        """Returns the name of the robot."""
         return self._model.name
 
     def get_root_link(self) -> str:
-        """Returns the link that has no parent."""
+        """Returns the root link."""
         return self._model.root_link
 
     def get_active_joint_names(self, group: str | None = None) -> list[str]:
-        """Returns the joints of a group, or of the robot, that move by themselves."""
+        """Returns the active joints of a group or of the robot."""
         joints = self._model.joints.values() if group is None else self._model.group(group).joints
         return [joint.name for joint in joints if joint.active]
 
     def get_joint_names(self, group: str | None = None) -> list[str]:
-        """Returns all joints of a group, or of the robot, fixed and mimic ones included."""
+        """Returns all joints of a group or of the robot, including fixed and mimic joints."""
         joints = self._model.joints.values() if group is None else self._model.group(group).joints
         return [joint.name for joint in joints]
 
     def get_link_names(self, group: str | None = None) -> list[str]:
-        """Returns the links of a group, or of the robot."""
+        """Returns the links of a group or of the robot."""
         return list(self._model.links if group is None else self._model.group(group).links)
 
     def get_group_names(self) -> list[str]:
@@ -141,7 +144,7 @@ class RobotCommander:
         return sorted(self._model.groups)
 
     def has_group(self, name: str) -> bool:
-        """Returns whether there is a group of that name."""
+        """Returns whether a group of this name exists."""
         return name in self._model.groups
 
     def get_current_state(self) -> RobotState:
@@ -149,30 +152,30 @@ class RobotCommander:
         return self._state.message()
 
     def get_current_variable_values(self) -> dict[str, float]:
-        """Returns the current positions by variable [rad or m]; a base that moves is among them where tf has it."""
+        """Returns the current positions [rad or m], keyed by variable; includes a moving base that tf provides."""
         return self._state.positions()
 
     def get_joint(self, name: str) -> Joint:
-        """Returns a joint; raises MoveItCommanderException if there is none of that name."""
+        """Returns a joint; raises MoveItCommanderException for an unknown name."""
         if name not in self._model.joints:
-            raise MoveItCommanderException(f"There is no joint named {name}; get_joint_names lists those there are")
+            raise MoveItCommanderException(f"There is no joint named {name}; get_joint_names lists the joints")
         return self.Joint(self, name)
 
     def get_link(self, name: str) -> Link:
-        """Returns a link; raises MoveItCommanderException if there is none of that name."""
+        """Returns a link; raises MoveItCommanderException for an unknown name."""
         if name not in self._model.links:
-            raise MoveItCommanderException(f"There is no link named {name}; get_link_names lists those there are")
+            raise MoveItCommanderException(f"There is no link named {name}; get_link_names lists the links")
         return self.Link(self, name)
 
     def get_group(self, name: str) -> MoveGroupCommander:
-        """Returns the commander of a group, the same one each time."""
+        """Returns the cached commander of a group."""
         if name not in self._groups:
             self._model.group(name)
             self._groups[name] = MoveGroupCommander(name, self._robot_description, self._ns)
         return self._groups[name]
 
     def get_default_owner_group(self, joint_name: str) -> str | None:
-        """Returns the group with the fewest links of those that have a joint; None if no group has it."""
+        """Returns the group with the fewest links among those that contain a joint, or None without such a group."""
         owners = [
             group for group in self._model.groups.values() if any(joint.name == joint_name for joint in group.joints)
         ]
@@ -182,8 +185,8 @@ class RobotCommander:
         """Returns markers that show the robot.
 
         Args:
-            args: nothing: as it is now; a RobotState; a dict of joint positions [rad or m], and perhaps a list of
-                links; or a group's name, and perhaps a dict of joint positions.
+            args: Nothing for the current state; a RobotState; a dict of joint positions [rad or m] and optionally a
+                list of links; or a group name and optionally a dict of joint positions.
         """
         values: dict[str, float] = {}
         links = self._model.links
@@ -218,7 +221,7 @@ class RobotCommander:
         return forward_kinematics(self._servers, self._model.planning_frame, link, self.get_current_state())
 
     def __getattr__(self, name: str) -> Any:
-        """Finds groups, joints and links by their names."""
+        """Returns the group, joint or link with this name."""
         if not name.startswith("_"):
             if self.has_group(name):
                 return self.get_group(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows a state of the robot as markers: the visual shapes of its links where compute_fk says they are."""
+"""Markers of a robot state: visual shapes of the links at their poses from compute_fk."""
 
 from __future__ import annotations
 
@@ -23,7 +23,18 @@ GREY = 0.5
 
 
 def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links: Sequence[str]) -> MarkerArray:
-    """Returns markers of links in a state, in the planning frame. Raises ServerError or MoveItCommanderException."""
+    """Returns markers of links in the planning frame.
+
+    Args:
+        model: Robot model.
+        servers: Clients of move_group.
+        state: State of the robot.
+        links: Names of the links.
+
+    Raises:
+        ServerError: The service compute_fk is not available.
+        MoveItCommanderException: The service rejects the request.
+    """
     shown = [link for link in links if model.visuals.get(link)]
     if not shown:
         return MarkerArray()
@@ -48,7 +59,7 @@ def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links:
 
 
 def _marker(visual: PlacedShapes) -> Marker | None:
-    """Returns the shape of a <visual>; None if it has none that markers can show."""
+    """Returns the marker of a <visual>, or None for an unsupported shape."""
     marker = Marker(action=Marker.ADD)
     marker.color.r = marker.color.g = marker.color.b = GREY
     marker.color.a = 1.0
@@ -68,7 +79,7 @@ def _marker(visual: PlacedShapes) -> Marker | None:
 
 
 def _compose(outer: Pose, inner: Pose) -> Pose:
-    """Returns the inner pose, given in the frame of the outer one, in the frame the outer one is given in."""
+    """Returns the product of two poses: the inner pose in the parent frame of the outer pose."""
     rotations = (
         Rotation.from_quat([item.orientation.x, item.orientation.y, item.orientation.z, item.orientation.w])
         for item in (outer, inner)

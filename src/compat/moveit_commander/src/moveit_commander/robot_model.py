@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot model from URDF, SRDF and joint limits: joints, links, groups, bounds and named states."""
+"""Robot model from URDF, SRDF and joint limits: joints, links, groups, bounds and named states."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from moveit_commander.joints import NO_MIMIC, Joint, is_quaternion, joint_of, ro
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """A planning group; joints and links in the order of the model."""
+    """A planning group, with joints and links in the order of the model."""
 
     name: str
     joints: tuple[Joint, ...]
@@ -35,12 +35,12 @@ class Group:
 
     @property
     def variables(self) -> tuple[Joint, ...]:
-        """Everything with a position, joints that mimic another included; of a planar or floating joint its parts."""
+        """Variables of all joints, including mimic joints and the parts of planar or floating joints."""
         return tuple(variable for joint in self.joints for variable in joint.variables)
 
     @property
     def active_variables(self) -> tuple[Joint, ...]:
-        """The variables of the active joints."""
+        """Variables of the active joints."""
         return tuple(variable for joint in self.active_joints for variable in joint.variables)
 
     @property
@@ -50,7 +50,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class EndEffector:
-    """A group mounted on a link of another group; without such a group `parent_group` is empty."""
+    """A group mounted on a link of another group; `parent_group` is empty without such a group."""
 
     group: str
     parent_group: str
@@ -58,18 +58,18 @@ class EndEffector:
 
 
 class RobotModel:
-    """The robot model; it has no state."""
+    """The robot model, without state."""
 
     def __init__(self, urdf: str, srdf: str, limits: Mapping[str, Any] | None = None) -> None:
-        """Reads the documents.
+        """Reads the descriptions.
 
         Args:
-            urdf: the robot's description, xacro expanded.
-            srdf: the semantic description.
-            limits: entries of joint_limits.yaml by joint name.
+            urdf: Robot description (URDF text, expanded).
+            srdf: Semantic description (SRDF text).
+            limits: Entries of joint_limits.yaml, keyed by joint.
 
         Raises:
-            RobotModelError: one of them cannot be read, or they contradict each other.
+            RobotModelError: A description is invalid, or the descriptions contradict each other.
         """
         try:
             description, semantics = read_urdf(urdf, "URDF"), read_srdf(srdf)
@@ -89,7 +89,7 @@ class RobotModel:
         virtual = _virtual_joint(semantics, self.root_link)
         root = root_joint(virtual, self.root_link, limits or {})
         self.base = virtual if virtual and virtual.kind in ("planar", "floating") else None
-        # As in MoveIt: the frame that a planar or floating base moves in; the root link below a fixed virtual joint.
+        # As in MoveIt: the parent frame of a planar or floating base, or the root link below a fixed virtual joint.
         self.planning_frame = self.base.parent_frame if self.base else self.root_link
         ordered = [root, *_depth_first(tree.values(), self.root_link)]
         self.joints = {joint.name: joint for joint in ordered}
@@ -101,7 +101,7 @@ class RobotModel:
         self.end_effectors = tuple(map(self._end_effector, semantics.end_effectors))
 
     def group(self, name: str) -> Group:
-        """Returns a group; raises RobotModelError with the names there are."""
+        """Returns a group; raises RobotModelError with the known names otherwise."""
         if name not in self.groups:
             raise RobotModelError(
                 f"There is no group named '{name}' in robot '{self.name}'; it has: "
@@ -110,19 +110,19 @@ class RobotModel:
         return self.groups[name]
 
     def chain(self, base: str, tip: str) -> list[Joint]:
-        """Returns the joints from a link down to another one of its branch."""
+        """Returns the joints from a link to one of its descendants."""
         joints: list[Joint] = []
         link = tip
         while link != base:
             joint = self._parent_joint.get(link)
-            if joint is None or joint.parent == link:  # a virtual joint may hang a link on a frame of its name
+            if joint is None or joint.parent == link:  # a virtual joint's parent frame may equal its child link
                 raise RobotModelError(f"link '{tip}' is not below link '{base}' in robot '{self.name}'")
             joints.append(joint)
             link = joint.parent
         return joints[::-1]
 
     def complete(self, positions: Mapping[str, float]) -> dict[str, float]:
-        """Returns the positions of the model's joints, in its order, mimic joints computed; unknown joints left out."""
+        """Returns the positions of the model's joints in order, with computed mimic joints; skips unknown joints."""
         values: dict[str, float] = {}
         for variable in self.variables:
             if variable.leader and variable.leader in positions:
@@ -133,12 +133,12 @@ class RobotModel:
 
     @property
     def variables(self) -> tuple[Joint, ...]:
-        """Everything with a position, in the order of the model."""
+        """Variables of all joints in the order of the model."""
         return tuple(variable for joint in self.joints.values() for variable in joint.variables)
 
     @property
     def base_variables(self) -> tuple[Joint, ...]:
-        """The variables of a planar or floating virtual joint; none where there is no such joint."""
+        """Variables of a planar or floating virtual joint; empty without one."""
         return self.joints[self.base.name].parts if self.base else ()
 
     def defaults(self) -> dict[str, float]:
@@ -146,15 +146,17 @@ class RobotModel:
         return self.complete({variable.name: variable.default for variable in self.variables if not variable.leader})
 
     def random_values(self, group: Group, generator: random.Random) -> dict[str, float]:
-        """Returns positions of the group's joints, drawn evenly within the bounds; 0 where there is none."""
+        """Returns positions of the group's joints, sampled uniformly within the bounds; 0 for an unbounded joint."""
         drawn = {
             item.name: generator.uniform(item.lower, item.upper) if math.isfinite(item.upper - item.lower) else 0.0
             for item in group.active_variables
         }
-        turns = [item.name for item in self.base_variables if item.name in drawn and is_quaternion(item)]
-        if turns:
-            quaternion = [generator.gauss(0.0, 1.0) for _ in turns]  # evenly over all rotations
-            drawn |= {name: value / math.hypot(*quaternion) for name, value in zip(turns, quaternion, strict=True)}
+        quaternion_names = [item.name for item in self.base_variables if item.name in drawn and is_quaternion(item)]
+        if quaternion_names:
+            quaternion = [generator.gauss(0.0, 1.0) for _ in quaternion_names]  # uniform over all rotations
+            drawn |= {
+                name: value / math.hypot(*quaternion) for name, value in zip(quaternion_names, quaternion, strict=True)
+            }
         completed = self.complete(drawn)
         return {joint.name: completed[joint.name] for joint in group.variables if joint.name in completed}
 
@@ -175,7 +177,7 @@ class RobotModel:
         return Group(name, joints, links, is_chain, effector, self._semantics.group_states.get(name, {}))
 
     def _end_effector(self, spec: srdf_reader.EndEffector) -> EndEffector:
-        """An end effector; its parent group is the named one or, as in MoveIt, the one with the fewest joints."""
+        """Returns an end effector; as in MoveIt, the default parent group is the one with the fewest joints."""
         link = spec.parent_link
         possible = [group for group in self.groups.values() if link in group.links and group.name != spec.group]
         named = [group for group in possible if group.name == spec.parent_group]
@@ -183,16 +185,16 @@ class RobotModel:
         return EndEffector(spec.group, chosen.name if chosen else "", link)
 
     def _members(self, spec: GroupSpec, above: frozenset[str]) -> set[str]:
-        """Names of a group's joints, those of its subgroups included."""
+        """Returns the names of a group's joints, including those of its subgroups."""
         if spec.name in above:
-            raise RobotModelError(f"SRDF: group '{spec.name}' contains itself; take one <group> element out")
+            raise RobotModelError(f"SRDF: group '{spec.name}' contains itself; remove one <group> element")
         members = set(spec.joints) | {self._joint_above(link).name for link in spec.links}
         for base, tip in spec.chains:
             members.update(joint.name for joint in self.chain(base, tip))
         for name in spec.subgroups:
             inner = self._semantics.groups.get(name)
             if inner is None:
-                raise RobotModelError(f"SRDF: group '{spec.name}' names the group '{name}', which is not there")
+                raise RobotModelError(f"SRDF: group '{spec.name}' contains the unknown group '{name}'")
             members |= self._members(inner, above | {spec.name})
         return members
 
@@ -210,7 +212,7 @@ class RobotModel:
 
 
 def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
-    """Lets every mimic joint follow the joint that drives its chain of mimic joints; a fixed joint follows none."""
+    """Returns the joints with each mimic joint directly following the leader of its chain of mimic joints."""
     moving = [joint for joint in joints if joint.movable]
     try:
         mimics = resolved(
@@ -227,7 +229,7 @@ def _with_leaders(joints: Sequence[Joint]) -> list[Joint]:
 
 
 def _virtual_joint(semantics: SemanticDescription, root_link: str) -> VirtualJoint | None:
-    """Returns the virtual joint above the root link, if there is one."""
+    """Returns the virtual joint above the root link, or None."""
     return next((item for item in semantics.virtual_joints if item.child_link == root_link), None)
 
 
@@ -245,10 +247,10 @@ def _depth_first(joints: Iterable[Joint], root_link: str) -> list[Joint]:
 
 
 def group_values(group: Group, values: Sequence[float]) -> dict[str, float]:
-    """Names the positions of a list: one for every variable of the group, or one for every active joint.
+    """Returns the positions of a list, keyed by variable; the list covers all or only the active variables.
 
     Raises:
-        RobotModelError: the list has another length.
+        RobotModelError: The list has a wrong length.
     """
     numbers = [float(value) for value in values]
     for joints in (group.variables, group.active_variables):

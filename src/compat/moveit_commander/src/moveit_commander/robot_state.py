@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The current robot: its description from the parameter server, joint positions from joint_states, a base from tf."""
+"""Current state of the robot: description from the parameter server, joints from joint_states, base from tf."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from moveit_commander.roscpp_initializer import ensure_node, on_shutdown
 
 STATE_TIMEOUT_S = 1.0
 _shared: dict[tuple[str, str], CurrentState] = {}
-_sharing = threading.Lock()
+_shared_lock = threading.Lock()
 
 
 def load_model(robot_description: str) -> RobotModel:
-    """Reads URDF, SRDF and joint limits from the parameters `<robot_description>`, `_semantic` and `_planning`.
+    """Returns the model from the parameters `<robot_description>`, `_semantic` and `_planning`.
 
     Raises:
-        RobotModelError: one of the first two is not there or cannot be read.
+        RobotModelError: One of the first two parameters is missing or invalid.
     """
     texts = []
     for parameter in (robot_description, f"{robot_description}_semantic"):
@@ -37,7 +37,7 @@ def load_model(robot_description: str) -> RobotModel:
             raise RobotModelError(
                 f"parameter {rospy.resolve_name(parameter)}: got {type(text).__name__}, the text of "
                 "the robot's description is needed; load it (planning_context.launch) or name "
-                "another one by the argument robot_description"
+                "a different parameter in the argument robot_description"
             )
         texts.append(text)
     limits = rospy.get_param(f"{nearest_parameter(f'{robot_description}_planning')}/joint_limits", {})
@@ -45,35 +45,35 @@ def load_model(robot_description: str) -> RobotModel:
 
 
 def current_state(robot_description: str, ns: str) -> CurrentState:
-    """Returns the listener of a robot; the commanders of one robot share it. Raises RobotModelError."""
+    """Returns the listener of a robot, shared by its commanders; raises RobotModelError."""
     ensure_node()
     key = (str(rospy.resolve_name(robot_description)), str(rospy.resolve_name(ns_join(ns, "joint_states"))))
-    with _sharing:
+    with _shared_lock:
         if key not in _shared:
             _shared[key] = CurrentState(load_model(robot_description), key[1])
         return _shared[key]
 
 
 def _tf_buffer() -> Any:
-    """Returns a buffer that listens to tf."""
-    import tf2_ros  # few robots need it, and it takes long to import
+    """Returns a buffer with a tf listener."""
+    import tf2_ros  # slow to import and needed by few robots
 
     buffer = tf2_ros.Buffer()
-    buffer.listener = tf2_ros.TransformListener(buffer)  # kept as long as the buffer
+    buffer.listener = tf2_ros.TransformListener(buffer)  # lives as long as the buffer
     return buffer
 
 
-def _forget_all() -> None:
-    with _sharing:
+def _close_all() -> None:
+    with _shared_lock:
         for state in _shared.values():
             state.close()
         _shared.clear()
 
 
 class CurrentState:
-    """Stores the latest joint states of a topic.
+    """Latest joint states of a topic.
 
-    Subscribes: joint_states (sensor_msgs/JointState); tf where the robot has a planar or floating virtual joint.
+    Subscribes: joint_states (sensor_msgs/JointState); tf for a planar or floating virtual joint.
     """
 
     def __init__(self, model: RobotModel, topic: str) -> None:
@@ -84,25 +84,23 @@ class CurrentState:
         self._changed = threading.Condition()
         self._transforms = _tf_buffer() if model.base else None
         self._subscriber = rospy.Subscriber(topic, JointState, self._on_joint_state, queue_size=10, tcp_nodelay=True)
-        on_shutdown(_forget_all)
+        on_shutdown(_close_all)
 
     def close(self) -> None:
-        """Stops listening. May be called twice."""
+        """Unsubscribes; repeated calls are allowed."""
         self._subscriber.unregister()
         if self._transforms is not None:
             self._transforms.listener.unregister()
 
     def positions(self, needed: Iterable[str] = (), timeout_s: float = STATE_TIMEOUT_S) -> dict[str, float]:
-        """Returns positions that arrived after this call [rad or m], mimic joints included.
-
-        A planar or floating base is among them, by its variables, where tf has it.
+        """Returns positions received after this call [rad or m], with mimic joints and a base that tf provides.
 
         Args:
-            needed: variables that must be heard of; none: every active joint that is not passive.
-            timeout_s: how long to wait [s].
+            needed: Variables to wait for; empty for every active joint that is not passive.
+            timeout_s: Maximum wait [s].
 
         Raises:
-            ServerError: a needed joint was not heard of in time.
+            ServerError: A needed joint was not received in time.
         """
         names = set(needed) or {variable.name for variable in self.model.variables}
         names = {self.model.mimics[name].leader if name in self.model.mimics else name for name in names}
@@ -115,18 +113,18 @@ class CurrentState:
                     f"topic {self._topic}: waited {timeout_s:g} s for joint states, nothing came for "
                     f"{', '.join(missing)}; does the joint state controller run?"
                 )
-            heard = dict(self._positions)
-        return self.model.complete(heard | self._base_values())
+            received = dict(self._positions)
+        return self.model.complete(received | self._base_values())
 
     def message(self, needed: Iterable[str] = ()) -> RobotState:
-        """Returns the whole known state as a message, in the planning frame; `needed` as above.
+        """Returns the known state as a message in the planning frame; `positions` describes `needed`.
 
-        It has a planar or floating base where tf has it; without, move_group leaves the base where it knows it to be.
+        Without a planar or floating base from tf, move_group keeps its own base pose.
         """
         return self.message_of(self.positions(needed))
 
     def _base_values(self) -> dict[str, float]:
-        """Returns the variables of a planar or floating base from tf; none where tf does not have it."""
+        """Returns the variables of a planar or floating base from tf; empty if tf has no transform."""
         base = self.model.base
         if base is None or self._transforms is None:
             return {}
@@ -150,7 +148,7 @@ class CurrentState:
         return state
 
     def values_of(self, state: RobotState) -> dict[str, float]:
-        """Returns the positions in a message, those of a planar or floating base by its variables."""
+        """Returns the positions in a message, including the variables of a planar or floating base."""
         values = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
         multi = state.multi_dof_joint_state
         for name, transform in zip(multi.joint_names, multi.transforms, strict=True):

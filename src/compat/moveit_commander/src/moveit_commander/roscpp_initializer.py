@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the process a ROS node if the script has not done so, under the names scripts of MoveIt call."""
+"""Initialises a ROS node for scripts without their own, with MoveIt's function names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NODE_NAME = "move_group_commander_wrappers"
 
 
 class _Node:
-    """The parts of the process that this library created: possibly the node, and connections to close."""
+    """Resources that this library created: the node, if any, and connections to close."""
 
     def __init__(self) -> None:
         self._name = NODE_NAME
@@ -24,7 +24,7 @@ class _Node:
         self._arguments = [argument for argument in arguments if not argument.startswith("__name:=")]
 
     def ensure(self) -> None:
-        """Initialises a node, unless the script has its own already."""
+        """Initialises a node unless the script has done so."""
         if not rospy.core.is_initialized():
             rospy.init_node(self._name, argv=self._arguments, anonymous=True, disable_signals=True)
             self._ours = True
@@ -45,13 +45,13 @@ on_shutdown = _node.on_shutdown
 
 
 def roscpp_initialize(args: Sequence[str], node_name: str = NODE_NAME) -> None:
-    """Keeps the command line and a name for the node; a script may call rospy.init_node before or after.
+    """Stores the command line and a name for the node; a script may call rospy.init_node before or after.
 
-    The node is made when the first interface is built, if the script has not called rospy.init_node by then.
+    The first interface creates the node unless the script has called rospy.init_node by then.
     """
     _node.remember(args, node_name)
 
 
 def roscpp_shutdown() -> None:
-    """Closes the connections of this library; ends the node only if this library has made it. May be called twice."""
+    """Closes the connections of this library and a node that it created; repeated calls are allowed."""
     _node.close()

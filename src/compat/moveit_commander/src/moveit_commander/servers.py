@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Clients of the services and actions of move_group; each wait is bounded, and its error says what it waited for."""
+"""Clients of move_group's services and actions with bounded waits, whose errors name the endpoint."""
 
 from __future__ import annotations
 
@@ -19,28 +19,26 @@ SERVICE_TIMEOUT_S = 5.0
 ACTION_TIMEOUT_S = 5.0
 POLL_PERIOD_S = 0.02
 LISTENER_TIMEOUT_S = 5.0
-SETTLE_S = 0.1  # the server's end of a new connection is ready a little later than ours
-SERVER_LOST_S = 5.0  # an action server that is not advertised for so long has ended
+SETTLE_S = 0.1  # the server accepts a new connection slightly later than the client
+SERVER_LOST_S = 5.0  # unadvertised time after which an action server counts as ended
 
 
 def is_heard(publisher: rospy.Publisher) -> bool:
-    """Waits until a publisher has a subscriber: a message sent before that is lost. Without one, logs an error."""
+    """Waits for a subscriber, because earlier messages are lost; logs an error and returns False without one."""
     if wait_until(lambda: publisher.get_num_connections() > 0, LISTENER_TIMEOUT_S):
         return True
-    rospy.logerr(
-        "topic %s: nobody has listened for %g s; does move_group run?", publisher.resolved_name, LISTENER_TIMEOUT_S
-    )
+    rospy.logerr("topic %s: no subscriber for %g s; does move_group run?", publisher.resolved_name, LISTENER_TIMEOUT_S)
     return False
 
 
 class Servers:
-    """The endpoints of one move_group node."""
+    """Endpoints of a move_group node."""
 
     def __init__(self, ns: str = "") -> None:
         """Stores the namespace.
 
         Args:
-            ns: namespace of the move_group node's endpoints; "" for that of this node.
+            ns: Namespace of the move_group node's endpoints; "" for the namespace of this node.
         """
         self._ns = ns
         self._actions: dict[str, ActionCaller] = {}
@@ -50,10 +48,16 @@ class Servers:
         return str(rospy.resolve_name(ns_join(self._ns, name)))
 
     def call(self, name: str, kind: Any, request: Any, timeout_s: float = SERVICE_TIMEOUT_S) -> Any:
-        """Calls a service.
+        """Calls a service and returns its response.
+
+        Args:
+            name: Name of the service.
+            kind: Service class.
+            request: Request message.
+            timeout_s: Maximum wait for the service [s].
 
         Raises:
-            ServerError: nobody offers it within the time, or the call fails.
+            ServerError: The service is not available in time, or fails.
         """
         full_name = self.resolve(name)
         try:
@@ -68,10 +72,15 @@ class Servers:
             raise ServerError(f"service {full_name} failed: {error}; move_group's log says why") from error
 
     def action(self, name: str, kind: Any, timeout_s: float = ACTION_TIMEOUT_S) -> ActionCaller:
-        """Returns the caller of an action, connected.
+        """Returns the connected client of an action.
+
+        Args:
+            name: Name of the action.
+            kind: Action class.
+            timeout_s: Maximum wait for the server [s]; as in MoveIt, 0 waits forever.
 
         Raises:
-            ServerError: no server within the time; 0 waits for ever, as in MoveIt.
+            ServerError: The server is not available in time.
         """
         if name not in self._actions:
             self._actions[name] = ActionCaller(self.resolve(name), kind)
@@ -80,7 +89,7 @@ class Servers:
 
 
 class ActionCaller:
-    """Sends goals to one action server; its timeouts are wall time, which passes also while a simulation is paused."""
+    """Client of an action server; timeouts use wall time, which also passes while a simulation is paused."""
 
     def __init__(self, name: str, kind: Any) -> None:
         self.name = name
@@ -88,7 +97,7 @@ class ActionCaller:
         self._settled = False
 
     def connect(self, timeout_s: float) -> None:
-        """Waits for the server; 0 waits for ever. Raises ServerError."""
+        """Waits for the server; 0 waits forever. Raises ServerError."""
         begun = time.monotonic()
         while not is_connected(self._client):
             if rospy.is_shutdown() or 0.0 < timeout_s <= time.monotonic() - begun:
@@ -102,14 +111,14 @@ class ActionCaller:
             self._settled = True
 
     def send(self, goal: Any) -> None:
-        """Sends a goal and does not wait; the goal before it is no longer listened to."""
+        """Sends a goal without waiting; the result of the previous goal is ignored."""
         self._client.send_goal(goal)
 
     def run(self, goal: Any, timeout_s: float) -> Any:
         """Sends a goal and returns its result.
 
         Raises:
-            ServerError: no result within the time (the goal is cancelled), or the server has gone.
+            ServerError: The result did not arrive in time (the goal is cancelled), or the server is lost.
         """
         done = threading.Event()
         self._client.send_goal(goal, done_cb=lambda _status, _result: done.set())
@@ -124,7 +133,7 @@ class ActionCaller:
                 raise ServerError(f"action {self.name}: no result within {timeout_s:g} s; the goal is cancelled")
             if now - seen > SERVER_LOST_S:
                 raise ServerError(
-                    f"action {self.name}: its server has gone, or ended the goal without a result, for "
+                    f"action {self.name}: its server was lost, or ended the goal without a result, for "
                     f"{SERVER_LOST_S:g} s; has it died?"
                 )
         result = self._client.get_result()
@@ -136,6 +145,6 @@ class ActionCaller:
         return result
 
     def _ended(self) -> bool:
-        """Returns whether the server says that the goal has ended, while its result is not here yet."""
+        """Returns whether the goal has ended on the server while its result has not arrived."""
         handle = self._client.gh
         return handle is not None and handle.get_comm_state() == CommState.WAITING_FOR_RESULT

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Retimes a path: its waypoints stay, and the curve that a controller puts through them keeps the joint limits."""
+"""Retimes a path with fixed waypoints, so that the controller's interpolation keeps the joint limits."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ ALGORITHMS = (
     "time_optimal_trajectory_generation",
 )
 GRID_POINTS = 20  # between two waypoints
-SAME_POINT = 1e-6  # [rad or m] waypoints nearer to each other than this are one
-SAMPLES = 64  # of the curve between two waypoints; the peak of a cubic lies at most 0.2 % above the largest of them
-MARGIN = 2e-3  # share of the limits
+SAME_POINT = 1e-6  # [rad or m]; distance below which waypoints are merged
+SAMPLES = 64  # of the curve between two waypoints; a cubic's peak exceeds the largest sample by at most 0.2 %
+MARGIN = 2e-3  # fraction of the limits
 BOUND_TOLERANCE = 1e-4  # [rad or m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Limits of the joints, shape (joints,) each [rad or m, per s, per s^2]."""
+    """Joint limits, each of shape (joints,) [rad or m, per s, per s^2]."""
 
     lower: Any
     upper: Any
@@ -33,11 +33,11 @@ class Limits:
 
 
 def unwound(points: Any, continuous: Any) -> Any:
-    """Returns waypoints in which joints without ends never jump by a turn, as in MoveIt; the first one stays.
+    """Returns waypoints whose continuous joints never jump by 2 pi, as in MoveIt; the first waypoint is unchanged.
 
     Args:
-        points: shape (n, joints) [rad or m].
-        continuous: which joints have no ends, shape (joints,).
+        points: Waypoints, shape (n, joints) [rad or m].
+        continuous: Whether each joint is continuous, shape (joints,).
     """
     array = np.asarray(points, dtype=float)
     steps = np.diff(array, axis=0)
@@ -46,7 +46,7 @@ def unwound(points: Any, continuous: Any) -> Any:
 
 
 def distinct(points: Any) -> Any:
-    """Returns the indices of the waypoints that differ from the one before."""
+    """Returns the indices of the waypoints that differ from their predecessor."""
     array = np.asarray(points, dtype=float)
     moved = np.linalg.norm(np.diff(array, axis=0), axis=1) > SAME_POINT
     return np.concatenate([[0], 1 + np.flatnonzero(moved)])
@@ -54,7 +54,7 @@ def distinct(points: Any) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timing:
-    """Times of waypoints [s], shape (n,); velocities and accelerations there, shape (n, joints)."""
+    """Times of waypoints [s], shape (n,), with velocities and accelerations, shape (n, joints)."""
 
     times: Any
     velocities: Any
@@ -62,18 +62,18 @@ class Timing:
 
 
 def retime(points: Any, limits: Limits) -> Timing:
-    """Returns a fast timing of the waypoints, at rest at both ends, whose times are whole nanoseconds.
+    """Returns a fast timing of the waypoints with rest at both ends and times in whole nanoseconds.
 
-    TOPP-RA times a cubic spline through the waypoints. Its accelerations jump, which the quintics between the waypoints
-    cannot do: the timing is slowed evenly until these keep the limits. Where the spline swings over a bound, or so far
-    that stops at all waypoints are faster, a monotone spline takes its place, then these stops.
+    TOPP-RA times a cubic spline through the waypoints. Its accelerations are discontinuous, unlike those of quintics
+    between the waypoints, so the timing is slowed uniformly until the quintics keep the limits. If the spline
+    exceeds a bound, or is slower than stopping at all waypoints, a monotone spline is tried, then these stops.
 
     Args:
-        points: waypoints, shape (n >= 2, joints) [rad or m], each different from the one before.
-        limits: of the joints; bounds hold where the waypoints keep them.
+        points: Waypoints, shape (n >= 2, joints) [rad or m], each different from its predecessor.
+        limits: Joint limits; bounds apply only as far as the waypoints keep them.
 
     Raises:
-        MoveItCommanderException: a velocity or acceleration limit is not above 0.
+        MoveItCommanderException: A velocity or acceleration limit is not above 0.
     """
     points = np.asarray(points, dtype=float)
     if not (min(limits.velocity.min(), limits.acceleration.min()) > 0.0):
@@ -81,12 +81,12 @@ def retime(points: Any, limits: Limits) -> Timing:
             f"retime_trajectory: velocity limits {limits.velocity.tolist()} and acceleration limits "
             f"{limits.acceleration.tolist()}; all must be above 0"
         )
-    slowest = _with_stops(points, limits)
-    return _along(False, points, limits, slowest) or _along(True, points, limits, slowest) or slowest
+    slowest = _timing_with_stops(points, limits)
+    return _spline_timing(False, points, limits, slowest) or _spline_timing(True, points, limits, slowest) or slowest
 
 
-def _with_stops(points: Any, limits: Limits) -> Timing:
-    """Returns the timing that stops at each waypoint; v = 15/8 d/T, a = 10/sqrt(3) d/T^2 at most."""
+def _timing_with_stops(points: Any, limits: Limits) -> Timing:
+    """Returns the timing that stops at each waypoint; peaks: v = 15/8 d/T, a = 10/sqrt(3) d/T^2."""
     spans = np.abs(np.diff(points, axis=0))
     durations = np.maximum(
         1.875 * spans / limits.velocity, np.sqrt(10.0 / np.sqrt(3.0) * spans / limits.acceleration)
@@ -95,11 +95,11 @@ def _with_stops(points: Any, limits: Limits) -> Timing:
     return Timing(np.round(times, 9), np.zeros_like(points), np.zeros_like(points))
 
 
-def _along(is_monotone: bool, points: Any, limits: Limits, slowest: Timing) -> Timing | None:
-    """Returns the timing of a spline; None where it leaves the bounds or is slower than another timing."""
+def _spline_timing(is_monotone: bool, points: Any, limits: Limits, slowest: Timing) -> Timing | None:
+    """Returns the timing of a spline, or None if it exceeds the bounds or is not faster than the slowest timing."""
     from scipy.interpolate import BPoly
 
-    timing = _fastest(is_monotone, points, limits)
+    timing = _time_optimal_timing(is_monotone, points, limits)
     if timing is None:
         return None
     times, velocities, accelerations = timing.times, timing.velocities, timing.accelerations
@@ -109,15 +109,15 @@ def _along(is_monotone: bool, points: Any, limits: Limits, slowest: Timing) -> T
     lower, upper = np.minimum(limits.lower, points.min(axis=0)), np.maximum(limits.upper, points.max(axis=0))
     if (positions < lower - BOUND_TOLERANCE).any() or (positions > upper + BOUND_TOLERANCE).any():
         return None
-    fastest = np.abs(curve(samples, 1) / limits.velocity).max()
-    hardest = np.abs(curve(samples, 2) / limits.acceleration).max()
-    factor = max(1.0, fastest, np.sqrt(hardest)) * (1.0 + MARGIN)
+    velocity_ratio = np.abs(curve(samples, 1) / limits.velocity).max()
+    acceleration_ratio = np.abs(curve(samples, 2) / limits.acceleration).max()
+    factor = max(1.0, velocity_ratio, np.sqrt(acceleration_ratio)) * (1.0 + MARGIN)
     times = np.round(times * factor, 9)
     return Timing(times, velocities / factor, accelerations / factor**2) if times[-1] < slowest.times[-1] else None
 
 
-def _fastest(is_monotone: bool, points: Any, limits: Limits) -> Timing | None:
-    """Returns the fastest timing of a spline through the waypoints; None where TOPP-RA finds none."""
+def _time_optimal_timing(is_monotone: bool, points: Any, limits: Limits) -> Timing | None:
+    """Returns the time-optimal timing of a spline through the waypoints, or None if TOPP-RA fails."""
     from scipy.interpolate import PchipInterpolator
     from toppra import SplineInterpolator
     from toppra.algorithm import TOPPRA
@@ -151,8 +151,8 @@ def _fastest(is_monotone: bool, points: Any, limits: Limits) -> Timing | None:
     steps = 2.0 * np.diff(grid) / (speeds[:-1] + speeds[1:])
     times = np.concatenate([[0.0], np.cumsum(steps)])
     changes = np.diff(speeds) / steps  # constant between two grid points
-    at = np.arange(len(knots)) * GRID_POINTS
+    knot_indices = np.arange(len(knots)) * GRID_POINTS
     tangents, curvatures = path(knots, 1), path(knots, 2)
-    change = changes[np.minimum(at, len(changes) - 1)]
-    accelerations = tangents * change[:, None] + curvatures * (speeds[at] ** 2)[:, None]
-    return Timing(times[at], tangents * speeds[at, None], accelerations)
+    change = changes[np.minimum(knot_indices, len(changes) - 1)]
+    accelerations = tangents * change[:, None] + curvatures * (speeds[knot_indices] ** 2)[:, None]
+    return Timing(times[knot_indices], tangents * speeds[knot_indices, None], accelerations)
