@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A container that runs all its states at the same time, each in a thread, and ends when the last one has ended."""
+"""A container that runs all its states in parallel threads and ends when the last state has ended."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ OutcomeCallback = Callable[[dict[str, "str | None"]], "str | None"]
 
 
 class Concurrence(Container):
-    """Runs its states side by side; its outcome is decided from theirs once all have ended.
+    """Runs its states in parallel; their outcomes determine its outcome.
 
-    The outcome is, in this order of precedence: what ``outcome_cb`` returns; the first entry of ``outcome_map``
-    whose children all gave the outcomes it names; ``default_outcome``.
+    The outcome is, in order of precedence: the return value of ``outcome_cb``; the first entry of ``outcome_map``
+    whose child outcomes all match; ``default_outcome``.
     """
 
     def __init__(
@@ -38,17 +38,17 @@ class Concurrence(Container):
         outcome_cb: OutcomeCallback | None = None,
         child_termination_cb: ChildTerminationCallback | None = None,
     ) -> None:
-        """Makes an empty concurrence; states are added inside ``with concurrence:``.
+        """Creates an empty concurrence; states are added inside ``with concurrence:``.
 
         Args:
-            outcomes: names of the outcomes.
-            default_outcome: given when nothing else decides.
-            input_keys: userdata keys copied from the parent before the states run.
-            output_keys: userdata keys copied to the parent after the states have ended.
-            outcome_map: outcome -> {label: outcome of that child}.
-            outcome_cb: gets {label: outcome} when all children have ended, returns an outcome or None.
-            child_termination_cb: gets {label: outcome, None while running} whenever a child has ended; True
-                stops all others, a list of labels stops those.
+            outcomes: Names of the outcomes.
+            default_outcome: Outcome if nothing else determines it.
+            input_keys: Userdata keys copied from the parent before the states run.
+            output_keys: Userdata keys copied to the parent after the states have ended.
+            outcome_map: Required child outcomes {label: outcome}, keyed by outcome of the concurrence.
+            outcome_cb: Function that receives all {label: outcome} at the end; returns an outcome or None.
+            child_termination_cb: Function that receives {label: outcome, None while running} after each end of a child;
+                True stops all other children, a list stops the children with these labels.
         """
         super().__init__(outcomes, input_keys, output_keys)
         self._states: dict[str, State] = {}
@@ -66,18 +66,18 @@ class Concurrence(Container):
     # ---- construction --------------------------------------------------------------------------------------
     @staticmethod
     def add(label: str, state: State, remapping: NameMap | None = None) -> State:
-        """Adds a state to the concurrence that is open.
+        """Adds a state to the open concurrence.
 
         Args:
-            label: its name in this concurrence.
-            state: the state, or a container.
-            remapping: userdata name in the state -> userdata name in this concurrence.
+            label: Label of the state.
+            state: State or container.
+            remapping: Userdata key in the concurrence, keyed by key in the state.
 
         Returns:
             The state.
 
         Raises:
-            smach.InvalidStateError: the label is taken, or the object is not a state.
+            smach.InvalidStateError: The label is already used, or the object is not a state.
         """
         concurrence: Concurrence = Concurrence._currently_opened_container()
         if label in concurrence._states:
@@ -89,7 +89,7 @@ class Concurrence(Container):
         return state
 
     def check_consistency(self) -> None:
-        """Raises when there is no state, or when the outcome map names outcomes or states that are not there."""
+        """Raises an error without states, or if the outcome map names unknown outcomes or states."""
         if not self._states:
             raise InvalidStateError("the concurrence has no states")
         faults = []
@@ -109,19 +109,19 @@ class Concurrence(Container):
 
     # ---- inspection ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
-        """Returns the states by label, in the order they were added."""
+        """Returns the states by label, in the order of their addition."""
         return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
-        """Returns the labels of all states: they all start together."""
+        """Returns the labels of all states, which start together."""
         return list(self._states)
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Puts values in the local userdata; the choice of states is fixed, since all of them run.
+        """Adds values to the local userdata; the initial states are fixed, because all states run.
 
         Args:
-            initial_states: ignored with a warning unless it names all states or none.
-            userdata: values put in the local userdata.
+            initial_states: Ignored with a warning unless all or no states are named.
+            userdata: Values to add to the local userdata.
         """
         if userdata is not None:
             self.userdata.update(userdata)
@@ -129,7 +129,7 @@ class Concurrence(Container):
             log.warn(f"a concurrence starts all its states; the choice {list(initial_states)} is ignored")
 
     def get_active_states(self) -> list[str]:
-        """Returns the labels of the states that are still running."""
+        """Returns the labels of the running states."""
         with self._lock:
             return list(self._active)
 
@@ -143,14 +143,14 @@ class Concurrence(Container):
 
     # ---- running -------------------------------------------------------------------------------------------
     def execute(self, parent_ud: Any = None) -> str:
-        """Runs all states and returns the outcome once the last of them has ended.
+        """Runs all states and returns the outcome after the last state has ended.
 
         Args:
-            parent_ud: userdata the input keys are copied from and the output keys are copied to.
+            parent_ud: Userdata for copying the input and output keys.
 
         Raises:
-            smach.SmachError: the concurrence is inconsistent; or a state raised or returned something that is not
-                one of its outcomes (the others are then asked to stop, and waited for).
+            smach.SmachError: The concurrence is inconsistent; or a state raised an error or returned an undeclared
+                outcome, after the other states have been stopped.
         """
         self.check_consistency()
         self._copy_input_keys(parent_ud)
@@ -187,7 +187,7 @@ class Concurrence(Container):
         return outcome
 
     def _run_child(self, label: str) -> None:
-        """Thread body: run one child and note how it ended."""
+        """Thread body: runs a child and stores its outcome."""
         state = self._states[label]
         outcome: str | None = None
         error: SmachError | None = InvalidUserCodeError(f"state '{label}' ended its thread")
@@ -201,7 +201,7 @@ class Concurrence(Container):
                 )
         except SmachError as raised:
             error = raised
-        finally:  # also when the state left by SystemExit: the concurrence must not wait for it for ever
+        finally:  # also after SystemExit, so that the concurrence does not wait forever
             with self._ended:
                 self._child_outcomes[label] = outcome
                 self._active.remove(label)
@@ -211,7 +211,7 @@ class Concurrence(Container):
                 self._ended.notify_all()
 
     def _wait_for_children(self) -> None:
-        """Waits until all children have ended; after each end, decides whether others are to be stopped."""
+        """Waits until all children have ended; each end may stop other children."""
         known_active = list(self._states)
         while known_active:
             with self._ended:
@@ -224,9 +224,9 @@ class Concurrence(Container):
             if failed:
                 self._preempt_active()
             elif known_active:
-                self._ask_child_termination_cb(outcomes)
+                self._call_child_termination_cb(outcomes)
 
-    def _ask_child_termination_cb(self, outcomes: dict[str, str | None]) -> None:
+    def _call_child_termination_cb(self, outcomes: dict[str, str | None]) -> None:
         if self._child_termination_cb is None:
             return
         try:
@@ -244,7 +244,7 @@ class Concurrence(Container):
             self._preempt_active()
 
     def _preempt_active(self, labels: Names | None = None) -> None:
-        """Asks running children to stop: all of them, or those named."""
+        """Requests preemption of the running children, all or those with the given labels."""
         with self._lock:
             wanted = set(self._active if labels is None else labels)
             for label in self._active:
@@ -252,7 +252,7 @@ class Concurrence(Container):
                     self._states[label].request_preempt()
 
     def _decide(self, outcomes: dict[str, str | None]) -> str:
-        """Returns the outcome of the concurrence, given those of its children."""
+        """Returns the outcome of the concurrence from those of its children."""
         if is_shutdown() and not all(
             outcome in self._states[label].get_registered_outcomes() for label, outcome in outcomes.items()
         ):
@@ -279,7 +279,7 @@ class Concurrence(Container):
         return chosen
 
     def _settle_preempt(self) -> None:
-        """Acknowledges the request to stop when every child has acknowledged it; withdraws those left over."""
+        """Acknowledges a preemption request after all children have; withdraws requests that remain."""
         leftovers = self._recall_leftovers()
         if self._preempt_requested and not leftovers:
             self.service_preempt()
@@ -292,7 +292,7 @@ class Concurrence(Container):
         return leftovers
 
     def request_preempt(self) -> None:
-        """Asks all running children to stop; the concurrence still waits until they have."""
+        """Requests preemption of all running children; the concurrence waits until they have ended."""
         with self._lock:
             super().request_preempt()
             if self._running:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A container: a state made of states. Building (``with container:``), userdata and callbacks common to all kinds."""
+"""Base class of containers, which are states made of states: construction, userdata and callbacks."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ Callback = Callable[..., object]
 
 
 class _Construction(threading.local):
-    """The containers being built by this thread, the innermost one last."""
+    """Containers under construction in this thread, the innermost last."""
 
     def __init__(self) -> None:
         self.stack: list[Container] = []
 
 
 class Container(State):
-    """Base of the containers: children, local userdata, construction, and callbacks."""
+    """Base class of containers: children, local userdata, construction and callbacks."""
 
     _construction = _Construction()
 
     def __init__(self, outcomes: Names = (), input_keys: Names = (), output_keys: Names = ()) -> None:
-        """Declares the interface of the container, as of any state."""
+        """Declares the interface of the container, like that of a state."""
         super().__init__(outcomes, input_keys, output_keys)
         self.userdata = UserData()
         self._running = False
@@ -43,30 +43,30 @@ class Container(State):
 
     # ---- abstract methods ----------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
-        """Returns the states in this container, by label."""
+        """Returns the contained states by label."""
         return {}
 
     def __getitem__(self, key: str) -> State:
         return self.get_children()[key]
 
     def get_initial_states(self) -> list[str]:
-        """Returns the labels of the states that run first."""
+        """Returns the labels of the initial states."""
         return []
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Chooses the states that run first, and values to put in the local userdata before."""
+        """Sets the initial states, and adds values to the local userdata."""
         raise self._unsupported("set_initial_state")
 
     def get_active_states(self) -> list[str]:
-        """Returns the labels of the states that are running."""
+        """Returns the labels of the running states."""
         return []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Returns the transitions inside the container as (outcome, from label, to label or container outcome)."""
+        """Returns the internal transitions as (outcome, from label, to label or container outcome)."""
         return []
 
     def check_consistency(self) -> None:
-        """Raises when the container cannot run as it was built."""
+        """Raises an error if the container is incomplete or inconsistent."""
         raise self._unsupported("check_consistency")
 
     def is_running(self) -> bool:
@@ -78,14 +78,14 @@ class Container(State):
 
     # ---- construction --------------------------------------------------------------------------------------
     def open(self) -> None:
-        """Makes this the container that ``add`` calls of this thread refer to."""
+        """Makes this container the target of ``add`` calls in this thread."""
         self._construction.stack.append(self)
 
     def close(self) -> None:
-        """Ends building this container.
+        """Ends the construction of this container.
 
         Raises:
-            smach.InvalidStateError: when another container was opened later and is still open, or none is open.
+            smach.InvalidStateError: A container that was opened later is still open, or no container is open.
         """
         stack = self._construction.stack
         if not stack or stack[-1] is not self:
@@ -93,7 +93,7 @@ class Container(State):
         stack.pop()
 
     def is_opened(self) -> bool:
-        """Returns whether this container is being built by this thread."""
+        """Returns whether this container is under construction in this thread."""
         return self in self._construction.stack
 
     def assert_opened(self, msg: str = "the container is not open; use 'with container:'") -> None:
@@ -103,7 +103,7 @@ class Container(State):
 
     @contextmanager
     def opened(self) -> Iterator[Container]:
-        """Opens the container for the duration of a ``with`` block; the same as ``with container:``."""
+        """Opens the container for a ``with`` block, like ``with container:``."""
         with self as container:
             yield container
 
@@ -123,7 +123,7 @@ class Container(State):
 
     @classmethod
     def _currently_opened_container(cls) -> Any:
-        """Returns the container being built; raises ``InvalidConstructionError`` when there is none of this kind."""
+        """Returns the container under construction; raises ``InvalidConstructionError`` without one of this class."""
         stack = cls._construction.stack
         if not stack:
             raise InvalidConstructionError(f"no container is open; call {cls.__name__}.add inside 'with container:'")
@@ -149,7 +149,7 @@ class Container(State):
                 parent_ud[key] = self.userdata[key]
 
     def _execute_child(self, label: str, state: State, remapping: NameMap) -> str:
-        """Runs a child with its own view of the userdata; raises ``InvalidUserCodeError`` for whatever it raises."""
+        """Runs a child with its view of the userdata; converts its errors to ``InvalidUserCodeError``."""
         view = Remapper(self.userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping)
         try:
             return state.execute(view)
@@ -164,32 +164,32 @@ class Container(State):
 
     # ---- callbacks -----------------------------------------------------------------------------------------
     def register_start_cb(self, start_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
-        """Calls ``start_cb(userdata, initial_labels, *cb_args)`` when the container starts."""
+        """Registers ``start_cb(userdata, initial_labels, *cb_args)``, called when the container starts."""
         self._start_cbs.append((start_cb, tuple(cb_args)))
 
     def register_transition_cb(self, transition_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
-        """Calls ``transition_cb(userdata, active_labels, *cb_args)`` when the running states have changed."""
+        """Registers ``transition_cb(userdata, active_labels, *cb_args)``, called when the running states change."""
         self._transition_cbs.append((transition_cb, tuple(cb_args)))
 
     def register_termination_cb(self, termination_cb: Callback, cb_args: Iterable[Any] = ()) -> None:
-        """Calls ``termination_cb(userdata, last_labels, outcome, *cb_args)`` when the container ends."""
+        """Registers ``termination_cb(userdata, last_labels, outcome, *cb_args)``, called when the container ends."""
         self._termination_cbs.append((termination_cb, tuple(cb_args)))
 
     def call_start_cbs(self) -> None:
-        """Calls the start callbacks; an error in one of them is logged and changes nothing."""
+        """Calls the start callbacks; their errors are logged and ignored."""
         self._call(self._start_cbs, "start", self.get_initial_states())
 
     def call_transition_cbs(self) -> None:
-        """Calls the transition callbacks; an error in one of them is logged and changes nothing."""
+        """Calls the transition callbacks; their errors are logged and ignored."""
         self._call(self._transition_cbs, "transition", self.get_active_states())
 
     def call_termination_cbs(self, terminal_states: list[str], outcome: str | None) -> None:
-        """Calls the termination callbacks; an error in one of them is logged and changes nothing."""
+        """Calls the termination callbacks; their errors are logged and ignored."""
         self._call(self._termination_cbs, "termination", terminal_states, outcome)
 
     def _call(self, callbacks: list[tuple[Callback, tuple[Any, ...]]], kind: str, *args: Any) -> None:
         for callback, extra in callbacks:
             try:
                 callback(self.userdata, *args, *extra)
-            except Exception:  # a failing callback must not change the run of the container
+            except Exception:  # a failing callback must not affect the container
                 log.error(f"{kind} callback {callback!r} raised:\n{traceback.format_exc()}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The errors of this library: each kind of mistake in a state machine has its own class."""
+"""Errors of this library, one class per kind of mistake in a state machine."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ __all__ = [
 
 
 class SmachError(Exception):
-    """Base of every error this library raises."""
+    """Base class of all errors of this library."""
 
 
 class InvalidTransitionError(SmachError):
-    """A transition starts or ends where there is nothing, or an outcome leads nowhere."""
+    """A transition has an unknown source or target, or an outcome has no transition."""
 
 
 class InvalidStateError(SmachError):
-    """A state cannot be part of the container it was given to."""
+    """A state cannot be added to a container."""
 
 
 class InvalidConstructionError(SmachError):
-    """A container is used as if it were open (or closed) while it is not."""
+    """A container is used while it is not open (or closed) as required."""
 
 
 class InvalidUserCodeError(SmachError):
-    """Code written by the user of the library raised, or broke the contract of its userdata."""
+    """User code raised an error or violated its userdata declaration."""

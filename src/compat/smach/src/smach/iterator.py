@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A container that runs one state again and again, once for each item of a sequence."""
+"""A container that runs one state for each item of a sequence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Iterator"]
 
 
 class Iterator(Container):
-    """Puts one item after the other in its userdata and runs the contained state for each."""
+    """Stores each item in its userdata and runs the contained state."""
 
     def __init__(
         self,
@@ -29,15 +29,15 @@ class Iterator(Container):
         it_label: str = "it_data",
         exhausted_outcome: str = "exhausted",
     ) -> None:
-        """Makes an iterator; its state is set inside ``with iterator:``.
+        """Creates an iterator; its state is set inside ``with iterator:``.
 
         Args:
-            outcomes: names of the outcomes; ``exhausted_outcome`` is added when it is missing.
-            input_keys: userdata keys copied from the parent before the first run.
-            output_keys: userdata keys copied to the parent after the last run.
-            it: the items, or a function without arguments that returns them when the iterator starts.
-            it_label: userdata key under which the state finds the current item.
-            exhausted_outcome: the outcome when the items have run out.
+            outcomes: Names of the outcomes; ``exhausted_outcome`` is added if missing.
+            input_keys: Userdata keys copied from the parent before the first run.
+            output_keys: Userdata keys copied to the parent after the last run.
+            it: Items, or a function without arguments that returns them when the iterator starts.
+            it_label: Userdata key of the current item.
+            exhausted_outcome: Outcome after the last item.
         """
         super().__init__(dict.fromkeys([*outcomes, exhausted_outcome]), input_keys, output_keys)
         self._items = it
@@ -59,16 +59,16 @@ class Iterator(Container):
         break_outcomes: Names = (),
         final_outcome_map: NameMap | None = None,
     ) -> None:
-        """Sets the state that is run for each item.
+        """Sets the state that runs for each item.
 
         Args:
-            label: its name.
-            state: the state, or a container.
-            loop_outcomes: outcomes of the state after which the next item follows; when empty, all that are not
+            label: Label of the state.
+            state: State or container.
+            loop_outcomes: Outcomes of the state that continue with the next item; if empty, all outcomes that are not
                 in ``break_outcomes``.
-            break_outcomes: outcomes of the state that end the iteration at once.
-            final_outcome_map: outcome of the state -> outcome of the iterator, for the outcome that ended it; an
-                outcome not mentioned keeps its name.
+            break_outcomes: Outcomes of the state that end the iteration.
+            final_outcome_map: Outcome of the iterator, keyed by the state's outcome that ends the iteration; outcomes
+                without an entry keep their names.
         """
         iterator: Iterator = Iterator._currently_opened_container()
         iterator._state_label = label
@@ -78,12 +78,12 @@ class Iterator(Container):
         iterator._final_outcome_map = dict(final_outcome_map or {})
 
     def set_iteritems(self, it: Iterable[Any] | Callable[[], Iterable[Any]], it_label: str) -> None:
-        """Replaces the items and the key under which the state finds the current one."""
+        """Replaces the items and the userdata key of the current item."""
         self._items = it
         self._items_label = it_label
 
     def check_consistency(self) -> None:
-        """Raises when there is no state, or when an outcome that ends the iteration is none of the iterator's."""
+        """Raises an error without a state, or if an ending outcome is not an outcome of the iterator."""
         if not isinstance(self._state, State):
             raise InvalidStateError("the iterator has no contained state; call Iterator.set_contained_state")
         registered = self._state.get_registered_outcomes()
@@ -117,11 +117,11 @@ class Iterator(Container):
         return {} if self._state is None else {self._state_label: self._state}
 
     def get_initial_states(self) -> list[str]:
-        """Returns the label of the contained state, in a list."""
+        """Returns the label of the contained state in a list."""
         return list(self.get_children())
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Puts values in the local userdata; there is only one state to start with."""
+        """Adds values to the local userdata; the initial state is always the contained state."""
         if initial_states and list(initial_states) != self.get_initial_states():
             log.warn(f"an iterator starts with its contained state; {list(initial_states)} is ignored")
         if userdata is not None:
@@ -149,11 +149,11 @@ class Iterator(Container):
         """Runs the contained state for each item.
 
         Args:
-            parent_ud: userdata the input keys are copied from and the output keys are copied to.
+            parent_ud: Userdata for copying the input and output keys.
 
         Returns:
-            The exhausted outcome, or the one the state broke out with; ``preempted`` (where the iterator has such
-            an outcome) when it was asked to stop between two items.
+            The exhausted outcome, or the outcome of the state that ended the iteration; ``preempted``, if the
+            iterator has this outcome, after a preemption request between two items.
         """
         self.check_consistency()
         self._copy_input_keys(parent_ud)
@@ -206,7 +206,7 @@ class Iterator(Container):
         return outcome
 
     def request_preempt(self) -> None:
-        """Asks the iterator to stop: the request goes to the contained state when it runs."""
+        """Requests preemption of the iterator and of the contained state when it runs."""
         with self._lock:
             super().request_preempt()
             if self._active and self._state is not None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where log lines go: to Python's logging, until ``set_loggers`` installs other functions (those of rospy, say).
+"""Logging functions, which use Python's logging until ``set_loggers`` installs others, such as those of rospy.
 
-``smach.loginfo``, ``logwarn``, ``logdebug`` and ``logerr`` are attributes of the package. Its own modules log by
-``log.info`` and its like, which find them at each call, so a replacement takes effect everywhere at once.
+``smach.loginfo``, ``logwarn``, ``logdebug`` and ``logerr`` are attributes of the package. Its modules log through
+``log.info`` etc., which look these attributes up at each call, so a replacement takes effect everywhere immediately.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ _LOGGER = logging.getLogger("smach")
 
 
 def loginfo(msg: str) -> None:
-    """Logs what a user wants to follow: which state runs, which outcome it gave."""
+    """Logs the progress of a machine: running states and outcomes."""
     _LOGGER.info(msg)
 
 
 def logwarn(msg: str) -> None:
-    """Logs what went on but should not have happened."""
+    """Logs a recoverable problem."""
     _LOGGER.warning(msg)
 
 
 def logdebug(msg: str) -> None:
-    """Logs what only a developer of a state machine needs."""
+    """Logs details for developers of state machines."""
     _LOGGER.debug(msg)
 
 
 def logerr(msg: str) -> None:
-    """Logs what keeps the state machine from going on."""
+    """Logs a fatal problem of a state machine."""
     _LOGGER.error(msg)
 
 
@@ -41,10 +41,10 @@ def set_loggers(info: LogFunction, warn: LogFunction, debug: LogFunction, error:
     """Replaces the four logging functions of the package.
 
     Args:
-        info: replaces ``smach.loginfo``.
-        warn: replaces ``smach.logwarn``.
-        debug: replaces ``smach.logdebug``.
-        error: replaces ``smach.logerr``.
+        info: Replacement of ``smach.loginfo``.
+        warn: Replacement of ``smach.logwarn``.
+        debug: Replacement of ``smach.logdebug``.
+        error: Replacement of ``smach.logerr``.
     """
     for name, function in (("loginfo", info), ("logwarn", warn), ("logdebug", debug), ("logerr", error)):
         setattr(sys.modules[__package__], name, function)

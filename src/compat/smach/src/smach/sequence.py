@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state machine whose states follow each other in the order they were added."""
+"""A state machine whose states run in the order of their addition."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ __all__ = ["Sequence"]
 
 
 class Sequence(StateMachine):
-    """Each state's connector outcome leads to the next state; the last one's leads out of the sequence."""
+    """Connects each state's connector outcome to the next state; the last state's one ends the sequence."""
 
     def __init__(
         self, outcomes: Names, connector_outcome: str, input_keys: Names = (), output_keys: Names = ()
     ) -> None:
-        """Makes an empty sequence.
+        """Creates an empty sequence.
 
         Args:
-            outcomes: names of the outcomes.
-            connector_outcome: the outcome of a state that leads to the next state.
-            input_keys: userdata keys copied from the parent before it runs.
-            output_keys: userdata keys copied to the parent after it has run.
+            outcomes: Names of the outcomes.
+            connector_outcome: Outcome of a state that leads to the next state.
+            input_keys: Userdata keys copied from the parent before the sequence runs.
+            output_keys: Userdata keys copied to the parent after the sequence has run.
         """
         super().__init__(outcomes, input_keys, output_keys)
         self._connector_outcome = connector_outcome
 
     @staticmethod
     def add(label: str, state: State, transitions: NameMap | None = None, remapping: NameMap | None = None) -> State:
-        """Adds a state to the sequence that is open.
+        """Adds a state to the open sequence.
 
         Args:
-            label: its name in this sequence.
-            state: the state, or a container; it must have the connector outcome.
-            transitions: where its other outcomes lead; one from the connector outcome breaks the sequence there.
-            remapping: userdata name in the state -> userdata name in this sequence.
+            label: Label of the state.
+            state: State or container; it must have the connector outcome.
+            transitions: Targets of its other outcomes; a target of the connector outcome breaks the sequence there.
+            remapping: Userdata key in the sequence, keyed by key in the state.
 
         Raises:
-            smach.InvalidStateError: the label is taken, or the object is not a state.
-            smach.InvalidTransitionError: the state lacks the connector outcome, or one in ``transitions``.
+            smach.InvalidStateError: The label is already used, or the object is not a state.
+            smach.InvalidTransitionError: The state lacks the connector outcome or an outcome in ``transitions``.
         """
         sequence: Sequence = Sequence._currently_opened_container()
         if not isinstance(state, State):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state: something that runs, reads and writes userdata, ends with one of its outcomes, and can be asked to stop."""
+"""A state runs, reads and writes userdata, ends with one of its outcomes, and can be preempted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["CBState", "State"]
 
 
 class State:
-    """Base of all states: declares outcomes and userdata keys; ``execute`` is written by the user."""
+    """Base class of all states: declares outcomes and userdata keys; subclasses define ``execute``."""
 
     def __init__(
         self, outcomes: Names = (), input_keys: Names = (), output_keys: Names = (), io_keys: Names = ()
@@ -21,10 +21,10 @@ class State:
         """Declares the interface of the state.
 
         Args:
-            outcomes: names of what ``execute`` may return.
-            input_keys: userdata keys that are read.
-            output_keys: userdata keys that are written.
-            io_keys: userdata keys that are read and written.
+            outcomes: Allowed return values of ``execute``.
+            input_keys: Userdata keys that are read.
+            output_keys: Userdata keys that are written.
+            io_keys: Userdata keys that are read and written.
         """
         self._outcomes: dict[str, None] = dict.fromkeys(outcomes)
         self._input_keys: dict[str, None] = dict.fromkeys(input_keys)
@@ -33,13 +33,13 @@ class State:
         self.register_io_keys(io_keys)
 
     def execute(self, userdata: Any) -> str:
-        """Does the work of the state and returns one of its outcomes. Subclasses override this.
+        """Executes the state and returns one of its outcomes. Subclasses override this method.
 
         Args:
-            userdata: the view this state has of its container's userdata.
+            userdata: View of the container's userdata.
 
         Raises:
-            smach.InvalidUserCodeError: when a subclass did not override it.
+            smach.InvalidUserCodeError: A subclass does not override this method.
         """
         raise InvalidUserCodeError(f"{type(self).__name__} does not define execute(self, userdata)")
 
@@ -76,24 +76,24 @@ class State:
 
     # ---- stopping ------------------------------------------------------------------------------------------
     def request_preempt(self) -> None:
-        """Asks the state to stop; it does so where its ``execute`` checks ``preempt_requested``."""
+        """Requests the state to stop, which it does when its ``execute`` checks ``preempt_requested``."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Acknowledges the request: called by the state that stops because of it."""
+        """Acknowledges the preemption request; called by the state that stops because of it."""
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:
-        """Withdraws the request; called by the requester."""
+        """Withdraws the preemption request; called by the requester."""
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:
-        """Returns whether the state was asked to stop and has not acknowledged it yet."""
+        """Returns whether a preemption request has not been acknowledged yet."""
         return self._preempt_requested
 
 
 class CBState(State):
-    """A state whose work is a function: ``cb(userdata, *cb_args, **cb_kwargs)`` returning an outcome."""
+    """A state that executes a function ``cb(userdata, *cb_args, **cb_kwargs)``, which returns an outcome."""
 
     def __init__(
         self,
@@ -105,16 +105,16 @@ class CBState(State):
         output_keys: Names = (),
         io_keys: Names = (),
     ) -> None:
-        """Makes a state of a function; an interface declared with ``cb_interface`` is taken over.
+        """Creates a state from a function and any interface that ``cb_interface`` declares for it.
 
         Args:
-            cb: the function.
-            cb_args: positional arguments passed after the userdata.
-            cb_kwargs: keyword arguments passed to the function.
-            outcomes: names of what the function may return.
-            input_keys: userdata keys that are read.
-            output_keys: userdata keys that are written.
-            io_keys: userdata keys that are read and written.
+            cb: Function to execute.
+            cb_args: Positional arguments after the userdata.
+            cb_kwargs: Keyword arguments.
+            outcomes: Allowed return values of the function.
+            input_keys: Userdata keys that are read.
+            output_keys: Userdata keys that are written.
+            io_keys: Userdata keys that are read and written.
         """
         super().__init__(outcomes, input_keys, output_keys, io_keys)
         self._cb = cb
@@ -127,5 +127,5 @@ class CBState(State):
             self.register_output_keys(declared.get_registered_output_keys())
 
     def execute(self, userdata: Any) -> str:
-        """Calls the function and returns what it returned."""
+        """Calls the function and returns its outcome."""
         return self._cb(userdata, *self._cb_args, **self._cb_kwargs)

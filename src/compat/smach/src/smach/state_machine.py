@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A container that runs one state at a time.
 
-It follows transitions from outcome to state until it reaches one of its own outcomes.
+Transitions from outcomes to states are followed until an outcome of the machine is reached.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ __all__ = ["StateMachine"]
 
 
 class StateMachine(Container):
-    """Runs its states in the order its transitions give, starting with the first one added."""
+    """Runs its states according to its transitions, starting with the state added first."""
 
     def __init__(self, outcomes: Names, input_keys: Names = (), output_keys: Names = ()) -> None:
-        """Makes an empty machine; states are added inside ``with machine:``."""
+        """Creates an empty machine; states are added inside ``with machine:``."""
         super().__init__(outcomes, input_keys, output_keys)
         self._states: dict[str, State] = {}
         self._transitions: dict[str, dict[str, str | None]] = {}
@@ -38,21 +38,21 @@ class StateMachine(Container):
     # ---- construction --------------------------------------------------------------------------------------
     @staticmethod
     def add(label: str, state: State, transitions: NameMap | None = None, remapping: NameMap | None = None) -> State:
-        """Adds a state to the machine that is open.
+        """Adds a state to the open machine.
 
         Args:
-            label: its name in this machine.
-            state: the state, or a container.
-            transitions: outcome of the state -> label of a state, or outcome of this machine. An outcome not
-                mentioned leads to the machine's outcome of the same name.
-            remapping: userdata name in the state -> userdata name in this machine.
+            label: Label of the state.
+            state: State or container.
+            transitions: Target label or machine outcome, keyed by the state's outcome. An outcome without an entry
+                leads to the machine's outcome of the same name.
+            remapping: Userdata key in the machine, keyed by key in the state.
 
         Returns:
             The state.
 
         Raises:
-            smach.InvalidStateError: the label is taken, or the object is not a state.
-            smach.InvalidTransitionError: a transition starts from an outcome the state does not have.
+            smach.InvalidStateError: The label is already used, or the object is not a state.
+            smach.InvalidTransitionError: A transition starts from an outcome that the state lacks.
         """
         machine: StateMachine = StateMachine._currently_opened_container()
         machine.check_state_spec(label, state, transitions or {})
@@ -72,14 +72,14 @@ class StateMachine(Container):
         transitions: NameMap | None = None,
         remapping: NameMap | None = None,
     ) -> State:
-        """Adds a state, some of whose outcomes lead to the state that is added next.
+        """Adds a state whose connector outcomes lead to the state that is added next.
 
         Args:
-            label: its name in this machine.
-            state: the state, or a container.
-            connector_outcomes: the outcomes that lead to the next state.
-            transitions: as for ``add``.
-            remapping: as for ``add``.
+            label: Label of the state.
+            state: State or container.
+            connector_outcomes: Outcomes that lead to the next state.
+            transitions: See ``add``.
+            remapping: See ``add``.
         """
         machine: StateMachine = StateMachine._currently_opened_container()
         connectors = [outcome for outcome in connector_outcomes if outcome not in (transitions or {})]
@@ -100,7 +100,7 @@ class StateMachine(Container):
         self._connector_label, self._connector_outcomes = None, []
 
     def check_state_spec(self, label: str, state: State, transitions: NameMap) -> None:
-        """Raises when a state cannot be added under a label with these transitions."""
+        """Raises an error if a state cannot be added with this label and these transitions."""
         if label in self._states:
             raise InvalidStateError(f"the machine already has a state with the label '{label}'")
         if label in self._outcomes:
@@ -117,7 +117,7 @@ class StateMachine(Container):
             )
 
     def check_consistency(self) -> None:
-        """Raises when the machine has no state or a transition leads nowhere, naming every such transition."""
+        """Raises an error without states, or with all transitions that have an unknown target."""
         if not self._states:
             raise InvalidStateError("the state machine has no states")
         if self._initial_label is not None and self._initial_label not in self._states:
@@ -138,24 +138,24 @@ class StateMachine(Container):
 
     # ---- inspection ----------------------------------------------------------------------------------------
     def get_children(self) -> dict[str, State]:
-        """Returns the states by label, in the order they were added."""
+        """Returns the states by label, in the order of their addition."""
         return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
-        """Returns the label of the first state, in a list."""
+        """Returns the label of the initial state in a list."""
         if self._initial_label is not None:
             return [self._initial_label]
         return list(self._states)[:1]
 
     def set_initial_state(self, initial_states: list[str], userdata: UserData | None = None) -> None:
-        """Chooses the state that runs first.
+        """Sets the initial state.
 
         Args:
-            initial_states: exactly one label.
-            userdata: values put in the machine's userdata.
+            initial_states: List of exactly one label.
+            userdata: Values to add to the machine's userdata.
 
         Raises:
-            smach.InvalidStateError: when not exactly one label is given.
+            smach.InvalidStateError: The list does not contain exactly one label.
         """
         if len(initial_states) != 1:
             raise InvalidStateError(f"a state machine starts with one state, got {list(initial_states)}")
@@ -165,7 +165,7 @@ class StateMachine(Container):
             self._initial_label = initial_states[0]
 
     def get_active_states(self) -> list[str]:
-        """Returns the label of the running state, in a list; empty when the machine is not running."""
+        """Returns the label of the running state in a list; empty while the machine is not running."""
         label = self._current_label
         return [] if label is None else [label]
 
@@ -179,17 +179,17 @@ class StateMachine(Container):
 
     # ---- running -------------------------------------------------------------------------------------------
     def execute(self, parent_ud: Any = None) -> str:
-        """Runs until an outcome of the machine is reached.
+        """Runs the machine until one of its outcomes is reached.
 
         Args:
-            parent_ud: userdata the machine's input keys are copied from and its output keys are copied to.
+            parent_ud: Userdata for copying the input and output keys.
 
         Returns:
-            The outcome; ``preempted`` when the process goes down (``set_shutdown_check``).
+            The outcome; ``preempted`` if the process shuts down (``set_shutdown_check``).
 
         Raises:
-            smach.SmachError: the machine is inconsistent, a state raised, or a state returned something that is
-                not one of its outcomes.
+            smach.SmachError: The machine is inconsistent, a state raised an error, or a state returned an undeclared
+                outcome.
         """
         self.check_consistency()
         self._copy_input_keys(parent_ud)
@@ -229,7 +229,7 @@ class StateMachine(Container):
             self.call_transition_cbs()
 
     def _enter(self, label: str) -> None:
-        """Makes a state the current one; a machine that was asked to stop passes the request on to it."""
+        """Sets the current state; forwards a preemption request of the machine to it."""
         with self._lock:
             self._current_label = label
             if self._preempt_requested:
@@ -237,7 +237,7 @@ class StateMachine(Container):
                 self._states[label].request_preempt()
 
     def _settle_preempt(self, label: str, state: State) -> None:
-        """Acknowledges the machine's own request once the state it was passed to has acknowledged it."""
+        """Acknowledges the request of the machine once the preempted state has acknowledged its own."""
         with self._lock:
             if self._preempted_label != label:
                 return
@@ -267,7 +267,7 @@ class StateMachine(Container):
         return "preempted"
 
     def request_preempt(self) -> None:
-        """Asks the machine to stop: the request goes to the running state, and to those entered later."""
+        """Requests preemption of the running state and of states entered later."""
         with self._lock:
             super().request_preempt()
             if self._running and self._current_label is not None and self._preempted_label is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Userdata: the variables that states pass to each other, and the restricted view of them that one state has."""
+"""Userdata: variables that states share, and a state's restricted view of them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Const", "Remapper", "UserData", "get_const"]
 
 
 class _ItemsAsAttributes:
-    """Reads items as attributes; names that begin with an underscore are not items."""
+    """Provides items as attributes; names that start with an underscore are not items."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -28,14 +28,14 @@ class _ItemsAsAttributes:
 
 
 class UserData(_ItemsAsAttributes):
-    """A set of named values, read and written as attributes or as items, safe to share between threads."""
+    """Thread-safe named values, accessible as attributes or items."""
 
     def __init__(self) -> None:
         object.__setattr__(self, "_data", {})
         object.__setattr__(self, "_lock", threading.RLock())
 
     def update(self, ud: UserData) -> None:
-        """Takes over every value of another userdata, overwriting those with the same name."""
+        """Copies every value of other userdata, replacing values with the same name."""
         with self._lock:
             self._data.update(ud._data)
 
@@ -43,8 +43,8 @@ class UserData(_ItemsAsAttributes):
         """Returns shallow copies of some values under other names.
 
         Args:
-            keys: names in this userdata.
-            remapping: new name -> name in this userdata; names not mentioned stay.
+            keys: Names in this userdata.
+            remapping: Name in this userdata, keyed by new name; names without an entry are kept.
         """
         renamed = {here: there for there, here in remapping.items()}
         if len(renamed) != len(remapping):
@@ -55,12 +55,12 @@ class UserData(_ItemsAsAttributes):
         return result
 
     def merge(self, ud: UserData, keys: Names, remapping: NameMap) -> None:
-        """Takes shallow copies of some values of another userdata.
+        """Stores shallow copies of some values of other userdata.
 
         Args:
-            ud: where the values come from.
-            keys: names in ``ud``.
-            remapping: name in ``ud`` -> name here; names not mentioned stay.
+            ud: Source userdata.
+            keys: Names in ``ud``.
+            remapping: Name here, keyed by name in ``ud``; names without an entry are kept.
         """
         for key in keys:
             self[remapping.get(key, key)] = copy.copy(ud[key])
@@ -92,16 +92,15 @@ class UserData(_ItemsAsAttributes):
 
 
 def get_const(obj: Any) -> Any:
-    """Returns a read-only proxy of an ordinary Python object; values without attributes of their own as they are.
+    """Returns a read-only proxy of an ordinary Python object, or the value itself without an instance dictionary.
 
-    Numbers, strings, containers and messages (whose classes use slots) have no instance dictionary and are
-    handed over unchanged.
+    Numbers, strings, containers and messages (whose classes use slots) have no instance dictionary.
     """
     return Const(obj) if hasattr(obj, "__dict__") and not isinstance(obj, type) else obj
 
 
 class Const:
-    """A proxy that lets attributes be read, and refuses to change them or to call methods."""
+    """A read-only proxy, which refuses changes of attributes and calls of methods."""
 
     __slots__ = ("_obj",)
 
@@ -145,18 +144,18 @@ class Const:
 
 
 class Remapper(_ItemsAsAttributes):
-    """The view a state has of its container's userdata: only its declared keys, under its own names."""
+    """A state's view of its container's userdata: the declared keys under the state's names."""
 
     def __init__(
         self, ud: Any, input_keys: Names = (), output_keys: Names = (), remapping: NameMap | None = None
     ) -> None:
-        """Wraps userdata in the interface of a state.
+        """Creates the view of a state.
 
         Args:
-            ud: the userdata of the container.
-            input_keys: names that may be read.
-            output_keys: names that may be written (a key that is input and output is handed over writable).
-            remapping: the state's name -> name in ``ud``; names not mentioned are the same in both.
+            ud: Userdata of the container.
+            input_keys: Readable names.
+            output_keys: Writable names; a key that is input and output gives the object itself.
+            remapping: Name in ``ud``, keyed by the state's name; names without an entry are equal.
         """
         object.__setattr__(self, "_ud", ud)
         object.__setattr__(self, "_input_keys", tuple(input_keys))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shutdown check shared by all containers, and the decorator that gives a plain function a state's interface."""
+"""Shutdown check of all containers, and a decorator that declares a function's smach interface."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ Names = Iterable[str]
 """Outcomes, labels or userdata keys."""
 
 NameMap = Mapping[str, str]
-"""Transitions or remappings: one name -> another."""
+"""Transitions or remappings, from name to name."""
 
 
 class _ShutdownCheck:
-    """Holds the function that says whether the process is going down."""
+    """Holder of the installed shutdown check."""
 
     def __init__(self) -> None:
-        self.ask: Callable[[], bool] = lambda: False
+        self.check: Callable[[], bool] = lambda: False
 
 
 _SHUTDOWN = _ShutdownCheck()
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
-    """Installs the function that containers call between two states: True = stop, with the outcome ``preempted``."""
-    _SHUTDOWN.ask = cb
+    """Installs the function that containers call between states; True stops them with the outcome ``preempted``."""
+    _SHUTDOWN.check = cb
 
 
 def is_shutdown() -> bool:
-    """Returns whether the process is going down, as far as the installed check knows (by default: never)."""
-    return _SHUTDOWN.ask()
+    """Returns whether the process is shutting down according to the installed check (by default never)."""
+    return _SHUTDOWN.check()
 
 
 def has_smach_interface(obj: object) -> bool:
-    """Returns whether an object declares outcomes, input keys and output keys the way states do."""
+    """Returns whether an object declares outcomes, input keys and output keys like a state."""
     names = ("get_registered_input_keys", "get_registered_output_keys", "get_registered_outcomes")
     return all(hasattr(obj, name) for name in names)
 
 
 class CBInterface:
-    """A callable that carries the outcomes and userdata keys of the function it wraps."""
+    """A function with declared outcomes and userdata keys."""
 
     def __init__(
         self,
@@ -52,7 +52,15 @@ class CBInterface:
         output_keys: Names = (),
         io_keys: Names = (),
     ) -> None:
-        """Wraps ``cb``; keys in ``io_keys`` count as input and as output."""
+        """Wraps a function; ``io_keys`` are added to input and output keys.
+
+        Args:
+            cb: Function.
+            outcomes: Outcomes of the function.
+            input_keys: Userdata keys that are read.
+            output_keys: Userdata keys that are written.
+            io_keys: Userdata keys that are read and written.
+        """
         both = list(io_keys)
         self._cb = cb
         self._outcomes = tuple(outcomes)
@@ -77,12 +85,19 @@ class CBInterface:
 
 
 class cb_interface:  # noqa: N801 - public name
-    """Decorator: declares outcomes and userdata keys of a function, for use with ``CBState``."""
+    """Decorator that declares the outcomes and userdata keys of a function for ``CBState``."""
 
     def __init__(
         self, outcomes: Names = (), input_keys: Names = (), output_keys: Names = (), io_keys: Names = ()
     ) -> None:
-        """Stores the interface that the decorated function will carry."""
+        """Stores the interface of the decorated function.
+
+        Args:
+            outcomes: Outcomes of the function.
+            input_keys: Userdata keys that are read.
+            output_keys: Userdata keys that are written.
+            io_keys: Userdata keys that are read and written.
+        """
         self._interface = (tuple(outcomes), tuple(input_keys), tuple(output_keys), tuple(io_keys))
 
     def __call__(self, cb: Callable[..., Any]) -> CBInterface:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """smach for ROS: a new implementation of the public interface of smach_ros 2.5.2.
 
-Importing the package makes smach log through rospy and stop when rospy shuts down.
+Importing the package makes smach log through rospy and stop on the shutdown of rospy.
 """
 
 import rospy

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Offers a state machine as an action: a goal runs it, its outcome is the end of the goal."""
+"""Provides a state machine as an action: a goal executes the machine, whose outcome ends the goal."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ActionServerWrapper:
     """An action server around a container.
 
     Attributes:
-        wrapped_container: the container.
-        userdata: what the container is executed with: the goal goes in, the result comes out.
+        wrapped_container: Wrapped container.
+        userdata: Userdata of the container, which receives the goal and provides the result.
     """
 
     def __init__(
@@ -40,26 +40,26 @@ class ActionServerWrapper:
         expand_goal_slots: bool = False,
         pack_result_slots: bool = False,
     ) -> None:
-        """Makes the server; ``run_server`` starts it.
+        """Creates the server; ``run_server`` starts it.
 
         Args:
-            server_name: name of the action.
-            action_spec: its type, as ``FibonacciAction``.
-            wrapped_container: what is executed; it declares the keys it uses as its input and output keys.
-            succeeded_outcomes: its outcomes that mean the goal succeeded.
-            aborted_outcomes: its outcomes that mean it was aborted; those in no list mean so, too.
-            preempted_outcomes: its outcomes that mean it was preempted.
-            goal_key: userdata key of the goal.
-            feedback_key: userdata key of the feedback, which is published at each transition.
-            result_key: userdata key of the result.
-            goal_slots_map: field of the goal -> userdata key it is put under.
-            feedback_slots_map: field of the feedback -> userdata key of the container it is taken from.
-            result_slots_map: field of the result -> userdata key it is taken from.
-            expand_goal_slots: put each field of the goal under the key of its name.
-            pack_result_slots: take each field of the result from the key of its name, where there is one.
+            server_name: Name of the action.
+            action_spec: Action class, such as ``FibonacciAction``.
+            wrapped_container: Container to execute, which declares its userdata keys as input and output keys.
+            succeeded_outcomes: Outcomes for which the goal succeeded.
+            aborted_outcomes: Outcomes for which the goal is aborted, like outcomes of no list.
+            preempted_outcomes: Outcomes for which the goal is preempted.
+            goal_key: Userdata key of the goal.
+            feedback_key: Userdata key of the feedback, which is published at each transition.
+            result_key: Userdata key of the result.
+            goal_slots_map: Userdata key that receives a goal field, keyed by field.
+            feedback_slots_map: Userdata key of the container that provides a feedback field, keyed by field.
+            result_slots_map: Userdata key that provides a result field, keyed by field.
+            expand_goal_slots: Whether to store each goal field under the key of its name.
+            pack_result_slots: Whether to take result fields from existing keys of their names.
 
         Raises:
-            smach.InvalidConstructionError: an argument does not fit; the text says which and what would.
+            smach.InvalidConstructionError: An argument is invalid; the message names the allowed values.
         """
         if not isinstance(wrapped_container, smach.Container):
             raise smach.InvalidConstructionError(
@@ -84,7 +84,7 @@ class ActionServerWrapper:
         self._action_server = SteadySimpleActionServer(server_name, action_spec, self.execute_cb)
 
     def _new_goal_data(self, goal: Any) -> None:
-        """Puts a goal in the userdata, with an empty feedback and result; None: an empty goal."""
+        """Stores a goal, or an empty goal for None, in the userdata with an empty feedback and result."""
         try:
             action = self._action_spec()
             empty = action.action_goal.goal, action.action_feedback.feedback, action.action_result.result
@@ -133,11 +133,11 @@ class ActionServerWrapper:
         self.publish_feedback(userdata)
 
     def termination_cb(self, userdata: Any, terminal_states: list[str], container_outcome: str | None) -> None:
-        """Notes the end of the container."""
+        """Logs the end of the container."""
         smach.logdebug(f"'{self._server_name}': container ended in {terminal_states} with '{container_outcome}'")
 
     def publish_feedback(self, userdata: Any) -> None:
-        """Publishes the feedback of the container's userdata, if there is any, with the fields that are mapped."""
+        """Publishes the feedback in the container's userdata with its mapped fields, if there is any."""
         if self._feedback_key not in userdata and not self._feedback_slots_map:
             return
         source = userdata if self._feedback_key in userdata else self.userdata
@@ -149,26 +149,26 @@ class ActionServerWrapper:
 
     # ---- callbacks of the action server --------------------------------------------------------------------
     def preempt_cb(self) -> None:
-        """Pass a cancelled goal on: the container is asked to stop."""
+        """Requests preemption of the container when the goal is cancelled."""
         smach.loginfo(f"'{self._server_name}': the goal is cancelled, the state machine is asked to stop")
         self.wrapped_container.request_preempt()
 
     def execute_cb(self, goal: Any) -> None:
-        """Runs the container for a goal, and ends the goal as its outcome says."""
+        """Executes the container for a goal, and ends the goal according to the outcome."""
         container = self.wrapped_container
         self._new_goal_data(goal)
         for slot in goal.__slots__ if self._expand_goal_slots else ():
             self.userdata[slot] = getattr(goal, slot)
         for slot, key in self._goal_slots_map.items():
             self.userdata[key] = getattr(goal, slot)
-        container.recall_preempt()  # that of an earlier goal
+        container.recall_preempt()  # from an earlier goal
         if self._action_server.is_preempt_requested():
             container.request_preempt()
         inputs, outputs = container.get_registered_input_keys(), container.get_registered_output_keys()
         try:
             outcome = container.execute(smach.Remapper(self.userdata, inputs, outputs, {}))
             result = self._packed_result()
-        except Exception as error:  # whatever a state raises ends this goal, not the server
+        except Exception as error:  # any error of a state ends this goal, not the server
             smach.logerr(f"'{self._server_name}': the state machine raised:\n{traceback.format_exc()}")
             self._action_server.set_aborted(text=f"the state machine raised {type(error).__name__}: {error}")
             return

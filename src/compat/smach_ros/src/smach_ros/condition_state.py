@@ -17,7 +17,7 @@ __all__ = ["ConditionState"]
 
 
 class ConditionState(smach.State):
-    """Outcomes: true, false (not within the checks or the time allowed), preempted."""
+    """Outcomes: true, false (not true within the allowed checks or time), preempted."""
 
     def __init__(
         self,
@@ -27,17 +27,17 @@ class ConditionState(smach.State):
         timeout: rospy.Duration | None = None,
         max_checks: int = 1,
     ) -> None:
-        """Makes the state.
+        """Creates the state.
 
         Args:
-            cond_cb: gets the userdata; one made by ``smach.cb_interface`` brings its keys along.
-            input_keys: userdata keys that are read.
-            poll_rate: time between two checks [wall time].
-            timeout: longest execution [ROS time]; None: no limit.
-            max_checks: longest number of checks; -1: no limit.
+            cond_cb: Condition, called with the userdata; a function of ``smach.cb_interface`` declares its own keys.
+            input_keys: Userdata keys that are read.
+            poll_rate: Period of the checks [wall time].
+            timeout: Maximum duration [ROS time]; None for no limit.
+            max_checks: Maximum number of checks; -1 for no limit.
 
         Raises:
-            smach.InvalidStateError: an argument does not fit.
+            smach.InvalidStateError: An argument is invalid.
         """
         super().__init__(("true", "false", "preempted"), input_keys)
         if not callable(cond_cb):
@@ -58,10 +58,10 @@ class ConditionState(smach.State):
         self._wake = threading.Event()
 
     def execute(self, userdata: Any) -> str:
-        """Polls the condition until it is true, or no further check is allowed.
+        """Polls the condition until it is true or a limit is reached.
 
         Raises:
-            smach.InvalidUserCodeError: the function raised.
+            smach.InvalidUserCodeError: The condition raised an error.
         """
         self._wake.clear()
         limit = RosTimeLimit(self._timeout_s)
@@ -69,7 +69,7 @@ class ConditionState(smach.State):
         while not (self.preempt_requested() or going_down()):
             if limit.over():
                 return "false"
-            if self._ask(userdata):
+            if self._evaluate(userdata):
                 return "true"
             checks += 1
             if checks == self._max_checks:
@@ -78,7 +78,7 @@ class ConditionState(smach.State):
         self.service_preempt()
         return "preempted"
 
-    def _ask(self, userdata: Any) -> bool:
+    def _evaluate(self, userdata: Any) -> bool:
         try:
             return bool(self._cond_cb(userdata))
         except Exception as error:
@@ -87,6 +87,6 @@ class ConditionState(smach.State):
             ) from error
 
     def request_preempt(self) -> None:
-        """Asks the state to stop."""
+        """Requests the state to stop."""
         super().request_preempt()
         self._wake.set()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes a running state machine for viewers, and lets them choose the state it starts in."""
+"""Publishes a running state machine for viewers, which may set its initial states."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ INIT_TOPIC = "/smach/container_init"
 STRUCTURE_TOPIC = "/smach/container_structure"
 
 UPDATE_PERIOD_S = 2.0
-"""How often everything is published again [wall time]."""
+"""Period of full updates [wall time]."""
 
 MIN_QUEUE = 100
 
@@ -34,10 +34,10 @@ def _values(userdata: smach.UserData) -> dict[str, Any]:
 
 
 class ContainerProxy:
-    """The messages of one container."""
+    """Messages of a container."""
 
     def __init__(self, container: smach.Container, path: str) -> None:
-        """Keeps a container and its path from the root."""
+        """Stores a container and its path from the root."""
         self.container = container
         self.path = path
 
@@ -66,11 +66,11 @@ class ContainerProxy:
         )
 
     def set_initial_state(self, command: SmachContainerInitialStatusCmd) -> None:
-        """Carries out a viewer's command.
+        """Executes a viewer's command.
 
         Raises:
-            smach.SmachError: the container has no such states.
-            UserdataError: the userdata is broken.
+            smach.SmachError: The container lacks a state.
+            UserdataError: The userdata is invalid.
         """
         children = self.container.get_children()
         unknown = [label for label in command.initial_states if label not in children]
@@ -83,37 +83,37 @@ class ContainerProxy:
 
 
 class _NewSubscriber(rospy.SubscribeListener):
-    """Calls a function when a node has subscribed."""
+    """Sets an event when a node subscribes."""
 
     def __init__(self, event: threading.Event) -> None:
         super().__init__()
         self._event = event
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
-        """Called by rospy."""
+        """Callback of rospy."""
         self._event.set()
 
 
 class IntrospectionServer:
-    """Publishes structure and status of a container and of all containers in it.
+    """Publishes structure and status of a container and all nested containers.
 
-    Nothing is computed or sent without subscribers; a new one gets everything at once, then whenever a
-    container starts, ends or makes a transition, and every two seconds.
+    Messages are created only for subscribers: all messages for a new subscriber, and updates when a container starts,
+    ends or makes a transition, and every two seconds.
     Publishers: ``<server_name>/smach/container_structure``, ``<server_name>/smach/container_status``.
     Subscriber: ``<server_name>/smach/container_init``.
     """
 
     def __init__(self, server_name: str, state: smach.Container, path: str, *, accept_commands: bool = True) -> None:
-        """Makes the server; ``start`` starts it.
+        """Creates the server; ``start`` starts it.
 
         Args:
-            server_name: start of the topics' names.
-            state: the outermost container.
-            path: what it is called, as "/TASK".
-            accept_commands: whether viewers may set initial states and userdata.
+            server_name: Prefix of the topics' names.
+            state: Outermost container.
+            path: Path of the container, such as "/TASK".
+            accept_commands: Whether viewers may set initial states and userdata.
 
         Raises:
-            smach.InvalidStateError: the state is no container, or the path does not begin with "/".
+            smach.InvalidStateError: The state is not a container, or the path does not begin with "/".
         """
         if not isinstance(state, smach.Container):
             raise smach.InvalidStateError(f"introspection needs a container, got a {type(state).__name__}")
@@ -131,14 +131,14 @@ class IntrospectionServer:
         self._topics: list[Any] = []
 
     def start(self) -> None:
-        """Advertises the topics and begins to publish. A server that was stopped can be started again."""
+        """Advertises the topics and starts to publish; a stopped server can be restarted."""
         with self._lock:
             if self._running:
                 return
             if not self._proxies:
                 self.construct(self._server_name, self._state, self._path)
             self._advertise()
-            self._running = True  # from here on the callbacks of the containers publish
+            self._running = True  # from now on the containers' callbacks publish
             self._run_number += 1
             arguments = (self._run_number,)
         threading.Thread(
@@ -158,7 +158,7 @@ class IntrospectionServer:
             self._topics.append(rospy.Subscriber(name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_command))
 
     def stop(self) -> None:
-        """Withdraws the topics. May be called twice."""
+        """Unregisters the topics; repeated calls are allowed."""
         with self._lock:
             self._running = False
             topics, self._topics = self._topics, []
@@ -167,7 +167,13 @@ class IntrospectionServer:
             topic.unregister()
 
     def construct(self, server_name: str, state: smach.Container, path: str) -> None:
-        """Registers a container and all containers in it; server_name is that of this server."""
+        """Registers a container and all nested containers.
+
+        Args:
+            server_name: Prefix of the topics' names.
+            state: Container.
+            path: Path of the container.
+        """
         proxy = ContainerProxy(state, path)
         self._proxies.append(proxy)
 
@@ -182,11 +188,11 @@ class IntrospectionServer:
                 self.construct(server_name, child, f"{path.rstrip('/')}/{label}")
 
     def clear(self) -> None:
-        """Forgets all containers."""
+        """Removes all containers."""
         self._proxies = []
 
     def _publish_loop(self, run_number: int) -> None:
-        """Body of the thread: publish everything now and then, and when there is a new listener."""
+        """Thread body: publishes all messages periodically and for new subscribers."""
         while self._running and self._run_number == run_number and not rospy.is_shutdown():
             self._wake.clear()
             for proxy in list(self._proxies):
@@ -203,7 +209,7 @@ class IntrospectionServer:
             self._send(self._status_pub, lambda: proxy.status(info))
 
     def _send(self, publisher: rospy.Publisher, make: Callable[[], Any]) -> None:
-        """Makes and publishes a message if there are subscribers: introspection must not slow the machine down."""
+        """Creates and publishes a message if there are subscribers, so that introspection costs nothing otherwise."""
         try:
             if publisher.get_num_connections() > 0:
                 publisher.publish(make())
@@ -225,14 +231,14 @@ class IntrospectionServer:
 
 
 class IntrospectionClient:
-    """Finds introspection servers and commands them."""
+    """Finds introspection servers and sends commands to them."""
 
     def __init__(self) -> None:
-        """Makes a client; it connects when it is used."""
+        """Creates a client that connects on demand."""
         self._publishers: dict[str, rospy.Publisher] = {}
 
     def get_servers(self) -> list[str]:
-        """Returns the names of the servers that publish now."""
+        """Returns the names of the active servers."""
         return [
             topic[: -len(STATUS_TOPIC)]
             for topic, kind in rospy.get_published_topics()
@@ -247,20 +253,20 @@ class IntrospectionClient:
         initial_userdata: smach.UserData | None = None,
         timeout: rospy.Duration | None = None,
     ) -> bool | None:
-        """Chooses the states a container starts in.
+        """Sets the initial states of a container.
 
         Args:
-            server: name of the server.
-            path: path of the container.
-            initial_states: labels of its states.
-            initial_userdata: values that are put in its userdata: plain values and messages.
-            timeout: longest wait for the container to have taken it over [wall time]; None: do not wait.
+            server: Name of the server.
+            path: Path of the container.
+            initial_states: Labels of the container's initial states.
+            initial_userdata: Plain values and messages to add to the container's userdata.
+            timeout: Maximum wait for the effect [wall time]; None to return immediately.
 
         Returns:
-            Whether it has; None when there was no wait.
+            Whether the container accepted the states; None without waiting.
 
         Raises:
-            UserdataError: a value cannot be sent.
+            UserdataError: A value cannot be sent.
         """
         labels = list(initial_states)
         userdata = smach.UserData() if initial_userdata is None else initial_userdata
@@ -285,7 +291,18 @@ def _send_until_shown(
     values: dict[str, Any],
     timeout_s: float,
 ) -> bool:
-    """Sends a command again and again until a status shows its effect; returns whether one did in time."""
+    """Repeats a command until a status shows its effect.
+
+    Args:
+        publisher: Publisher of the command.
+        server: Name of the server.
+        command: Command to send.
+        values: Expected userdata values.
+        timeout_s: Maximum wait [s].
+
+    Returns:
+        Whether the effect was seen in time.
+    """
     shown_by_server = threading.Event()
 
     def on_status(status: SmachContainerStatus) -> None:

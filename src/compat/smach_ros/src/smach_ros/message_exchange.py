@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Conversion between userdata and messages for states that call another node.
+"""Conversion between userdata and messages for states that call a server.
 
-Goal and result of an action, request and response of a service follow the same rules, which are kept here.
+Goals and results of actions follow the same rules as requests and responses of services.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from typing import Any
 import smach
 from smach_ros.waiting import WallTimeLimit, going_down
 
-__all__ = ["AskingState", "ExchangeError", "MessageSink", "MessageSource", "UserCallback"]
+__all__ = ["ServerCallState", "ExchangeError", "MessageSink", "MessageSource", "UserCallback"]
 
 OUTCOMES = ("succeeded", "aborted", "preempted")
 
 
 class ExchangeError(Exception):
-    """A message could not be made or delivered; the text says why."""
+    """A message could not be created or processed; the message gives the reason."""
 
 
 class UserCallback:
-    """A function of the user with the extra arguments and the view of the userdata it gets."""
+    """A user function with its extra arguments and its view of the userdata."""
 
     def __init__(
         self,
@@ -34,17 +34,17 @@ class UserCallback:
         kwargs: Mapping[str, Any] | None = None,
         keys: tuple[Iterable[str], Iterable[str]] = ((), ()),
     ) -> None:
-        """Checks and keeps a function.
+        """Checks and stores a function.
 
         Args:
-            what: how errors call it.
-            function: the function, or None; one made by ``cb_interface`` brings its keys and outcomes along.
-            args: positional arguments it gets last.
-            kwargs: keyword arguments it gets.
-            keys: userdata keys it may read, and those it may write, unless it declares its own.
+            what: Name of the function in errors.
+            function: User function, or None; a function of ``cb_interface`` declares its own keys and outcomes.
+            args: Additional positional arguments.
+            kwargs: Additional keyword arguments.
+            keys: Readable and writable userdata keys, unless the function declares its own.
 
         Raises:
-            smach.InvalidStateError: it cannot be called.
+            smach.InvalidStateError: The function is not callable.
         """
         if function is not None and not callable(function):
             raise smach.InvalidStateError(f"{what} is a {type(function).__name__}; give a function, or None")
@@ -61,7 +61,7 @@ class UserCallback:
             self.outcomes = tuple(function.get_registered_outcomes())
 
     def register_on(self, state: smach.State, with_outcomes: bool) -> None:
-        """Declares on a state what the function declares itself."""
+        """Registers the function's own keys and, optionally, outcomes with a state."""
         if not self.declares_interface:
             return
         state.register_input_keys(self._input_keys)
@@ -70,10 +70,10 @@ class UserCallback:
             state.register_outcomes(self.outcomes)
 
     def call(self, userdata: Any, *values: Any) -> Any:
-        """Calls the function with its view of the userdata; None when there is no function.
+        """Calls the function with its view of the userdata; returns None without a function.
 
         Raises:
-            ExchangeError: it raised.
+            ExchangeError: The function raised an error.
         """
         if self._function is None:
             return None
@@ -86,7 +86,13 @@ class UserCallback:
 
 
 def check_slots(what: str, message: Any, slots: Iterable[str]) -> tuple[str, ...]:
-    """Returns names of fields; raises ``smach.InvalidStateError`` when a message does not have them."""
+    """Returns names of fields; raises ``smach.InvalidStateError`` for unknown fields.
+
+    Args:
+        what: Name of the argument in errors.
+        message: Message with the allowed fields.
+        slots: Names of fields.
+    """
     if isinstance(slots, str):
         raise smach.InvalidStateError(f"{what} must be a list of field names, got the string '{slots}'")
     given = tuple(slots)
@@ -99,20 +105,20 @@ def check_slots(what: str, message: Any, slots: Iterable[str]) -> tuple[str, ...
 
 
 class _MessageRules:
-    """Base: what connects a message with the userdata, and the user's callback for it."""
+    """Base class of the mappings between a message and the userdata."""
 
     def __init__(self, what: str, empty: Any, key: str | None, slots: Iterable[str], callback: UserCallback) -> None:
-        """Checks and keeps the rules.
+        """Checks and stores the mapping.
 
         Args:
-            what: what the message is: "goal", "result", "request" or "response".
-            empty: an empty message of the right type.
-            key: userdata key of the whole message; None: there is none.
-            slots: fields that have userdata keys of the same names.
-            callback: function of the user.
+            what: Role of the message: "goal", "result", "request" or "response".
+            empty: Empty message of the required type.
+            key: Userdata key of the whole message; None for no key.
+            slots: Fields that are mapped to userdata keys of the same names.
+            callback: User function.
 
         Raises:
-            smach.InvalidStateError: a field does not exist.
+            smach.InvalidStateError: A field does not exist.
         """
         self._what = what
         self._key = key
@@ -125,23 +131,23 @@ class _MessageRules:
 
 
 class MessageSource(_MessageRules):
-    """Makes a message: the fixed one, or that under a userdata key; then fields by key; then the callback's."""
+    """Creates a message from the fixed message or a userdata key, then from fields by key, then from the callback."""
 
     def __init__(
         self, what: str, empty: Any, fixed: Any, key: str | None, slots: Iterable[str], callback: UserCallback
     ) -> None:
-        """Checks and keeps the rules.
+        """Checks and stores the mapping.
 
         Args:
-            what: "goal" or "request".
-            empty: an empty message of the right type.
-            fixed: the message to start from, when there is no key; None: the empty one.
-            key: as of every message.
-            slots: as of every message.
-            callback: gets (userdata, message) and may return another message.
+            what: Role of the message: "goal" or "request".
+            empty: Empty message of the required type.
+            fixed: Initial message without a key; None for an empty one.
+            key: Userdata key of the whole message; None for no key.
+            slots: Fields that are read from userdata keys of the same names.
+            callback: Function that receives (userdata, message) and may return a replacement.
 
         Raises:
-            smach.InvalidStateError: the fixed message has another type, or a field does not exist.
+            smach.InvalidStateError: The fixed message has a wrong type, or a field does not exist.
         """
         super().__init__(what, empty, key, slots, callback)
         self._empty = empty
@@ -152,15 +158,15 @@ class MessageSource(_MessageRules):
         self._fixed = empty if fixed is None else fixed
 
     def register_on(self, state: smach.State) -> None:
-        """Declares the userdata keys on a state."""
+        """Registers the userdata keys with a state."""
         state.register_input_keys(self._keys)
         self._callback.register_on(state, with_outcomes=False)
 
     def make(self, userdata: Any) -> Any:
-        """Returns the message of this execution: always a new object.
+        """Returns a new message for this execution.
 
         Raises:
-            ExchangeError: a userdata key has no value or one of the wrong type, or the callback failed.
+            ExchangeError: A userdata key has no value or a value of the wrong type, or the callback failed.
         """
         message = copy.deepcopy(self._fixed if self._key is None else self._read(userdata, self._key))
         self._check(message, f"userdata key '{self._key}'")
@@ -192,27 +198,27 @@ def _kind(value: Any) -> str:
 
 
 class MessageSink(_MessageRules):
-    """Delivers an answer: to the callback, then whole under a userdata key, then its fields under keys."""
+    """Passes an answer to the callback, and stores the message and its fields under userdata keys."""
 
     def register_on(self, state: smach.State) -> None:
-        """Declares the userdata keys and the callback's outcomes on a state."""
+        """Registers the userdata keys and the callback's outcomes with a state."""
         state.register_output_keys(self._keys)
         self._callback.register_on(state, with_outcomes=True)
 
     def deliver(self, userdata: Any, outcomes: Iterable[str], message: Any, *before: Any) -> str | None:
-        """Delivers an answer.
+        """Processes an answer.
 
         Args:
-            userdata: of the state.
-            outcomes: what the callback may return.
-            message: the answer; None when there was none.
-            before: what the callback gets before the message.
+            userdata: Userdata of the state.
+            outcomes: Allowed return values of the callback.
+            message: Answer; None without an answer.
+            before: Arguments of the callback before the message.
 
         Returns:
-            The outcome the callback chose, if any.
+            Outcome from the callback, if any.
 
         Raises:
-            ExchangeError: the callback failed or chose an unknown outcome.
+            ExchangeError: The callback failed or returned an unknown outcome.
         """
         chosen = self._callback.call(userdata, *before, message)
         known = list(outcomes)
@@ -226,17 +232,17 @@ class MessageSink(_MessageRules):
         return None if chosen is None else str(chosen)
 
 
-class AskingState(smach.State):
-    """Base of the states that ask another node.
+class ServerCallState(smach.State):
+    """Base class of states that call a server.
 
     Attributes:
-        reason: why the last execution did not succeed; "" when it did.
+        reason: Reason for a failed execution; "" on success.
     """
 
     def __init__(
         self, input_keys: Iterable[str], output_keys: Iterable[str], io_keys: Iterable[str], outcomes: Iterable[str]
     ) -> None:
-        """Declares succeeded, aborted, preempted, and what the user adds."""
+        """Declares the keys, and the outcomes succeeded, aborted, preempted and those of the user."""
         super().__init__((*OUTCOMES, *outcomes), input_keys, output_keys, io_keys)
         self.reason = ""
         self._keys = (self.get_registered_input_keys(), self.get_registered_output_keys())
@@ -244,11 +250,11 @@ class AskingState(smach.State):
     def _user_callback(
         self, what: str, function: Any, args: Iterable[Any], kwargs: Mapping[str, Any] | None
     ) -> UserCallback:
-        """Returns a callback that may use the keys the user gave; arguments and errors as of ``UserCallback``."""
+        """Returns a callback with the user's keys; ``UserCallback`` describes arguments and errors."""
         return UserCallback(what, function, args, kwargs, self._keys)
 
     def _use(self, source: MessageSource, sink: MessageSink) -> None:
-        """Takes what makes the message and what delivers the answer, and declares their keys and outcomes."""
+        """Stores the mappings of message and answer, and registers their keys and outcomes."""
         self._source, self._sink = source, sink
         source.register_on(self)
         sink.register_on(self)
@@ -256,21 +262,23 @@ class AskingState(smach.State):
     def _stopped(self) -> bool:
         return self.preempt_requested() or going_down()
 
-    def _wait_for_server(self, server: str, is_there: Callable[[], bool], limit_s: float | None, problem: str) -> bool:
-        """Waits for the server; returns False when the state was asked to stop.
+    def _wait_for_server(
+        self, server: str, is_available: Callable[[], bool], limit_s: float | None, problem: str
+    ) -> bool:
+        """Waits for the server; returns False after a request to stop.
 
         Args:
-            server: its name, for the warning.
-            is_there: checks for the server, for a moment.
-            limit_s: longest wait [s of wall time]; None: no limit.
-            problem: what is wrong when the time is over, for the error.
+            server: Name of the server for the warning.
+            is_available: Function that checks briefly for the server.
+            limit_s: Maximum wait [s of wall time]; None for no limit.
+            problem: Description of the timeout for the error.
 
         Raises:
-            ExchangeError: it did not come in time.
+            ExchangeError: The server did not appear in time.
         """
         limit, next_warning = WallTimeLimit(limit_s), WallTimeLimit(1.0)
         while not self._stopped():
-            if is_there():
+            if is_available():
                 return True
             if limit.over():
                 raise ExchangeError(f"{problem} within {limit_s} s; start the node that offers it")

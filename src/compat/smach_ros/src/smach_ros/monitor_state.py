@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state that checks the messages of a topic and ends when a condition no longer holds, or has held often enough."""
+"""A state that checks the messages of a topic until a condition is violated or has held often enough."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["MonitorState"]
 
 
 class MonitorState(smach.State):
-    """Outcomes: valid (true ``max_checks`` times), invalid (false once), preempted.
+    """Outcomes: valid (condition true ``max_checks`` times), invalid (false once), preempted.
 
     Attributes:
-        reason: why the last execution ended as invalid or preempted; "" when it did not.
+        reason: Reason for the outcomes invalid and preempted; "" otherwise.
     """
 
     def __init__(
@@ -33,20 +33,20 @@ class MonitorState(smach.State):
         io_keys: Iterable[str] = (),
         timeout: rospy.Duration | None = None,
     ) -> None:
-        """Makes the state.
+        """Creates the state.
 
         Args:
-            topic: name of the topic.
-            msg_type: type of its messages.
-            cond_cb: gets (userdata, message); a false value, or an error, ends the state as invalid.
-            max_checks: number of true answers that end it as valid; -1: only a false one ends it.
-            input_keys: userdata keys that are read.
-            output_keys: userdata keys that are written.
-            io_keys: userdata keys that are read and written.
-            timeout: longest execution [ROS time]; then the outcome is invalid; None: no limit.
+            topic: Name of the topic.
+            msg_type: Message class of the topic.
+            cond_cb: Condition, called with (userdata, message); a false value or an error gives the outcome invalid.
+            max_checks: Number of true results for the outcome valid; -1 for no limit.
+            input_keys: Userdata keys that are read.
+            output_keys: Userdata keys that are written.
+            io_keys: Userdata keys that are read and written.
+            timeout: Maximum duration [ROS time], after which the outcome is invalid; None for no limit.
 
         Raises:
-            smach.InvalidStateError: an argument does not fit.
+            smach.InvalidStateError: An argument is invalid.
         """
         super().__init__(("valid", "invalid", "preempted"), input_keys, output_keys, io_keys)
         if not hasattr(msg_type, "_md5sum"):
@@ -67,7 +67,7 @@ class MonitorState(smach.State):
         self.reason = ""
 
     def execute(self, userdata: Any) -> str:
-        """Listens to the topic until the verdict is there."""
+        """Checks messages until a verdict is reached."""
         self.reason = ""
         self._checks = 0
         self._verdict = None
@@ -88,7 +88,7 @@ class MonitorState(smach.State):
         return self._preempted() if self.preempt_requested() else self._verdict
 
     def _check(self, message: Any, userdata: Any) -> None:
-        """Asks the condition about one message; the first verdict stays."""
+        """Evaluates the condition for a message; the first verdict is final."""
         with self._lock:
             if self._verdict is not None:
                 return
@@ -116,6 +116,6 @@ class MonitorState(smach.State):
         return "preempted"
 
     def request_preempt(self) -> None:
-        """Asks the state to stop."""
+        """Requests the state to stop."""
         super().request_preempt()
         self._wake.set()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state that calls a service; asked to stop, it does not wait for the answer."""
+"""A state that calls a service; a request to stop ends the wait for the response."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 import rospy
 
 import smach
-from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource
+from smach_ros.message_exchange import ExchangeError, MessageSink, MessageSource, ServerCallState
 from smach_ros.waiting import POLL_PERIOD_S, WallTimeLimit, seconds
 
 __all__ = ["ServiceState"]
 
 PROBE_TIME_S = 0.25
-"""How long one check for the service takes at most [s]: the time in which a request to stop is noticed."""
+"""Maximum duration of one check for the service [s], which bounds the reaction to a request to stop."""
 
 
 class _Call(threading.Thread):
-    """One call of a service, in a thread that can be left alone."""
+    """A service call in a thread that can be abandoned."""
 
     def __init__(self, proxy: rospy.ServiceProxy, request: Any) -> None:
         super().__init__(name=f"call {proxy.resolved_name}", daemon=True)
@@ -34,14 +34,14 @@ class _Call(threading.Thread):
         """Body of the thread."""
         try:
             self.response = self._proxy(self._request)
-        except Exception as error:  # the state reports it, whatever it is
+        except Exception as error:  # the state reports any error
             self.error = error
         finally:
             self.ended.set()
 
 
-class ServiceState(AskingState):
-    """Outcomes: succeeded, aborted, preempted, and those the user adds."""
+class ServiceState(ServerCallState):
+    """Outcomes: succeeded, aborted, preempted, and the user's outcomes."""
 
     def __init__(
         self,
@@ -65,31 +65,31 @@ class ServiceState(AskingState):
         server_wait_timeout: rospy.Duration | None = rospy.Duration(60.0),  # noqa: B008 - never changed
         exec_timeout: rospy.Duration | None = None,
     ) -> None:
-        """Makes the state.
+        """Creates the state.
 
         Args:
-            service_name: name of the service.
-            service_spec: its type, as ``std_srvs.srv.Trigger``.
-            request: the request, or what it is started from; None: an empty one.
-            request_cb: gets (userdata, request, *args, **kwargs), may change the request or return another one.
-            request_cb_args: see there.
-            request_cb_kwargs: see there.
-            request_key: userdata key that holds the request.
-            request_slots: fields of the request that are taken from userdata keys of the same names.
-            response_cb: gets (userdata, response, *args, **kwargs), may return an outcome.
-            response_cb_args: see there.
-            response_cb_kwargs: see there.
-            response_key: userdata key the response is put under.
-            response_slots: fields of the response that are put under userdata keys of the same names.
-            input_keys: further userdata keys that are read.
-            output_keys: further userdata keys that are written.
-            outcomes: further outcomes, for ``response_cb``.
-            io_keys: further userdata keys that are read and written.
-            server_wait_timeout: longest wait for the service [wall time]; None: no limit.
-            exec_timeout: longest wait for the answer [wall time]; None: no limit.
+            service_name: Name of the service.
+            service_spec: Service class, such as ``std_srvs.srv.Trigger``.
+            request: Request, or its initial value; None for an empty one.
+            request_cb: Function that receives (userdata, request, *args, **kwargs); may change or replace the request.
+            request_cb_args: Additional positional arguments of ``request_cb``.
+            request_cb_kwargs: Additional keyword arguments of ``request_cb``.
+            request_key: Userdata key of the request.
+            request_slots: Request fields that are read from userdata keys of the same names.
+            response_cb: Function that receives (userdata, response, *args, **kwargs) and may return an outcome.
+            response_cb_args: Additional positional arguments of ``response_cb``.
+            response_cb_kwargs: Additional keyword arguments of ``response_cb``.
+            response_key: Userdata key that receives the response.
+            response_slots: Response fields that are stored under userdata keys of the same names.
+            input_keys: Additional userdata keys that are read.
+            output_keys: Additional userdata keys that are written.
+            outcomes: Additional outcomes for ``response_cb``.
+            io_keys: Additional userdata keys that are read and written.
+            server_wait_timeout: Maximum wait for the service [wall time]; None for no limit.
+            exec_timeout: Maximum wait for the response [wall time]; None for no limit.
 
         Raises:
-            smach.InvalidStateError: an argument does not fit; the text says which and what would.
+            smach.InvalidStateError: An argument is invalid; the message names the allowed values.
         """
         super().__init__(input_keys, output_keys, io_keys, outcomes)
         self._service_name = service_name
@@ -105,7 +105,7 @@ class ServiceState(AskingState):
         )
 
     def execute(self, userdata: Any) -> str:
-        """Waits for the service, calls it and delivers the answer."""
+        """Waits for the service, calls it and processes the response."""
         self.reason = ""
         try:
             if self._wait_for_server(
@@ -130,10 +130,10 @@ class ServiceState(AskingState):
         return True
 
     def _wait_for_answer(self, call: _Call) -> bool:
-        """Calls the service; returns False when the state was asked to stop before the answer.
+        """Calls the service; returns False if the state is requested to stop before the response.
 
         Raises:
-            ExchangeError: the call failed or took too long.
+            ExchangeError: The call failed or exceeded its time limit.
         """
         limit = WallTimeLimit(self._exec_timeout_s)
         if self._stopped():
@@ -150,7 +150,7 @@ class ServiceState(AskingState):
 
 
 def _empty_messages(service_name: str, service_spec: Any) -> tuple[Any, Any]:
-    """Returns an empty request and response of a service type; raises ``InvalidStateError`` when it is none."""
+    """Returns an empty request and response of a service class; raises ``InvalidStateError`` for other objects."""
     if not isinstance(service_name, str) or not service_name:
         raise smach.InvalidStateError(f"service_name must be the name of a service, got {service_name!r}")
     try:

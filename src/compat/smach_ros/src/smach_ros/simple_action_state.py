@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A state that gives an action server a goal and ends with it; asked to stop, it cancels the goal at once."""
+"""A state that sends a goal to an action server and waits for its end; a request to stop cancels the goal."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from actionlib_msgs.msg import GoalID, GoalStatus
 
 import smach
 from modular_framework_ros.action_client import is_connected
-from smach_ros.message_exchange import AskingState, ExchangeError, MessageSink, MessageSource
+from smach_ros.message_exchange import ExchangeError, MessageSink, MessageSource, ServerCallState
 from smach_ros.waiting import POLL_PERIOD_S, RosTimeLimit, WallTimeLimit, seconds
 
 __all__ = ["SimpleActionState"]
 
 SERVER_LOST_S = 5.0
-"""How long a server may be gone [s] before its goal is given up."""
+"""Time without the server after which its goal is abandoned [s]."""
 
 _STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)}
 
 
-class SimpleActionState(AskingState):
-    """Outcomes: succeeded, aborted, preempted, and those the user adds."""
+class SimpleActionState(ServerCallState):
+    """Outcomes: succeeded, aborted, preempted, and the user's outcomes."""
 
     def __init__(
         self,
@@ -50,32 +50,32 @@ class SimpleActionState(AskingState):
         server_wait_timeout: rospy.Duration | None = rospy.Duration(60.0),  # noqa: B008 - never changed
         io_keys: Iterable[str] = (),
     ) -> None:
-        """Makes the state.
+        """Creates the state.
 
         Args:
-            action_name: name of the action.
-            action_spec: its type, as ``FibonacciAction``.
-            goal: the goal, or what the goal is started from; None: an empty one.
-            goal_key: userdata key that holds the goal.
-            goal_slots: fields of the goal that are taken from userdata keys of the same names.
-            goal_cb: gets (userdata, goal, *args, **kwargs), may change the goal or return another one.
-            goal_cb_args: see there.
-            goal_cb_kwargs: see there.
-            result_key: userdata key the result is put under.
-            result_slots: fields of the result that are put under userdata keys of the same names.
-            result_cb: gets (userdata, goal status, result, *args, **kwargs), may return an outcome.
-            result_cb_args: see there.
-            result_cb_kwargs: see there.
-            input_keys: further userdata keys that are read.
-            output_keys: further userdata keys that are written.
-            outcomes: further outcomes, for ``result_cb``.
-            exec_timeout: longest execution [ROS time]; then the goal is cancelled, and the outcome is aborted.
-            preempt_timeout: longest wait for the end of a cancelled goal [wall time]; then the outcome is aborted.
-            server_wait_timeout: longest wait for the server [wall time]; then the outcome is aborted.
-            io_keys: further userdata keys that are read and written.
+            action_name: Name of the action.
+            action_spec: Action class, such as ``FibonacciAction``.
+            goal: Goal, or its initial value; None for an empty one.
+            goal_key: Userdata key of the goal.
+            goal_slots: Goal fields that are read from userdata keys of the same names.
+            goal_cb: Function that receives (userdata, goal, *args, **kwargs) and may modify or replace the goal.
+            goal_cb_args: Additional positional arguments of ``goal_cb``.
+            goal_cb_kwargs: Additional keyword arguments of ``goal_cb``.
+            result_key: Userdata key that receives the result.
+            result_slots: Result fields that are stored under userdata keys of the same names.
+            result_cb: Function that receives (userdata, goal status, result, *args, **kwargs); may return an outcome.
+            result_cb_args: Additional positional arguments of ``result_cb``.
+            result_cb_kwargs: Additional keyword arguments of ``result_cb``.
+            input_keys: Additional userdata keys that are read.
+            output_keys: Additional userdata keys that are written.
+            outcomes: Additional outcomes for ``result_cb``.
+            exec_timeout: Maximum duration [ROS time], after which the goal is cancelled and the outcome is aborted.
+            preempt_timeout: Maximum wait for the end of a cancelled goal [wall time]; then the outcome is aborted.
+            server_wait_timeout: Maximum wait for the server [wall time]; then the outcome is aborted.
+            io_keys: Additional userdata keys that are read and written.
 
         Raises:
-            smach.InvalidStateError: an argument does not fit; the text says which and what would.
+            smach.InvalidStateError: An argument is invalid; the message names the allowed values.
         """
         super().__init__(input_keys, output_keys, io_keys, outcomes)
         self._action_name = action_name
@@ -95,7 +95,7 @@ class SimpleActionState(AskingState):
         self._goal_is_out = False
         self._client: SimpleActionClient | None = None
         if rospy.core.is_initialized():
-            self._connect()  # so that the server is found while the rest of the machine is being made
+            self._connect()  # finds the server while the rest of the machine is constructed
 
     def _connect(self) -> SimpleActionClient:
         if self._client is None:
@@ -104,7 +104,7 @@ class SimpleActionState(AskingState):
 
     # ---- stopping ------------------------------------------------------------------------------------------
     def request_preempt(self) -> None:
-        """Asks the state to stop: a goal that is out is cancelled at once."""
+        """Requests the state to stop and cancels its active goal."""
         with self._lock:
             super().request_preempt()
             if self._goal_is_out and self._client is not None:
@@ -126,7 +126,7 @@ class SimpleActionState(AskingState):
             ):
                 return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")
             goal = self._source.make(userdata)
-            with self._lock:  # a request to stop comes before this, or finds the goal out
+            with self._lock:  # orders a request to stop either before this block or after the goal is active
                 if self.preempt_requested():
                     return self._preempted(f"action '{self._action_name}': asked to stop before the goal was sent")
                 client = self._connect()
@@ -148,7 +148,7 @@ class SimpleActionState(AskingState):
     def _follow(self, client: SimpleActionClient, userdata: Any) -> str:
         """Waits for the end of the goal and returns the outcome."""
         too_late = self._wait_for_end(client)
-        # only now: the status of a goal can be final before its result has come
+        # The status is read last, because it can be final before the result arrives.
         status = client.get_state()
         result = client.get_result() if client.gh else None
         text = client.get_goal_status_text() if client.gh else ""
@@ -157,10 +157,10 @@ class SimpleActionState(AskingState):
         return outcome if chosen is None else chosen
 
     def _wait_for_end(self, client: SimpleActionClient) -> str:
-        """Waits until the goal has ended; returns "" or why the state gave it up.
+        """Waits for the end of the goal; returns the reason if the state cancelled it for lateness, otherwise "".
 
         Raises:
-            ExchangeError: the goal did not end though it was cancelled, or the server has gone.
+            ExchangeError: The goal did not end after its cancellation, or the server is lost.
         """
         limit = RosTimeLimit(self._exec_timeout_s)
         lost = WallTimeLimit(SERVER_LOST_S)
@@ -199,7 +199,7 @@ class SimpleActionState(AskingState):
 
 
 def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
-    """Returns an empty goal and result of an action type; raises ``InvalidStateError`` when it is none."""
+    """Returns an empty goal and result of an action class; raises ``InvalidStateError`` for other objects."""
     if not isinstance(action_name, str) or not action_name:
         raise smach.InvalidStateError(f"action_name must be the name of an action, got {action_name!r}")
     try:
@@ -212,9 +212,9 @@ def _empty_messages(action_name: str, action_spec: Any) -> tuple[Any, Any]:
 
 
 def _ended(client: SimpleActionClient) -> bool:
-    """Returns whether the goal has ended and its result is here.
+    """Returns whether the goal has ended and its result has arrived.
 
-    The handle is right where the client is not: that misses the end of a goal that ends while it is being sent.
+    The goal handle is used, because the client misses the end of a goal that ends while it is being sent.
     """
     return client.gh is not None and client.gh.get_comm_state() == CommState.DONE
 
@@ -222,7 +222,7 @@ def _ended(client: SimpleActionClient) -> bool:
 def _cancel(client: SimpleActionClient) -> None:
     """Cancels the goal.
 
-    The client's own `cancel_goal` counts a goal that is cancelled before its server has confirmed it as lost.
+    The client's `cancel_goal` treats a goal that is cancelled before the server's confirmation as lost.
     """
     handle = client.gh
     if handle is not None:

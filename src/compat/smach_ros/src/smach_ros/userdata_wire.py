@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Userdata as text in messages: a pickled dictionary in base64, as viewers of state machines expect it.
+"""Encodes userdata in messages as a pickled dictionary in base64, the format of state machine viewers.
 
-Pickles can run code. So only plain values and messages are written (of others, only their type), and nothing else
-is ever read.
+Pickles can execute code. Only plain values and messages are therefore encoded, other values by their type name, and
+decoding rejects everything else.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ import genpy
 __all__ = ["UserdataError", "decode", "encode", "is_plain"]
 
 PROTOCOL = 2
-"""Pickle protocol of the public implementation."""
+"""Pickle protocol of the public smach_ros."""
 
 MAX_VALUE_BYTES = 65536
-"""Values that are larger when pickled [bytes] are written as their type only."""
+"""Maximum pickled size of a value [bytes]; larger values are encoded by their type name."""
 
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, bytearray)
 _MESSAGE_MODULE = re.compile(r"[A-Za-z]\w*\.(msg|srv)\._\w+")
 
 
 class UserdataError(ValueError):
-    """Text is no userdata, or holds what is not allowed in it."""
+    """The text is not valid userdata, or contains disallowed types."""
 
 
 def is_plain(value: Any) -> bool:
-    """Returns whether a value consists of numbers, texts, collections, times and messages only."""
+    """Returns whether a value consists only of numbers, texts, collections, times and messages."""
     if isinstance(value, genpy.Message):
         return all(is_plain(getattr(value, slot, None)) for slot in value.__slots__)
     if type(value) in (list, tuple, set, frozenset):
@@ -47,20 +47,20 @@ def is_plain(value: Any) -> bool:
 
 
 def encode(values: Mapping[str, Any], *, strict: bool = False) -> str:
-    """Writes userdata as text.
+    """Returns userdata as text.
 
     Args:
-        values: by key.
-        strict: whether a value that cannot be written is an error; else its type is written instead.
+        values: Values, keyed by name.
+        strict: Whether to raise an error for a value that cannot be encoded, instead of encoding its type name.
 
     Raises:
-        UserdataError: there is one, and ``strict``.
+        UserdataError: A value cannot be encoded, with ``strict``.
     """
     written: dict[str, Any] = {}
     for key, value in values.items():
         try:
             fits = is_plain(value) and (strict or len(pickle.dumps(value, PROTOCOL)) <= MAX_VALUE_BYTES)
-        except Exception:  # changed by its owner meanwhile, or nested without end: written as its type
+        except Exception:  # modified concurrently by its owner, or infinitely nested
             fits = False
         if not fits and strict:
             raise UserdataError(f"userdata '{key}' is a {type(value).__name__}; allowed are plain values and messages")
@@ -69,10 +69,10 @@ def encode(values: Mapping[str, Any], *, strict: bool = False) -> str:
 
 
 def decode(text: str) -> dict[str, Any]:
-    """Reads userdata that was written as text.
+    """Returns userdata from text.
 
     Raises:
-        UserdataError: it is no dictionary of plain values and messages.
+        UserdataError: The text is not a dictionary of plain values and messages.
     """
     if not text:
         return {}
@@ -82,7 +82,7 @@ def decode(text: str) -> dict[str, Any]:
         raise
     except binascii.Error as error:
         raise UserdataError(f"userdata is not base64: {error}") from error
-    except Exception as error:  # a pickle that is broken can raise nearly anything
+    except Exception as error:  # an invalid pickle can raise almost any error
         raise UserdataError(f"userdata is no pickle: {type(error).__name__}: {error}") from error
     if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):
         raise UserdataError(f"userdata must be a dictionary with text as keys, got a {type(values).__name__}")
@@ -90,7 +90,7 @@ def decode(text: str) -> dict[str, Any]:
 
 
 def _bytes_from_text(text: str, encoding: str) -> bytes:
-    """Stands in for ``_codecs.encode``, by which protocol 2 writes bytes."""
+    """Replaces ``_codecs.encode``, which protocol 2 uses to store bytes."""
     if encoding != "latin1":
         raise UserdataError(f"userdata holds bytes as '{encoding}'; allowed is latin1")
     return text.encode("latin1")
@@ -108,10 +108,10 @@ _ALLOWED: dict[tuple[str, str], Any] = {
 
 
 class _PlainUnpickler(pickle.Unpickler):
-    """Finds plain types, times and messages, and nothing else."""
+    """Unpickler restricted to plain types, times and messages."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """Returns a type that is allowed in a pickle."""
+        """Returns an allowed type; raises UserdataError for others."""
         if (module, name) in _ALLOWED:
             return _ALLOWED[module, name]
         if module in ("genpy.rostime", "rospy.rostime") and name in ("Time", "Duration"):

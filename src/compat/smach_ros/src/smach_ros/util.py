@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stops a state machine when ROS shuts down, while its states can still reach other nodes."""
+"""Stops a state machine on the shutdown of ROS, while its states can still reach other nodes."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ import smach
 __all__ = ["set_preempt_handler"]
 
 STOP_TIME_S = 5.0
-"""How long a machine has to stop [s] before ROS shuts down all the same."""
+"""Maximum time for a machine to stop before ROS shuts down [s]."""
 
 
 def set_preempt_handler(sc: smach.Container) -> None:
-    """Asks a container to stop when ROS is asked to shut down, and holds the shutdown until it has, or 5 s are over.
+    """Requests preemption of a container on the shutdown of ROS, and delays the shutdown until it stops or for 5 s.
 
-    The container is to be executed in a thread of its own: the one that received SIGINT is the one that waits.
+    Execute the container in a separate thread, because the thread that receives SIGINT waits.
 
     Args:
-        sc: the outermost container.
+        sc: Outermost container.
 
     Raises:
-        smach.InvalidStateError: it is no container.
+        smach.InvalidStateError: The object is not a container.
     """
     if not isinstance(sc, smach.Container):
         raise smach.InvalidStateError(f"set_preempt_handler needs a container, got a {type(sc).__name__}")

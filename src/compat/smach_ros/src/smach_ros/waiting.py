@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Time limits of states: in ROS time for how long work may take, in wall time for how long another node is waited for.
+"""Time limits of states: ROS time limits the duration of work, wall time the wait for other nodes.
 
-A paused simulation stops the clock of ROS and the work with it; a node that is missing stays missing meanwhile.
+A paused simulation stops ROS time and the work, but not the wait for a missing node.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import smach
 __all__ = ["POLL_PERIOD_S", "RosTimeLimit", "WallTimeLimit", "going_down", "seconds"]
 
 POLL_PERIOD_S = 0.02
-"""How often a waiting state checks [s]."""
+"""Polling period of a waiting state [s]."""
 
 
 def seconds(what: str, duration: object) -> float | None:
-    """Returns a duration in seconds; None stays None: no limit.
+    """Returns a duration in seconds; None (no limit) stays None.
 
     Args:
-        what: name of the argument, for the error.
-        duration: a ``rospy.Duration``, or a number [s].
+        what: Name of the argument in the error.
+        duration: ``rospy.Duration`` or number [s].
 
     Raises:
-        smach.InvalidStateError: it is something else, or negative.
+        smach.InvalidStateError: The duration has a wrong type or is negative.
     """
     if duration is None:
         return None
@@ -38,7 +38,7 @@ def seconds(what: str, duration: object) -> float | None:
 
 
 def going_down() -> bool:
-    """Returns whether the process or the machine is asked to end."""
+    """Returns whether the process or the machine is shutting down."""
     return rospy.is_shutdown() or smach.is_shutdown()
 
 
@@ -46,7 +46,7 @@ class RosTimeLimit:
     """A limit in ROS time; a clock that jumps back restarts it."""
 
     def __init__(self, limit_s: float | None) -> None:
-        """Starts the limit [s]; None: there is none."""
+        """Starts the limit [s]; None for no limit."""
         self._limit_s = limit_s
         self._start = rospy.get_time() if limit_s is not None else 0.0
 
@@ -63,7 +63,7 @@ class WallTimeLimit:
     """A limit in wall time."""
 
     def __init__(self, limit_s: float | None) -> None:
-        """Starts the limit [s]; None: there is none."""
+        """Starts the limit [s]; None for no limit."""
         self._end = None if limit_s is None else time.monotonic() + limit_s
 
     def over(self) -> bool:
