@@ -103,7 +103,7 @@ wrist: {frame_id: lens, data_topics: {rgb_topic: a, depth_map_topic: b, pointclo
     text = disk_text("task", [EpisodeSpec(number, {}, number, 1, settings) for number in range(3)])
     image_bytes = 320 * 240 * (3 + 4 + 16)
     assert f"camera 'wrist' in bags at most (320 x 240 at 5 Hz) {size_text(3 * 50 * image_bytes)}" in text
-    assert text.startswith("  disk: about 279 MB for 3 episodes, each 10 s of simulated time long")
+    assert text.startswith("  disk: about 279 MB for 3 episodes, each 10 s of simulated time")
     without = disk_text("task", [EpisodeSpec(0, {}, 0, 1, {**settings, "record": {"bag": False}})])
     assert "wrist" not in without and "disk: about 580 kB for 1 episodes" in without
 

@@ -61,7 +61,7 @@ def test_lost_states_are_counted() -> None:
 
 @pytest.mark.parametrize(
     ("lost", "fault"),
-    [(0, ""), (3, "17 messages of the models came instead of 20: their poses have the times at which these came")],
+    [(0, ""), (3, "17 messages of the models arrived instead of 20: their poses have times of arrival")],
 )
 def test_lost_messages_of_the_models_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: int, fault: str

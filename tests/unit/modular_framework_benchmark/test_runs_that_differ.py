@@ -101,7 +101,7 @@ def test_a_report_warns_of_a_load_of_faults_of_metrics_and_of_killed_tries(tmp_p
         )
     )
     assert "8 episodes ran beside other processes that used up to 35 % of the machine" in text
-    assert "is longer there (planning_time)" in text
+    assert "which lengthens real times (planning_time)" in text
     assert "The metric my_height raised an error in 8 episodes: KeyError: 'can'." in text
     assert "8 attempts ended without a record, and the episodes ran again: begun 2026-11-26 on lab-1" in text
 

@@ -55,4 +55,4 @@ def test_seeds_of_purposes_differ_and_stay_the_same() -> None:
     found = [seeds.derived_seed(*item) for item in asked]
     assert len(set(found)) == len(found)
     assert found == [seeds.derived_seed(*item) for item in asked]
-    assert all(0 <= seed <= seeds.LARGEST_SEED for seed in found)
+    assert all(0 <= seed <= seeds.MAX_SEED for seed in found)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action servers that report the end of every goal to the client, also of a goal that ends at once.
+"""Action servers that report the end of every goal to the client, even if the goal ends at once.
 
-A client of actionlib misses what it hears of a goal before its send_goal() has returned. So a server reports a goal
-only after the client has sent it to the end.
+An actionlib client ignores messages about a goal until its send_goal() has returned, so a server reports a goal only
+after the client has sent it completely.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from actionlib import ActionServer, SimpleActionServer
 from modular_framework_ros.publishing import going_down
 from modular_framework_ros.ros_goal_senders import GoalSenders
 
-LONGEST_STATUS_PAUSE_S = 2.0
-"""Longer than a goal remains unreported; only goals that come one upon another put off the status for so long [s]."""
+MAX_STATUS_PAUSE_S = 2.0
+"""Maximum pause of the status topic, longer than a single goal stays unreported [s]; reached only by rapid goals."""
 CLOSING_DELAY_S = 0.15
-"""For a result to get out: to close a topic drops what rospy's threads have still to write [s]."""
+"""Delay before the topics are closed, because closing discards what rospy's threads have not sent yet [s]."""
 
 
 class _StatusTimer(threading.Thread):
-    """Publishes the status of goals at a fixed rate of real time.
+    """Publishes the goal status at a fixed rate of real time.
 
-    rospy's timers wake at every message of /clock, and stop when time is held.
+    A rospy timer would wake at every message of /clock and stop while simulated time is held.
 
     Args:
-        server: Whose goals.
+        server: Action server whose status is published.
         period_s: Real time between two messages [s].
     """
 
@@ -40,23 +40,23 @@ class _StatusTimer(threading.Thread):
         self._ended = threading.Event()
 
     def run(self) -> None:
-        """Publishes until the end."""
+        """Publishes until `shutdown` is called."""
         while not self._ended.wait(self._period_s) and not rospy.is_shutdown():
             self._server.publish_status_async(None)
 
     def shutdown(self) -> None:
-        """Ends it; does not wait."""
+        """Stops the timer without waiting for its thread."""
         self._ended.set()
 
 
 class SteadyActionServer(ActionServer):
-    """An action server whose status topic does not depend on simulated time, and whose clients hear of every end."""
+    """An action server that publishes its status in real time and reports the end of every goal."""
 
     def initialize(self) -> None:
         self._last_result_s = -CLOSING_DELAY_S
-        self._last_status_s = -LONGEST_STATUS_PAUSE_S
+        self._last_status_s = -MAX_STATUS_PAUSE_S
         self._unreported: dict[str, tuple[Any, Any] | None] = {}
-        """Status and result, if the goal has ended, of the goals that are not reported yet, by their ID."""
+        """Status and result of each unreported goal by its ID; None while the goal runs."""
         self._reports: set[threading.Thread] = set()
         super().initialize()
         self._senders = GoalSenders(self.goal_sub)
@@ -101,20 +101,20 @@ class SteadyActionServer(ActionServer):
             self._last_result_s = time.monotonic()
 
     def stop(self) -> None:
-        """Stops serving, once every result has been published."""
+        """Stops the server once every result has been published."""
         for report in list(self._reports):
             report.join()
         time.sleep(max(0.0, self._last_result_s + CLOSING_DELAY_S - time.monotonic()))
         super().stop()
 
     def publish_status(self) -> None:
-        """Publishes the status of the goals, later if a goal is not reported yet.
+        """Publishes the goal status, later if a goal is not reported yet.
 
-        A client that cancels such a goal would take a status without the goal for its loss.
+        A client that cancels an unreported goal would take a status without the goal for its loss.
         """
         with self.lock:
             now_s = time.monotonic()
-            if self._unreported and now_s < self._last_status_s + LONGEST_STATUS_PAUSE_S:
+            if self._unreported and now_s < self._last_status_s + MAX_STATUS_PAUSE_S:
                 return
             self._last_status_s = now_s
             items, self.status_list = self.status_list, []
@@ -131,12 +131,12 @@ class SteadyActionServer(ActionServer):
 
 
 class SteadySimpleActionServer(SimpleActionServer):
-    """actionlib's SimpleActionServer on a `SteadyActionServer`; `start` starts it.
+    """actionlib's SimpleActionServer on a `SteadyActionServer`; call `start` to start it.
 
     Args:
         name: Name of the action.
         action: Type of the action.
-        execute: Called with each goal, on a thread of the server.
+        execute: Function called with each goal, in a thread of the server.
     """
 
     def __init__(self, name: str, action: Any, execute: Callable[[Any], None]) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Calls services and actions of other nodes; every wait has a timeout and ends when the task is stopped.
 
-All limits are wall time: a simulation that is paused or has died stops the clock of ROS, and every wait on it.
+All timeouts are in real time, since a paused or crashed simulation stops the ROS clock.
 """
 
 from __future__ import annotations
@@ -25,18 +25,24 @@ POLL_PERIOD_S = 0.01
 STOP_PERIOD_S = 0.05
 
 WATCHED_AFTER_S = 2.0
-"""Wait after which a call looks for frozen nodes [s]."""
+"""Wait after which a call checks for frozen nodes [s]."""
 
 CANCEL_WAIT_S = 0.5
-"""Longest wait for the result of a cancelled goal [s]; a task has to end within a second of a request to stop."""
+"""Maximum wait for the result of a cancelled goal [s]; a task must end within a second of a stop request."""
 
 
 class CallError(RuntimeError):
-    """A service or an action did not answer; the text names it and the time waited, or that the task was stopped."""
+    """A service or an action did not respond; the message gives its name and the time waited, or the stop request."""
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float, period_s: float = POLL_PERIOD_S) -> bool:
-    """Waits for a condition [wall time]; False when it did not hold in time, or ROS shuts down."""
+    """Waits for a condition; returns False if it is not met in time or ROS shuts down.
+
+    Args:
+        condition: Function that returns whether the condition is met.
+        timeout_s: Maximum wait [s of real time].
+        period_s: Time between two checks [s of real time].
+    """
     deadline = time.monotonic() + timeout_s
     while not condition():
         if rospy.is_shutdown() or time.monotonic() >= deadline:
@@ -49,14 +55,14 @@ def wait_for_service(proxy: rospy.ServiceProxy, timeout_s: float) -> None:
     """Waits for a service to be advertised.
 
     Raises:
-        CallError: It was not advertised in time, or what needs it was asked to stop.
+        CallError: The service was not advertised in time, or the task was asked to stop.
     """
     end = time.monotonic() + timeout_s
     report = WaitReport(f"service '{proxy.resolved_name}'", timeout_s)
     while True:
         report.remind()
         if stop_requested():
-            raise _given_up(f"service '{proxy.resolved_name}'")
+            raise _stop_error(f"service '{proxy.resolved_name}'")
         try:
             rospy.wait_for_service(proxy.resolved_name, max(0.05, min(0.2, end - time.monotonic())))
             return
@@ -76,16 +82,15 @@ def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> A
     """Calls a service.
 
     Args:
-        proxy: The service.
-        request: Its request.
-        timeout_s: Longest wait for the answer [s].
+        proxy: Proxy of the service.
+        request: Request message.
+        timeout_s: Maximum wait for the response [s of real time].
 
     Returns:
-        The answer.
+        The response message.
 
     Raises:
-        CallError: The service is absent, refused the call, or did not answer in time, or what needs the answer was
-            asked to stop.
+        CallError: The service is absent, rejected the call or did not respond in time, or the task was asked to stop.
     """
     answers: list[Any] = []
     errors: list[Exception] = []
@@ -104,7 +109,7 @@ def call_service(proxy: rospy.ServiceProxy, request: Any, timeout_s: float) -> A
     threading.Thread(target=call, daemon=True, name=f"call {proxy.resolved_name}").start()
     while not done.wait(max(0.0, min(STOP_PERIOD_S, deadline - time.monotonic()))) and time.monotonic() < deadline:
         if stop_requested():
-            raise _given_up(f"service '{proxy.resolved_name}'")
+            raise _stop_error(f"service '{proxy.resolved_name}'")
         if time.monotonic() > begun_s + WATCHED_AFTER_S and (frozen := frozen_nodes()):
             raise CallError(f"service '{proxy.resolved_name}' does not answer: {frozen}")
     if answers:
@@ -119,57 +124,57 @@ def request_service(name: str, kind: Any, request: Any, timeout_s: float) -> Any
 
     Args:
         name: Name of the service.
-        kind: Its type.
-        request: Its request.
-        timeout_s: Longest wait for the service, and again for its answer [s].
+        kind: Type of the service.
+        request: Request message.
+        timeout_s: Maximum wait for the service, and then for its response [s of real time].
 
     Returns:
-        The answer.
+        The response message.
 
     Raises:
-        CallError: As of ``wait_for_service`` and ``call_service``.
+        CallError: As in `wait_for_service` and `call_service`.
     """
     proxy = rospy.ServiceProxy(name, kind)
     wait_for_service(proxy, timeout_s)
     return call_service(proxy, request, timeout_s)
 
 
-def _given_up(what: str) -> CallError:
-    return CallError(f"{what} was not waited for any longer: the task was asked to stop")
+def _stop_error(target: str) -> CallError:
+    return CallError(f"the wait for {target} ended because the task was asked to stop")
 
 
 def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: float) -> None:
-    """Waits until an action server listens to a client.
+    """Waits until an action server is connected to a client.
 
     Raises:
-        CallError: No server was there in time, or what needs it was asked to stop.
+        CallError: No server was connected in time, or the task was asked to stop.
     """
     what = f"action server '{rospy.resolve_name(name)}'"
     there = wait_for_start(lambda: is_connected(client) or stop_requested(), what, timeout_s)
     if stop_requested():
-        raise _given_up(what)
+        raise _stop_error(what)
     if not there:
-        raise CallError(f"{what} was not there within {timeout_s:.1f} s; start the node that offers it")
+        raise CallError(f"{what} was not available within {timeout_s:.1f} s; start the node that offers it")
 
 
 def wait_for_result(
     client: actionlib.SimpleActionClient, timeout_s: float, stop_requested: Callable[[], bool] = stop_requested
 ) -> int:
-    """Waits for the end of a goal; cancels it when asked to stop or out of time.
+    """Waits for the end of a goal; cancels the goal on a stop request or a timeout.
 
     Args:
-        client: Client whose goal was sent.
-        timeout_s: Longest wait [s].
-        stop_requested: Asked all the time; True cancels the goal.
+        client: Client that has sent the goal.
+        timeout_s: Maximum wait [s of real time].
+        stop_requested: Function polled during the wait; the goal is cancelled when it returns True.
 
     Returns:
-        The final goal status, PREEMPTED after a stop, LOST out of time or when a node is frozen.
+        The final goal status: PREEMPTED after a stop request, LOST after a timeout or if a node is frozen.
     """
     stopped, watched_from_s = False, time.monotonic() + WATCHED_AFTER_S
 
     def ended() -> bool:
-        # The status of the goal is final some time before its result is here; DONE means that both are. The goal
-        # handle knows, while the client itself misses an end that comes before send_goal() returns.
+        # The goal status is final before the result has arrived; DONE means both. The goal handle has this state,
+        # while the client misses an end that comes before send_goal() returns.
         return bool(client.gh is not None and client.gh.get_comm_state() == CommState.DONE)
 
     def finished() -> bool:

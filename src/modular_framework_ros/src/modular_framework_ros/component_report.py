@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a component report what it did, on one topic for all of them: what benchmarks measure components by."""
+"""Publishes reports of the components' runs on one topic, from which the benchmark computes component metrics."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ TOPIC = "component_reports"
 
 @dataclass
 class Work:
-    """One piece of work of a component, while it is done.
+    """A running task of a component.
 
     Attributes:
-        figures: Its own figures, such as how many candidates there were.
-        reason: Why it failed; "" while it has not.
+        figures: Values of the component's own figures, such as the number of candidates.
+        reason: Reason of the failure; "" without a failure.
     """
 
     figures: dict[Figure, float] = field(default_factory=dict)
@@ -32,7 +32,7 @@ class Work:
 
 
 class ComponentReporter:
-    """Publishes ``component_reports`` (std_msgs/String, JSON), one message for each piece of work when it ends.
+    """Publishes ``component_reports`` (std_msgs/String, JSON): one message at the end of each task of a component.
 
     Keys: ``component``, ``name``, ``succeeded``, ``reason``, ``started`` and ``ended`` (ROS time [s]), ``wall_s`` (real
     time [s]), ``figures`` (name to number, see `reported_figures`).
@@ -42,17 +42,17 @@ class ComponentReporter:
         """Advertises the topic.
 
         Args:
-            component: ``generation``, ``planning``, ``execution``, ``grasp``, or a name of your own.
+            component: ``generation``, ``planning``, ``execution``, ``grasp``, or a user-defined name.
         """
         self._component = component
         self._publisher = rospy.Publisher(TOPIC, String, queue_size=100)
 
     @contextmanager
     def work(self, name: str) -> Iterator[Work]:
-        """Reports what is done within; an exception is reported as the reason of a failure, and raised on.
+        """Reports the body of the with statement as a task; an exception is reported as its failure and re-raised.
 
         Args:
-            name: What is done, such as the name of the method.
+            name: Name of the task, such as that of the method.
         """
         work, started, wall = Work(), rospy.get_time(), time.monotonic()
         try:

@@ -14,14 +14,14 @@ _LOG_PERIOD_S = 10.0
 
 
 class DeclaredParameters(ParameterReader):
-    """The parameters of a node on the parameter server.
+    """The declared parameters of a node on the parameter server.
 
     Args:
         package: Package of the node.
-        node: Its executable.
+        node: Executable of the node.
 
     Raises:
-        DeclarationError: The package declares no parameters of the node, or not as it should.
+        DeclarationError: The package has no valid declaration for the node.
     """
 
     def __init__(self, package: str, node: str) -> None:
@@ -30,7 +30,7 @@ class DeclaredParameters(ParameterReader):
         )
 
     def value_or_default(self, name: str) -> Any:
-        """Returns the value of a parameter; the default, with an error in the log, if the value is not allowed.
+        """Returns the value of a parameter, or its default after logging an error if the value is not allowed.
 
         Args:
             name: Declared name of the parameter.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parameters of controllers and hardware, readable with and without a ROS master.
+"""Read access to parameters of controllers and hardware, with and without a ROS master.
 
-`NodeHandle` is the small part of a ROS node handle they need. `MappingNodeHandle` serves it from a plain mapping
-(tests, programs without a master); `RosNodeHandle` reads the parameter server.
+`MappingNodeHandle` reads from a nested mapping (in tests and programs without a master), `RosNodeHandle` from the
+parameter server; both implement the protocol `NodeHandle`.
 """
 
 from __future__ import annotations
@@ -20,30 +20,30 @@ class NodeHandle(Protocol):
 
     @property
     def namespace(self) -> str:
-        """Absolute namespace, for example "/" or "/arm_trajectory_controller"."""
+        """The absolute namespace, for example "/" or "/arm_trajectory_controller"."""
 
     def has_param(self, key: str) -> bool:
-        """Whether `key` (relative, parts separated by "/") is set."""
+        """Returns whether the parameter `key` (a relative name, separated by "/") is set."""
 
     def get_param(self, key: str, default: Any = None) -> Any:
-        """Value of `key`, or `default` when it is not set."""
+        """Returns the value of `key`, or `default` if it is not set."""
 
     def child(self, name: str) -> NodeHandle:
-        """The handle of the namespace `name` below this one."""
+        """Returns the handle of the namespace `name` below this one."""
 
 
 def join_names(namespace: str, name: str) -> str:
-    """Absolute name of `name` below `namespace`, with single slashes."""
+    """Returns the absolute name of `name` below `namespace`, with single slashes."""
     parts = [part for part in f"{namespace}/{name}".split("/") if part]
     return "/" + "/".join(parts)
 
 
 class MappingNodeHandle:
-    """A node handle over nested mappings.
+    """A node handle that reads from nested mappings.
 
     Args:
-        parameters: nested mapping of the whole tree below `namespace`.
-        namespace: name used in messages.
+        parameters: Nested mapping of all parameters below `namespace`.
+        namespace: Namespace used in messages.
     """
 
     def __init__(self, parameters: Mapping[str, Any] | None = None, namespace: str = "/") -> None:
@@ -76,16 +76,16 @@ class MappingNodeHandle:
 
 
 def read_number(handle: NodeHandle, key: str, default: float, minimum: float | None = 0.0) -> float:
-    """A finite number parameter, checked.
+    """Returns a parameter that is a finite number.
 
     Args:
-        handle: namespace to read in.
-        key: relative name.
-        default: value when the parameter is not set.
-        minimum: smallest allowed value; None for no bound.
+        handle: Node handle of the namespace.
+        key: Relative name of the parameter.
+        default: Value if the parameter is not set.
+        minimum: Minimum allowed value; None for no bound.
 
     Raises:
-        ParameterError: not a finite number, or below `minimum`.
+        ParameterError: The value is not a finite number or below `minimum`.
     """
     value = handle.get_param(key, default)
     where = join_names(handle.namespace, key)
@@ -97,10 +97,15 @@ def read_number(handle: NodeHandle, key: str, default: float, minimum: float | N
 
 
 def read_bool(handle: NodeHandle, key: str, default: bool) -> bool:
-    """A boolean parameter, checked.
+    """Returns a boolean parameter.
+
+    Args:
+        handle: Node handle of the namespace.
+        key: Relative name of the parameter.
+        default: Value if the parameter is not set.
 
     Raises:
-        ParameterError: not true or false.
+        ParameterError: The value is not true or false.
     """
     value = handle.get_param(key, default)
     if not isinstance(value, bool):
@@ -109,10 +114,10 @@ def read_bool(handle: NodeHandle, key: str, default: bool) -> bool:
 
 
 def read_names(handle: NodeHandle, key: str) -> list[str]:
-    """A parameter that is one name or a list of distinct names.
+    """Returns a parameter that is one name or a list of distinct names.
 
     Raises:
-        ParameterError: not set, empty, not names, or a name twice.
+        ParameterError: The parameter is not set or empty, contains a value other than a name, or repeats a name.
     """
     value = handle.get_param(key)
     names = [value] if isinstance(value, str) else value
@@ -120,5 +125,5 @@ def read_names(handle: NodeHandle, key: str) -> list[str]:
     if not isinstance(names, (list, tuple)) or not names or not all(isinstance(name, str) and name for name in names):
         raise ParameterError(f"parameter {where}: got {value!r}; expected a list of joint names")
     if len(set(names)) != len(names):
-        raise ParameterError(f"parameter {where}: got {value!r}; each joint may be named once")
+        raise ParameterError(f"parameter {where}: got {value!r}; expected each joint name once")
     return list(names)

@@ -10,16 +10,16 @@ from typing import NoReturn
 
 
 def run_node(module: str, function: str = "main") -> NoReturn:
-    """Imports a module, runs a function of it and exits with what that returns.
+    """Imports a module, calls one of its functions and exits with the returned code.
 
-    An interrupt (SIGINT) before the node handles signals itself ends the process at once, without a traceback:
-    roslaunch sends it to all nodes when one of them died, and the reason of that death is what the user needs to see.
-    One that comes while rospy starts the node ends the process too. The node's publishers send without a change of
-    threads. A parameter with a wrong value ends it with the fault in the log.
+    An interrupt (SIGINT) before the node handles signals ends the process without a traceback: roslaunch interrupts all
+    nodes when a required node has died, and the user needs to see the reason of that death. An interrupt while rospy
+    starts the node ends the process too. Publishers of the node send without switching threads. An invalid parameter
+    ends the node with an error in the log.
 
     Args:
         module: Full name of the module.
-        function: Name of the function; it takes no argument and returns the exit code.
+        function: Name of the function, which takes no argument and returns the exit code.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     import rospy

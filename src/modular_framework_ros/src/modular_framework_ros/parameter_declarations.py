@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads which parameters a node has: one file `parameters/NODE.yaml` in its package, which the node itself reads.
+"""Reads the parameter declarations of a node from `parameters/NODE.yaml` in its package.
 
-Programs that check a launch before it starts read the same file, without importing the node.
+The node reads its own file; programs that check a launch before it starts read it without importing the node.
 """
 
 from __future__ import annotations
@@ -27,35 +27,35 @@ TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "dict": ((dict,), "a mapping"),
     "any": ((object,), "any value"),
 }
-"""Python types of each type word, and the words for it in a message."""
+"""Python types of each type word, and their description in messages."""
 
 
 class DeclarationError(Exception):
-    """A file that declares parameters cannot be used; the message names it."""
+    """A file of parameter declarations is missing or invalid; the message gives its path."""
 
 
 @dataclass(frozen=True, slots=True)
 class Declaration:
-    """One parameter of a node.
+    """A declared parameter of a node.
 
     Attributes:
-        name: `~name` below the node, `name` in the node's namespace, `/name` everywhere.
-        type: A word of TYPES.
+        name: `~name` for a private parameter, `name` in the node's namespace, `/name` for a global parameter.
+        type: Key of TYPES.
         doc: Meaning and unit.
-        default: Value if it is not set; None: none.
-        required: Whether it must be set, and not to an empty text.
-        required_with: Parameter with which it is required, unless that is empty.
-        at_least, at_most: Bounds of a number, themselves allowed.
-        above: Lower bound that is itself not allowed.
-        choices: Allowed values; empty: any.
-        distinct: Whether no item of a list may come twice.
-        length: Number of items of a list; None: any.
-        items: Type of each item of a list or mapping, a word of TYPES; empty: any.
-        names: Kind of thing it names, such as `planner` or `group`; empty: none.
-        adjustable: Lowest and highest value that dynamic_reconfigure may give it while the node runs; empty: none.
-        tree: Whether there are names below this one that only the robot or a plugin knows.
-        below: PACKAGE/NAME of the declaration of these names, in which `{joint}`, `{link}` and `{group}` stand for
-            names of the robot; empty: any are allowed.
+        default: Value if the parameter is not set; None without a default.
+        required: Whether the parameter must be set to a non-empty value.
+        required_with: Name of a parameter that makes this one required if it is not empty.
+        at_least, at_most: Inclusive bounds of a number.
+        above: Exclusive lower bound of a number.
+        choices: Allowed values; empty if any value is allowed.
+        distinct: Whether the items of a list must be distinct.
+        length: Required length of a list; None for any length.
+        items: Type of each item of a list or mapping, a key of TYPES; empty for any type.
+        names: Kind of object that the value names, such as `planner` or `group`; empty for other values.
+        adjustable: Minimum and maximum for dynamic_reconfigure at run time; empty if fixed.
+        tree: Whether the parameter has sub-parameters that only the robot or a plugin knows.
+        below: PACKAGE/NAME of the declaration of these sub-parameters, in which `{joint}`, `{link}` and `{group}` stand
+            for names of the robot; empty if any are allowed.
     """
 
     name: str
@@ -78,7 +78,7 @@ class Declaration:
 
     @property
     def allowed(self) -> str:
-        """The values that are allowed, in words."""
+        """Description of the allowed values."""
         if self.choices:
             return ", ".join(map(str, self.choices))
         bounds = [
@@ -95,19 +95,19 @@ class Declaration:
 
     @property
     def needed(self) -> str:
-        """What a required parameter must be set to, in words."""
+        """Description of the allowed values and of the meaning, for messages."""
         return f"allowed: {self.allowed} ({self.doc.rstrip('.')})"
 
-    def beside(self, get: Callable[[str], Any]) -> Declaration:
-        """Returns the declaration beside the values of the other parameters.
+    def resolved(self, get: Callable[[str], Any]) -> Declaration:
+        """Returns the declaration with `required_with` applied to the values of the other parameters.
 
         Args:
-            get: Returns the value of a parameter by its declared name, None if it is not set.
+            get: Function that returns the value of a parameter by its declared name, None if it is not set.
         """
         return replace(self, required=True) if self.required_with and get(self.required_with) else self
 
     def fault(self, value: Any) -> str:
-        """Returns what is wrong with a value, in words that follow the name of the parameter; "" if nothing is."""
+        """Returns the error of a value as text that follows the parameter name; "" for a valid value."""
         fits = _is_of(self.type, value)
         if fits and self.items:
             items = value.values() if isinstance(value, dict) else value
@@ -125,19 +125,19 @@ class Declaration:
 
 
 def _is_of(word: str, value: Any) -> bool:
-    """Returns whether a value is of a type by its word; true and false are no numbers."""
+    """Returns whether a value has the type of a type word; a boolean is not a number."""
     kinds = TYPES[word][0]
     return isinstance(value, kinds) and (object in kinds or isinstance(value, bool) == (bool in kinds))
 
 
 @dataclass(frozen=True, slots=True)
 class NodeDeclaration:
-    """The parameters of a node.
+    """The declared parameters of a node.
 
     Attributes:
-        parameters: By the name that the file gives them.
-        closed: Whether the node has no other parameters of its own, so that a name below it that is not declared is
-            misspelt. Open are nodes that read what configuration packages of others have.
+        parameters: Declarations by the name in the file.
+        closed: Whether the node has no other private parameters, so that an undeclared private name is misspelt. False
+            for nodes that read the parameters of other configuration packages.
     """
 
     parameters: Mapping[str, Declaration] = field(default_factory=dict)
@@ -145,12 +145,12 @@ class NodeDeclaration:
 
 
 class ParameterReader:
-    """Reads declared parameters; a value that the declaration does not allow is refused.
+    """Reads declared parameters and rejects values that the declaration does not allow.
 
     Args:
-        declaration: The parameters.
-        get: Returns the value of a parameter by its declared name, None if it is not set.
-        whole_name: Returns the name for messages.
+        declaration: Declaration of the parameters.
+        get: Function that returns the value of a parameter by its declared name, None if it is not set.
+        whole_name: Function that returns the absolute name for messages.
     """
 
     def __init__(
@@ -167,35 +167,35 @@ class ParameterReader:
         return self._declared[name]
 
     def value(self, name: str) -> Any:
-        """Returns a parameter, a number of type float as a float; its default if it is not set.
+        """Returns the value of a parameter, or its default; a number of type float as a float.
 
         Args:
-            name: As it is declared, with `~` for the node's own.
+            name: Declared name, with `~` for a private parameter.
 
         Raises:
-            ParameterError: It is required and not set, or its value is not allowed.
-            KeyError: It is not declared.
+            ParameterError: The parameter is required and not set, or its value is not allowed.
+            KeyError: The parameter is not declared.
         """
         return self.values(name)[0]
 
     def all(self) -> dict[str, Any]:
-        """Returns all declared parameters by name, as `values` does."""
+        """Returns the values of all declared parameters by name, as `value` does."""
         return dict(zip(self._declared, self.values(*self._declared), strict=True))
 
     def values(self, *names: str, required: Container[str] = ()) -> list[Any]:
-        """Returns several parameters, as `value` does.
+        """Returns the values of several parameters, as `value` does.
 
         Args:
-            names: As they are declared.
-            required: Names of those that are required though the declaration does not say so.
+            names: Declared names.
+            required: Names that are required in addition to the declaration.
 
         Raises:
-            ParameterError: Names each that is not set though required, or whose value is not allowed.
-            KeyError: One is not declared.
+            ParameterError: A value is missing or not allowed; the message lists all of them.
+            KeyError: A parameter is not declared.
         """
         found, faults = [], []
         for name in names:
-            declared = self._declared[name].beside(self._get)
+            declared = self._declared[name].resolved(self._get)
             declared = replace(declared, required=True) if name in required else declared
             value = self._get(declared.name)
             value = declared.default if value is None else value
@@ -210,34 +210,34 @@ class ParameterReader:
 
 
 def parameters_below(package: str, name: str, own: NodeHandle, root: NodeHandle) -> ParameterReader:
-    """Returns the parameters of a part of a node, such as hardware, which has a declaration of its own.
+    """Returns a reader for the parameters of a plugin, such as hardware, that has its own declaration.
 
     Args:
-        package: Package of the part.
-        name: Name of the file in its folder `parameters`; that of hardware is its class.
-        own: Namespace of the names that begin with `~`.
-        root: Namespace of the others.
+        package: Package of the plugin.
+        name: Name of the file in the folder `parameters`; for hardware its class.
+        own: Node handle for names that begin with `~`.
+        root: Node handle for all other names.
 
     Raises:
-        DeclarationError: There is no declaration of it, or it cannot be used.
+        DeclarationError: The declaration is missing or invalid.
     """
 
-    def place(declared: str) -> tuple[NodeHandle, str]:
+    def resolve(declared: str) -> tuple[NodeHandle, str]:
         return (own, declared[1:]) if declared.startswith("~") else (root, declared)
 
     def get(declared: str) -> Any:
-        handle, key = place(declared)
+        handle, key = resolve(declared)
         return handle.get_param(key)
 
     def whole_name(declared: str) -> str:
-        handle, key = place(declared)
+        handle, key = resolve(declared)
         return join_names(handle.namespace, key)
 
     return ParameterReader(existing_declaration(package, name), get, whole_name)
 
 
 def existing_declaration(package: str, node: str) -> NodeDeclaration:
-    """Returns the declared parameters of an executable or a part; raises DeclarationError if there are none."""
+    """Returns the declared parameters of an executable or a plugin; raises DeclarationError if there are none."""
     found = node_declaration(package, node)
     if found is None:
         raise DeclarationError(f"there is no {package}/parameters/{node}.yaml")
@@ -246,10 +246,10 @@ def existing_declaration(package: str, node: str) -> NodeDeclaration:
 
 @cache
 def node_declaration(package: str, node: str) -> NodeDeclaration | None:
-    """Returns the declared parameters of an executable of a package; None if it declares none.
+    """Returns the declared parameters of an executable; None if its package declares none.
 
     Raises:
-        DeclarationError: The file cannot be used.
+        DeclarationError: The file is invalid.
     """
     try:
         path = Path(_packages().get_path(package)) / "parameters" / f"{node}.yaml"
@@ -260,18 +260,18 @@ def node_declaration(package: str, node: str) -> NodeDeclaration | None:
 
 @cache
 def _packages() -> rospkg.RosPack:
-    """Returns the packages; looking for them takes long."""
+    """Returns the package index, cached because the search is slow."""
     return rospkg.RosPack()
 
 
 def read_declaration(path: Path) -> NodeDeclaration:
-    """Reads a file of declarations.
+    """Reads a file of parameter declarations.
 
     Its keys: `parameters` ({name: {type, doc, default, ...}}), `includes` (a list of PACKAGE/NODE whose parameters
-    the node has too), `closed` (true or false).
+    are included), `closed` (true or false).
 
     Raises:
-        DeclarationError: It cannot be used.
+        DeclarationError: The file is invalid.
     """
     try:
         content = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds a parameter that is given to one node or shared by several, such as the robot's description."""
+"""Finds a parameter, such as the robot description, in the namespaces of a node."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import rospy
 
 
 def nearest_parameter(name: str) -> str:
-    """Returns the absolute name of a parameter: in the node's private namespace, or else in the nearest one above it.
+    """Returns the absolute name of a parameter in the node's private namespace or in the nearest namespace above.
 
     Args:
-        name: relative name, which may be remapped; one that begins with / or ~ is taken as it is.
+        name: Relative name, after remapping; a name that begins with / or ~ is not searched.
 
     Returns:
-        The name; where there is no such parameter, the one the node's namespace gives it.
+        The name of the parameter found; otherwise the name resolved in the node's namespace.
     """
     found = None if name.startswith("~") else rospy.search_param(name)
     return str(rospy.resolve_name(found or name))

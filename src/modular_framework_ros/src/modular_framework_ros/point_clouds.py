@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the coordinates of a sensor_msgs/PointCloud2, at once for all points; imports no ROS."""
+"""Converts a sensor_msgs/PointCloud2 to an array; imports no ROS."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ FLOAT_TYPES = {7: "f4", 8: "f8"}  # of sensor_msgs/PointField: FLOAT32, FLOAT64
 
 
 class PointCloudError(ValueError):
-    """A message is no point cloud that can be used; the text says why."""
+    """A message is not a usable point cloud; the message gives the reason."""
 
 
 def point_array(message: Any) -> npt.NDArray[np.float64]:
-    """Returns the points of a sensor_msgs/PointCloud2 (rows, columns, 3) [m]; an unorganised one has one row.
+    """Returns the points of a sensor_msgs/PointCloud2, shape (rows, columns, 3) [m]; an unorganised cloud has one row.
 
     Raises:
-        PointCloudError: x, y or z is missing or no floating-point number, or there are too few bytes.
+        PointCloudError: The field x, y or z is missing or not a floating-point number, or the data are too short.
     """
     fields = {field.name: field for field in message.fields}
     bad = [name for name in "xyz" if name not in fields or fields[name].datatype not in FLOAT_TYPES]

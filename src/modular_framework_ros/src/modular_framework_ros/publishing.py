@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes during the shutdown of the node without useless errors, and draws pictures only for subscribers."""
+"""Publishes without errors during the shutdown of a node, and creates visualisation messages only for subscribers."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import rospy
 
 
 def going_down() -> bool:
-    """Whether the node is being shut down: rospy closes the topics before it says so by is_shutdown()."""
+    """Returns whether the node is shutting down; rospy closes the topics before is_shutdown() returns True."""
     return bool(rospy.core.is_shutdown_requested())
 
 
 def publish(publisher: rospy.Publisher, message: Any) -> None:
-    """Publishes a message; a topic that is closed because the node shuts down is no error.
+    """Publishes a message and ignores topics that are closed because the node shuts down.
 
     Raises:
-        rospy.ROSException: the topic is closed, or the message does not fit, while the node runs on.
+        rospy.ROSException: The topic is closed or the message does not fit its type, while the node runs.
     """
     try:
         publisher.publish(message)
@@ -30,12 +30,12 @@ def publish(publisher: rospy.Publisher, message: Any) -> None:
 
 
 class PicturePublisher(rospy.SubscribeListener):
-    """A latched topic whose message is drawn only for subscribers.
+    """A latched topic whose message is created only for subscribers.
 
-    Drawing the markers of a planned path takes longer than an easy plan.
+    The markers of a planned path take longer to create than an easy plan.
 
     Args:
-        name: Topic.
+        name: Name of the topic.
         kind: Message type.
     """
 
@@ -46,10 +46,11 @@ class PicturePublisher(rospy.SubscribeListener):
         self._publisher = rospy.Publisher(name, kind, subscriber_listener=self, latch=True, queue_size=1)
 
     def show(self, draw: Callable[[], Any]) -> None:
-        """Replaces the picture.
+        """Replaces the message.
 
         Args:
-            draw: Returns the message; called now if there are subscribers, or else once the first one comes.
+            draw: Function that creates the message, called now if the topic has subscribers and otherwise for the first
+                new subscriber.
         """
         with self._lock:
             if self._publisher.get_num_connections() > 0:
@@ -58,7 +59,7 @@ class PicturePublisher(rospy.SubscribeListener):
                 self._draw = draw
 
     def peer_subscribe(self, _topic: str, _publish: Any, _peer_publish: Any) -> None:
-        """Called by rospy before it sends the latched message to a new subscriber."""
+        """Called by rospy before the latched message is sent to a new subscriber."""
         with self._lock:
             if self._draw is not None:
                 self._publisher.impl.latch, self._draw = self._draw(), None

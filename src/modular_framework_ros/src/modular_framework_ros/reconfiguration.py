@@ -17,7 +17,13 @@ from modular_framework_ros.parameter_declarations import ParameterReader
 
 @dataclass(frozen=True, slots=True)
 class Adjustable:
-    """A parameter that may be changed, under its public name and within its public range."""
+    """A parameter that may be changed at run time.
+
+    Attributes:
+        name: Public name.
+        lowest, highest: Public range.
+        description: Meaning and unit.
+    """
 
     name: str
     lowest: bool | int | float
@@ -26,16 +32,16 @@ class Adjustable:
 
     @property
     def kind(self) -> str:
-        """The type in dynamic_reconfigure's words."""
+        """Type name of dynamic_reconfigure."""
         return {bool: "bool", int: "int", float: "double"}[type(self.lowest)]
 
 
 def adjustable(parameters: ParameterReader, namespace: str) -> tuple[Adjustable, ...]:
-    """Returns the declared parameters below a namespace that may be changed while the node runs.
+    """Returns the declared parameters below a namespace that may be changed at run time.
 
     Args:
-        parameters: The parameters of the node.
-        namespace: With the slash at its end.
+        parameters: Parameters of the node.
+        namespace: Namespace with a trailing slash.
     """
     as_kind = {"bool": bool, "int": int, "float": float}
     return tuple(
@@ -46,10 +52,10 @@ def adjustable(parameters: ParameterReader, namespace: str) -> tuple[Adjustable,
 
 
 class _Server(Server):
-    """A server that refuses values that are not finite: public servers take NaN, and the bound instead of infinity.
+    """A server that rejects values that are not finite; dynamic_reconfigure accepts NaN and clamps infinity.
 
     Attributes:
-        caller: Name that the node gave whose request is carried out, or was the last.
+        caller: Name of the node that sent the latest request; "" before the first.
     """
 
     caller = ""
@@ -79,14 +85,14 @@ class Reconfiguration:
     """Serves NAMESPACE/{set_parameters, parameter_descriptions, parameter_updates}."""
 
     def __init__(self, namespace: str, table: Sequence[Adjustable], holder: Any, attribute: str) -> None:
-        """Say what is adjusted.
+        """Stores the adjustable parameters.
 
         Args:
-            namespace: absolute, or beginning with "~".
-            table: the settings that may be changed.
-            holder: the object that has the settings.
-            attribute: its attribute with them: a frozen dataclass that is replaced, never changed: readers see the
-                old settings or the new ones, never some of each.
+            namespace: Absolute namespace, or one that begins with "~".
+            table: Adjustable parameters.
+            holder: Object that has the settings.
+            attribute: Name of the holder's attribute with the settings, a frozen dataclass that is replaced as a whole,
+                so that readers never see a mixture of old and new settings.
         """
         self._namespace, self._table = namespace, tuple(table)
         self._holder, self._attribute = holder, attribute
@@ -94,11 +100,11 @@ class Reconfiguration:
 
     @property
     def caller(self) -> str:
-        """Name that the node gave whose request is carried out, or was the last; "" for none."""
+        """Name of the node that sent the latest request; "" before the first."""
         return self._server.caller if self._server is not None else ""
 
     def connect(self) -> None:
-        """Start to serve."""
+        """Starts the server."""
         settings = getattr(self._holder, self._attribute)
         defaults = {item.name: getattr(settings, item.name) for item in self._table}
         for name, value in defaults.items():  # the server reads these parameters and does not check them
@@ -106,7 +112,7 @@ class Reconfiguration:
         self._server = _Server(described(self._table, defaults), self._adjust, self._namespace)
 
     def refresh(self) -> None:
-        """Publish the settings as they are, after something else has changed them; nothing while not serving."""
+        """Publishes the current settings after a change from elsewhere; does nothing before `connect`."""
         if self._server is None:
             return
         settings = getattr(self._holder, self._attribute)
@@ -115,7 +121,7 @@ class Reconfiguration:
             self._server.update_configuration(values)
 
     def close(self) -> None:
-        """Stop serving; may be called twice."""
+        """Stops the server; may be called twice."""
         server, self._server = self._server, None
         if server is not None:
             server.set_service.shutdown("its owner was closed")
@@ -136,9 +142,9 @@ class Reconfiguration:
 
 
 def described(parameters: Sequence[Adjustable], defaults: dict[str, Any]) -> SimpleNamespace:
-    """Returns what dynamic_reconfigure's server takes for the module its generator makes of a .cfg file.
+    """Returns the equivalent of the module that dynamic_reconfigure generates from a .cfg file.
 
-    Ranges are widened to what is configured, so that starting the server changes nothing.
+    Ranges are extended to the configured values, so that starting the server changes nothing.
     """
     lowest = {item.name: min(item.lowest, defaults[item.name]) for item in parameters}
     highest = {item.name: max(item.highest, defaults[item.name]) for item in parameters}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Declares every figure that a component of the framework reports of its work, for reporters and for metrics alike.
+"""Declares the figures that components of the framework report, for reporters and metrics.
 
-A component of a user's own may report further figures; `declared` gives them a declaration without unit and clock.
+User-defined components may report further figures, for which `declared` returns a declaration without unit and clock.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from enum import Enum
 
 
 class Clock(Enum):
-    """Which clock a duration is measured by."""
+    """Clock that measures a duration."""
 
     SIMULATED = "simulated time"
     WALL = "real time"
@@ -19,23 +19,23 @@ class Clock(Enum):
 
 
 class Source(Enum):
-    """Who measured a figure."""
+    """Origin of a figure."""
 
-    MEASURED = "measured"  # by the framework, from outside of the method
-    SAID = "said by the method"  # without a check
+    MEASURED = "measured"  # by the framework, outside the method
+    SAID = "said by the method"  # not verified
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure of one piece of work.
+    """A figure that a component reports for each task.
 
     Attributes:
-        name: Key in reports and recordings, with its unit as suffix: `planning_time_s`.
-        component: The component that reports it.
-        unit: Unit of its values; "" for none.
-        description: What it says, in a sentence.
+        name: Key in reports and recordings, with the unit as suffix: `planning_time_s`.
+        component: Component that reports the figure.
+        unit: Unit of the values; "" for none.
+        description: Meaning, in a sentence.
         clock: Clock of a duration; None for other figures.
-        source: Who measures it in an episode of the whole stack.
+        source: Origin of the figure in an episode of the whole stack.
     """
 
     name: str
@@ -71,9 +71,9 @@ ROTATION_ERROR = Figure(
 )
 
 FIGURES = {(found.component, found.name): found for found in list(globals().values()) if isinstance(found, Figure)}
-"""Every declared figure, by component and name."""
+"""All declared figures by component and name."""
 
 
 def declared(component: str, name: str) -> Figure:
-    """Returns the declaration of a figure; one without unit and clock for a figure of a user's own."""
+    """Returns the declaration of a figure; for a user-defined figure a declaration without unit and clock."""
     return FIGURES.get((component, name)) or Figure(name, component)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes without a change of threads for every subscriber.
+"""Publishes without switching threads for every subscriber.
 
-rospy hands each message to a thread of its own per subscriber, and gives up the interpreter for each of them. The
-simulation, whose clock goes to every node, takes a sixth less processor time without that. Python's `socket.send` gives
-up the interpreter too, also where it does not wait, and getting it back takes as long as the system call.
+rospy passes each message to one thread per subscriber and releases the interpreter lock for each of them. Without that,
+the simulation, which sends the clock to every node, takes a sixth less processor time. Python's `socket.send` releases
+the lock even for a non-blocking socket, and reacquiring it takes as long as the system call.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 import rospy.topics
 from rospy.impl.tcpros_pubsub import QueuedConnection
 
-# of a library whose functions are called without giving up the interpreter
+# PyDLL keeps the interpreter lock during a call.
 _send = ctypes.PyDLL(None).send
 _send.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_size_t, ctypes.c_int]
 _send.restype = ctypes.c_ssize_t
@@ -23,22 +23,22 @@ _FLAGS = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
 
 
 def publish_directly() -> None:
-    """Makes all publishers of this process send at once; to be called before the first one has a subscriber."""
+    """Makes all publishers of this process send directly; call it before the first publisher has a subscriber."""
     rospy.topics.QueuedConnection = DirectConnection
 
 
 class DirectConnection(QueuedConnection):  # type: ignore[misc]
-    """A connection to a subscriber that sends at once what the socket takes, and never waits for it.
+    """A subscriber connection that sends at once as much as the socket accepts, without blocking.
 
-    What the socket does not take waits for rospy's thread of the connection, the oldest messages dropped, as before.
+    The rest waits for rospy's thread of the connection, which discards the oldest messages as in rospy.
 
     Args:
         connection: Transport of rospy with a connected socket.
-        queue_size: Messages that may wait; 0: any number.
+        queue_size: Maximum number of waiting messages; 0 for no limit.
     """
 
     def __init__(self, connection: Any, queue_size: int) -> None:
-        self._begun = b""  # rest of a message whose first bytes are sent
+        self._begun = b""  # rest of a partly sent message
         self._thread_sends = False
         super().__init__(connection, queue_size)
 
@@ -46,7 +46,7 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]
         """Sends a message, or queues it.
 
         Raises:
-            Exception: What the thread met since the last call; rospy closes the connection then.
+            Exception: Error of the thread since the last call, upon which rospy closes the connection.
         """
         with self._lock:
             if self._error:
@@ -65,9 +65,11 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]
         return True
 
     def _send(self, data: bytes) -> int:
-        """Returns how many bytes the socket took; errors are left to the thread, which meets them again."""
-        near = self._connection.socket
-        sent = max(0, _send(near.fileno(), data, len(data), _FLAGS)) if near is not None else 0  # None: closed
+        """Returns the number of bytes that the socket accepted; errors are left to the thread, where they recur."""
+        client_socket = self._connection.socket
+        sent = (
+            max(0, _send(client_socket.fileno(), data, len(data), _FLAGS)) if client_socket is not None else 0
+        )  # None: closed
         self._connection.stat_bytes += sent
         self._connection.stat_num_msg += sent == len(data)
         return sent
@@ -84,6 +86,6 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]
             for data in queue:
                 try:
                     self._connection.write_data(data)
-                except Exception as error:  # raised by the next write_data
+                except Exception as error:  # re-raised by the next write_data
                     with self._lock:
                         self._error = error

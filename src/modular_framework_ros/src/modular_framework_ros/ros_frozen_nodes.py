@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds nodes whose process was stopped by SIGSTOP: they answer nothing, and everything waits for them until a timeout.
+"""Detects nodes whose process was stopped by SIGSTOP, which otherwise block every caller until a timeout.
 
-The state of a process is read from the system, so that neither load nor a long computation looks like a stop.
+The process state is read from the operating system, so that neither load nor a long computation looks like a stop.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ import psutil
 import rosgraph
 
 LOOK_PERIOD_S, NODES_PERIOD_S = 1.0, 5.0
-"""Time between two readings of the process states, and of the master's list of nodes [s]."""
+"""Period of the process checks, and of the requests for the master's node list [s]."""
 FROZEN_AFTER_S = 2.5
 
 
 def frozen_nodes() -> str:
     """Describes the nodes on this computer that have been stopped for some seconds; empty if there are none.
 
-    A process of a terminal, which its user may stop by Ctrl-Z, is left out. The first call only starts the watch.
+    Processes of a terminal are excluded, since their user may stop them by Ctrl-Z. The first call only starts the
+    watch.
     """
     return _watch().description
 
@@ -32,7 +33,7 @@ def _watch() -> _Watch:
 
 
 class _Watch:
-    """Looks at the nodes all the time, in a thread of its own since the master may not answer."""
+    """Checks the nodes periodically, in a separate thread since the master may not respond."""
 
     def __init__(self) -> None:
         self.description = ""
@@ -71,7 +72,7 @@ class _Watch:
 
 
 def _processes_of(uris: dict[str, str]) -> dict[str, psutil.Process | None]:
-    """Returns the process that listens at each address; None if it is not of this computer, or another user's."""
+    """Returns the process that listens at each address; None on another computer or for another user."""
     sockets = [item for item in psutil.net_connections("tcp") if item.status == psutil.CONN_LISTEN and item.pid]
     owners = {item.laddr.port: item.pid for item in sockets}
     addresses = {name: rosgraph.network.parse_http_host_and_port(uri) for name, uri in uris.items()}

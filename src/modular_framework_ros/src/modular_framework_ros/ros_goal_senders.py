@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Determines when the client of an action has sent a goal completely, so that it hears the server's reports.
+"""Detects when an action client has sent a goal completely, so that the server's reports reach it.
 
-actionlib's SimpleActionClient misses what it hears of a goal before its send_goal() has returned, and logs an error.
-The server has the goal earlier: rospy hands the message to a thread of the connection, yields the processor, and counts
-the bytes of the message only when the sending thread runs again. From then on that thread needs neither the network nor
-a lock, and Python lets a thread that runs keep the interpreter for 5 ms. So the server waits until the client's node
-counts the message. No server can know more: every answer of a client comes from another thread than send_goal()'s,
-which the operating system may stop at any point.
+actionlib's SimpleActionClient ignores messages about a goal until send_goal() has returned, and logs an error. The
+server receives the goal earlier: rospy passes the message to a thread of the connection, yields the processor, and
+counts the bytes of the message only when the sending thread runs again. From then on that thread needs neither the
+network nor a lock, and Python lets a running thread keep the interpreter for 5 ms. The server therefore waits until the
+client's node has counted the message. No stronger guarantee is possible: every response of a client comes from a
+different thread than that of send_goal(), which the operating system may interrupt at any point.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from rosgraph.network import encode_ros_handshake_header
 from modular_framework_ros.ros_node_calls import NodeCallError, node_address, published_bytes
 
 CLIENT_TIMEOUT_S = 0.5
-"""Longest wait for a client whose node does not answer, or does not count the goal [s]."""
+"""Maximum wait for a client whose node does not respond or does not count the goal [s]."""
 _PAUSE_S = 0.002
 _BLIND_CALLS = 3
-"""Calls of a node that has to answer before its goal counts as sent if the expected byte count is unknown."""
+"""Number of responses after which a goal counts as sent if the expected byte count is unknown."""
 
 
 @dataclass(slots=True, eq=False)
 class _Sender:
-    """A client's connection.
+    """Connection of a client.
 
     Attributes:
-        connection: rospy's transport of the goal topic.
+        connection: rospy transport of the goal topic.
         address: URI of the XML-RPC interface of the client's node.
-        difference: Bytes that the client has published minus bytes that the transport has counted; None if unknown.
+        difference: Bytes published by the client minus bytes counted by the transport; None if unknown.
     """
 
     connection: Any
@@ -55,20 +55,20 @@ class GoalSenders:
         self._senders: dict[str, _Sender] = {}
 
     def received_bytes(self, goal: Any) -> int:
-        """Returns the transport's byte count when a goal arrives; to be called by the subscriber's thread."""
+        """Returns the transport's byte count when a goal arrives; call it in the subscriber's thread."""
         client = goal._connection_header["callerid"]
         connection = next((item for item in self._goals.impl.connections if item.callerid_pub == client), None)
         sender = self._senders.get(client)
         if sender is None or sender.connection is not connection:
             sender = self._senders[client] = _Sender(connection)
-        if connection is None:  # closed meanwhile
+        if connection is None:  # already closed
             return 0
-        if goal.header.seq == 1:  # the client has published nothing else; the transport counts its own header too
+        if goal.header.seq == 1:  # first message of the client; the transport also counts its own header
             sender.difference = -len(encode_ros_handshake_header(connection.protocol.get_header_fields()))
         return int(connection.stat_bytes)
 
     def wait(self, client: str, received: int) -> None:
-        """Waits until a client has sent a goal to the end, or does not answer.
+        """Waits until a client has sent a goal completely or does not respond.
 
         Args:
             client: Name of the client's node.

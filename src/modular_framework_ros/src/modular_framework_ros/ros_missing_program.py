@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stands where launch files of other stacks start a program that is not here: it says so, and what to do instead."""
+"""Replaces a program of other stacks that this one does not have: logs the reason and an alternative."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import rospy
 
 
 def refuse(program: str, option: str, instead: str) -> int:
-    """Says in the log and on the terminal that a program is not there.
+    """Logs that a program does not exist.
 
     Args:
-        program: package and name, as launch files give them.
-        option: of a public launch file that asks for it.
-        instead: what serves the purpose here.
+        program: Package and name of the program, as in launch files.
+        option: Option of a public launch file that starts the program.
+        instead: Alternative in this framework.
 
     Returns:
         The exit code of the node, 1.

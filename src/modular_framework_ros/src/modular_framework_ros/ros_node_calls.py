@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls of a node's XML-RPC interface that do not wait for ever for a node whose process was stopped."""
+"""Calls the XML-RPC interface of a node with a timeout, for nodes whose process was stopped."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import rospy
 
 
 class NodeCallError(Exception):
-    """A node could not be called; the text names the node and says why."""
+    """A call of a node failed; the message gives the node and the reason."""
 
 
 class _Transport(xmlrpc.client.Transport):
-    """Opens connections with a timeout [s]."""
+    """An XML-RPC transport whose connections have a timeout [s]."""
 
     def __init__(self, timeout_s: float) -> None:
         super().__init__()
@@ -36,7 +36,7 @@ def node_address(node: str) -> str:
         node: Name of the node.
 
     Raises:
-        NodeCallError: The master does not know the node, or does not answer.
+        NodeCallError: The master does not know the node or does not respond.
     """
     try:
         return str(rosgraph.Master(rospy.get_name()).lookupNode(node))
@@ -45,34 +45,34 @@ def node_address(node: str) -> str:
 
 
 def process_id(address: str, timeout_s: float) -> int:
-    """Asks a node for the number of its process.
+    """Returns the process ID of a node.
 
     Args:
         address: URI of the node's XML-RPC interface.
-        timeout_s: Longest wait for the connection, and for the answer [s].
+        timeout_s: Maximum wait for the connection, and for the response [s].
 
     Raises:
-        NodeCallError: The node does not answer in time.
+        NodeCallError: The node does not respond in time.
     """
     return int(_call(address, "getPid", timeout_s))
 
 
 def published_bytes(address: str, topic: str, timeout_s: float) -> int | None:
-    """Asks a node for the size of all messages that it has published on a topic since it has a subscriber [bytes].
+    """Returns the total size of the messages that a node has published on a topic since it has a subscriber [bytes].
 
-    A node of rospy counts a message at the end of the publishing thread's work, once all subscribers' connections have
-    taken the message.
+    A rospy node counts a message once the connections of all subscribers have accepted it, at the end of the publishing
+    call.
 
     Args:
         address: URI of the node's XML-RPC interface.
         topic: Resolved name of the topic.
-        timeout_s: Longest wait for the connection, and for the answer [s].
+        timeout_s: Maximum wait for the connection, and for the response [s].
 
     Returns:
-        The count. None if the node does not count: nodes of roscpp, and nodes of rospy beyond 2 GiB.
+        The byte count; None for nodes that do not count: roscpp nodes, and rospy nodes beyond 2 GiB.
 
     Raises:
-        NodeCallError: The node does not answer in time.
+        NodeCallError: The node does not respond in time.
     """
     try:
         publishers = _call(address, "getBusStats", timeout_s)[0]
@@ -83,7 +83,7 @@ def published_bytes(address: str, topic: str, timeout_s: float) -> int | None:
 
 
 class _NodeFault(NodeCallError):
-    """The node answered with a fault."""
+    """The node responded with a fault."""
 
 
 def _call(address: str, method: str, timeout_s: float) -> Any:

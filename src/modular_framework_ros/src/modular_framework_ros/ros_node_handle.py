@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node handle that asks the ROS parameter server."""
+"""A node handle that reads the ROS parameter server."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from modular_framework_ros.node_handle import join_names
 
 
 class RosNodeHandle:
-    """Read access to the parameters below one namespace of the parameter server.
+    """Read access to the parameters below a namespace of the parameter server.
 
     Args:
-        namespace: absolute name, or "~" for the node's private namespace.
+        namespace: Absolute name, or "~" for the node's private namespace.
     """
 
     def __init__(self, namespace: str = "/") -> None:

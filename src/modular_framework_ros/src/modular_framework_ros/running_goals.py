@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The goals an action server works on, of which a new one cancels those before it that use the same."""
+"""Tracks the running goals of an action server; a new goal cancels those that use the same resources."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import threading
 from typing import Any
 
 
-def overlap(one: frozenset[str] | None, other: frozenset[str] | None) -> bool:
-    """Returns whether two goals use something in common; None is everything."""
-    return one is None or other is None or not one.isdisjoint(other)
+def overlap(first: frozenset[str] | None, second: frozenset[str] | None) -> bool:
+    """Returns whether two sets of resources intersect; None stands for all resources."""
+    return first is None or second is None or not first.isdisjoint(second)
 
 
 class RunningGoals:
-    """Goals by their handle, each with an event that is set when it is cancelled."""
+    """The running goals by their handle, each with an event that is set when the goal is cancelled."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._goals: dict[str, tuple[threading.Event, frozenset[str] | None]] = {}
 
     def add(self, handle: Any, uses: frozenset[str] | None = None) -> threading.Event:
-        """Cancels the goals that use something a new one uses, adds that and returns its event.
+        """Cancels the goals that share resources with a new goal, adds the new goal and returns its event.
 
         Args:
-            handle: The new goal.
-            uses: Names of what it uses, such as joints; None: everything.
+            handle: Handle of the new goal.
+            uses: Names of the used resources, such as joints; None for all resources.
         """
         cancelled = threading.Event()
         with self._lock:
@@ -35,7 +35,7 @@ class RunningGoals:
         return cancelled
 
     def cancel(self, handle: Any) -> None:
-        """Cancels a goal; one that has ended is left alone."""
+        """Cancels a goal; a goal that has ended is ignored."""
         name = handle.get_goal_id().id
         with self._lock:
             goal = self._goals.get(name)
@@ -43,7 +43,7 @@ class RunningGoals:
             goal[0].set()
 
     def remove(self, handle: Any) -> None:
-        """Forgets a goal that has ended."""
-        name = handle.get_goal_id().id  # takes the server's lock, which is held where add() and cancel() are called
+        """Removes a goal that has ended."""
+        name = handle.get_goal_id().id  # takes the server's lock, which is held when add() and cancel() are called
         with self._lock:
             self._goals.pop(name, None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One seed for all random numbers of a launch: the parameter ``/seed``, from which every component derives its own."""
+"""One seed for all random numbers of a launch: the parameter ``/seed``, from which components derive their seeds."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from rospy.impl.paramserver import get_param_server_cache
 from modular_framework_ros.parameter_declarations import existing_declaration
 
 SEED_PARAMETER = "/seed"
-LARGEST_SEED = 2**31 - 1
+MAX_SEED = 2**31 - 1
 
 
 class SeedError(ValueError):
-    """The parameter ``/seed`` is no seed."""
+    """The parameter ``/seed`` is not a valid seed."""
 
 
 def seed_parameter() -> int | None:
-    """Returns the parameter ``/seed``, 0 or more; None where it is not set and random numbers may differ every time.
+    """Returns the parameter ``/seed``, at least 0; None if it is not set and random numbers may differ between runs.
 
     Raises:
-        SeedError: it is no whole number in range.
+        SeedError: The value is not an integer in the allowed range.
     """
     value = _newest_value()
-    if value is None or value in ("", {}):  # {} stands for a parameter that is not set
+    if value is None or value in ("", {}):  # rospy's cache has {} for a parameter that is not set
         return None
     fault = existing_declaration("modular_framework_ros", "launch").parameters[SEED_PARAMETER].fault(value)
     if fault:
@@ -35,7 +35,7 @@ def seed_parameter() -> int | None:
 
 
 def _newest_value() -> Any:
-    """Returns the value the master sent last; rospy.get_param_cached asks every time while the parameter is not set."""
+    """Returns the cached value; rospy.get_param_cached calls the master each time while the parameter is not set."""
     cache = get_param_server_cache()
     with cache.lock:
         known, name = cache.d or {}, SEED_PARAMETER.strip("/")
@@ -45,14 +45,14 @@ def _newest_value() -> Any:
 
 
 def derived_seed(seed: int, *purpose: object) -> int:
-    """Returns the seed of one purpose, from which that of another one cannot be guessed.
+    """Returns the seed for one purpose; the seeds of different purposes are independent.
 
     Args:
-        seed: of the launch.
-        purpose: what the random numbers are for, such as a component, a request, and how often that was asked before.
+        seed: Seed of the launch.
+        purpose: Identifiers of the purpose, such as a component, a request, and the number of its earlier calls.
 
     Returns:
-        A number from 0 to LARGEST_SEED.
+        A seed from 0 to MAX_SEED.
     """
     text = "\0".join(str(part) for part in (seed, *purpose))
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") % (LARGEST_SEED + 1)
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") % (MAX_SEED + 1)

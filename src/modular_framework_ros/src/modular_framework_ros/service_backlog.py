@@ -10,15 +10,15 @@ BACKLOG = 128
 
 
 def widen_backlog() -> None:
-    """To be called after rospy.init_node.
+    """Extends the queue of pending service connections; call it after rospy.init_node.
 
-    rospy lets five connections wait to be accepted, and every call of a service is one or two of them. Linux drops the
-    sixth, whose client tries again after a second. A listening socket takes a new length of the queue at any time.
+    rospy's queue holds five connections, and every service call needs one or two. Linux drops the sixth, and its client
+    retries after a second. The queue length of a listening socket may be changed at any time.
     """
     server = init_tcpros_server()
     server.start_server()
     socket = getattr(server.tcp_ros_server, "server_sock", None)
     if socket is None:
-        rospy.logdebug("rospy keeps its server elsewhere: calls of services may wait for a second under load")
+        rospy.logdebug("rospy's server socket was not found: service calls may wait for a second under load")
     else:
         socket.listen(BACKLOG)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a node that handles its signals itself finish its work before ROS shuts down, also after `rosnode kill`."""
+"""Lets a node with its own signal handlers finish its task before ROS shuts down, even after `rosnode kill`."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import threading
 
 import rospy
 
-LONGEST_END_S = 15.0
-"""How long a shutdown waits for the work that is left [s]."""
+MAX_SHUTDOWN_DELAY_S = 15.0
+"""Maximum delay of a shutdown [s]."""
 
 
-def hold_shutdown(ended: threading.Event, longest_s: float = LONGEST_END_S) -> threading.Event:
-    """Makes a shutdown of this node set `ended` and then wait; topics and services work as long as it waits.
+def hold_shutdown(ended: threading.Event, longest_s: float = MAX_SHUTDOWN_DELAY_S) -> threading.Event:
+    """Makes a shutdown of this node set `ended` and then wait; topics and services remain available during the wait.
 
     Args:
-        ended: set to request that the main thread ends.
-        longest_s: how long the shutdown waits [s].
+        ended: Event that asks the main thread to end.
+        longest_s: Maximum delay of the shutdown [s].
 
     Returns:
-        An event that the main thread sets when its work is done, before it requests the shutdown itself.
+        An event that the main thread sets when it has finished, before it requests the shutdown.
     """
     finished = threading.Event()
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Holds simulated time while a node computes, and lets it pass while the node waits.
+"""Holds simulated time while a node computes, and advances it while the node waits.
 
-With the parameter ``/wait_for_planning`` a simulation lets nodes hold its time. What a node waits for then has to be
-asked for: time that is held passes only while a controller carries out a goal, or while ``SimulatedTime.sleep`` asks
-for it. Without the parameter, and on a real robot, nothing is held, and waits are those of the ROS clock.
+With the parameter ``/wait_for_planning`` a simulation lets nodes hold its time. Held time advances only while a
+controller executes a goal, or on request by ``SimulatedTime.sleep``. Without the parameter, and on a real robot, time
+is never held, and waits use the ROS clock.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ LEASE_S = 10.0
 RENEWALS = 5
 """Renewals of a hold within its lease."""
 ANSWER_TIMEOUT_S = 40.0
-SLOWEST_FACTOR = 0.02
+MIN_REAL_TIME_FACTOR = 0.02
 SAME_TIME_S = 1.0e-6
 CLOCK_TIMEOUT_S, CLOCK_JUMP_S = 1.0, 1.0
 
 
 class SimulatedTime:
-    """A client of the time of the simulation; threads may share it.
+    """A thread-safe client for the simulation's time.
 
     Parameters: ``/wait_for_planning`` (bool, false), read at the first use.
     Services called: ``/gazebo/hold_time`` (simulation_time_msgs/HoldTime), ``/gazebo/advance_time``
@@ -50,14 +50,14 @@ class SimulatedTime:
 
     @contextmanager
     def held(self, owner: str, during_motions: bool = False) -> Iterator[None]:
-        """Holds simulated time as long as the context lasts; a hold whose process dies ends after LEASE_S.
+        """Holds simulated time inside the context; if the process dies, the hold ends after LEASE_S.
 
         Args:
-            owner: whose hold it is; made unique by the name of the node.
-            during_motions: whether time stands still while controllers carry out goals, too.
+            owner: Owner of the hold, made unique by the name of the node.
+            during_motions: Whether time is also held while controllers execute goals.
 
         Raises:
-            CallError: the simulation does not hold its time.
+            CallError: The simulation does not hold its time.
         """
         if not self.enabled:
             yield
@@ -77,12 +77,12 @@ class SimulatedTime:
                 _release(name)
 
     def sleep(self, duration_s: float) -> None:
-        """Waits until simulated time has passed by a duration [s], which lets it pass where it is held.
+        """Waits until simulated time has advanced by a duration [s], which advances held time.
 
-        Where it is held, the clock of this node shows the time of then on return.
+        If time is held, the clock of this node has the new time on return.
 
         Raises:
-            CallError: it does not pass.
+            CallError: The simulation does not advance its time.
         """
         if self.enabled:
             self._advance(duration_s)
@@ -90,15 +90,15 @@ class SimulatedTime:
             rospy.sleep(duration_s)
 
     def catch_up(self, latest: Callable[[], rospy.Time | None] = lambda: None, timeout_s: float = 3.0) -> None:
-        """Waits until clock, planning scene, and what the caller receives are as the world is now; not without holds.
+        """Waits until clock, planning scene and the caller's messages are up to date; returns at once if disabled.
 
         Args:
-            latest: stamp of the latest message that the caller received; None before the first, and where it receives
-                none.
-            timeout_s: longest wait for that message [s of real time].
+            latest: Function that returns the stamp of the latest message received by the caller; None before the first
+                message or without a subscription.
+            timeout_s: Maximum wait for that message [s of real time].
 
         Raises:
-            CallError: the simulation does not answer, or no message came.
+            CallError: The simulation does not respond, or no message arrived.
         """
         if not self.enabled:
             return
@@ -117,21 +117,21 @@ class SimulatedTime:
             )
 
     def now(self) -> rospy.Time | None:
-        """Returns the time at which the simulation stands; None where it is not held, and the clock is all there is.
+        """Returns the simulation's time; None if time is not held, so that only the ROS clock is available.
 
         Raises:
-            CallError: the simulation does not answer.
+            CallError: The simulation does not respond.
         """
         answer = self._advance(0.0) if self.enabled else None
         return answer.stamp if answer is not None and answer.held else None
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float, period_s: float) -> bool:
-        """Waits for a condition that simulated time brings about; returns whether it held in time.
+        """Waits for a condition while simulated time advances; returns whether it was met in time.
 
         Args:
-            condition: asked after each period, with the time of then standing still.
-            timeout_s: longest wait [s of simulated time].
-            period_s: time between two questions [s].
+            condition: Function polled after each period, while time is held.
+            timeout_s: Maximum wait [s of simulated time].
+            period_s: Time between two checks [s of simulated time].
         """
         passed_s = 0.0
         while not condition():
@@ -144,7 +144,9 @@ class SimulatedTime:
     @staticmethod
     def _advance(duration_s: float) -> AdvanceTimeResponse:
         request = AdvanceTimeRequest(duration=rospy.Duration.from_sec(duration_s))
-        answer = request_service(ADVANCE_SERVICE, AdvanceTime, request, ANSWER_TIMEOUT_S + duration_s / SLOWEST_FACTOR)
+        answer = request_service(
+            ADVANCE_SERVICE, AdvanceTime, request, ANSWER_TIMEOUT_S + duration_s / MIN_REAL_TIME_FACTOR
+        )
         if not answer.success:
             raise CallError(f"service '{ADVANCE_SERVICE}': {answer.message}")
         if answer.held and not rospy.rostime.is_wallclock():
@@ -153,9 +155,9 @@ class SimulatedTime:
 
 
 def _clock_shows(time_s: float) -> bool:
-    """Returns whether the clock of this node has come to a time at which the simulation stood [s]."""
+    """Returns whether the clock of this node has reached a time of the simulation [s]."""
     late_s = rospy.get_time() - time_s
-    return -SAME_TIME_S < late_s < CLOCK_JUMP_S  # further on, it is from before the world began again
+    return -SAME_TIME_S < late_s < CLOCK_JUMP_S  # a larger value precedes a reset of the world
 
 
 def _hold(request: HoldTimeRequest) -> None:
@@ -167,7 +169,7 @@ def _hold(request: HoldTimeRequest) -> None:
 def _release(owner: str) -> None:
     try:
         _hold(HoldTimeRequest(owner=owner, lease_s=0.0))
-    except CallError as error:  # the lease ends the hold of a simulation that answers again
+    except CallError as error:  # the lease ends the hold once the simulation responds again
         rospy.logwarn("the hold of simulated time is not released: %s", error)
 
 

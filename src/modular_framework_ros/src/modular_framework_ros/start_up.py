@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waits at the start for other nodes, long enough for a slow machine, and logs what is waited for."""
+"""Waits at startup for other nodes, long enough for a slow machine, and logs the progress."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ POLL_PERIOD_S = 0.05
 
 
 def start_timeout() -> float:
-    """Returns the longest wait of a node for another one at the start [s, wall time]: the parameter ``/start_timeout``.
+    """Returns the maximum wait for another node at startup [s of real time]: the parameter ``/start_timeout``.
 
-    A node that died ends the launch that requires it, so this is for nodes that were never started.
+    A required node that dies ends the launch, so the timeout only matters for nodes that were never started.
     """
     return float(DeclaredParameters("modular_framework_ros", "launch").value_or_default(START_TIMEOUT_PARAMETER))
 
 
 class WaitReport:
-    """Logs every ten seconds what is waited for.
+    """Logs a long wait every ten seconds.
 
     Args:
-        what: Name of what is missing, or what gives it.
-        timeout_s: Longest wait [s].
+        what: Name of the missing item, or a function that returns it.
+        timeout_s: Maximum wait [s].
     """
 
     def __init__(self, what: str | Callable[[], str], timeout_s: float) -> None:
         self._what, self._timeout_s = what, timeout_s
-        self._begun_s = self._said_s = time.monotonic()
+        self._begun_s = self._reported_s = time.monotonic()
 
     def remind(self) -> None:
-        """Logs it when ten seconds have passed since the last time."""
+        """Logs the wait if ten seconds have passed since the last message."""
         now_s = time.monotonic()
-        if now_s - self._said_s >= REPORT_PERIOD_S:
-            self._said_s = now_s
+        if now_s - self._reported_s >= REPORT_PERIOD_S:
+            self._reported_s = now_s
             what = self._what if isinstance(self._what, str) else self._what()
             rospy.logwarn(
                 "still waiting for %s after %.0f s (of %.0f s at most)", what, now_s - self._begun_s, self._timeout_s
@@ -49,15 +49,15 @@ class WaitReport:
 def wait_for_start(
     condition: Callable[[], bool], what: str | Callable[[], str], timeout_s: float | None = None
 ) -> bool:
-    """Waits for a condition that another node brings about [wall time].
+    """Waits for a condition that another node fulfils.
 
     Args:
-        condition: Asked again and again.
-        what: Name of what is missing, or what gives it.
-        timeout_s: Longest wait [s]; None takes the parameter ``/start_timeout``.
+        condition: Function that returns whether the condition is met.
+        what: Name of the missing item, or a function that returns it.
+        timeout_s: Maximum wait [s of real time]; None for the parameter ``/start_timeout``.
 
     Returns:
-        False when it did not hold in time, or ROS shuts down.
+        Whether the condition was met in time; False as well if ROS shuts down.
     """
     limit_s = start_timeout() if timeout_s is None else timeout_s
     report, end_s = WaitReport(what, limit_s), time.monotonic() + limit_s

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Passes a state's request to stop to the waits in its thread, at any depth of the call stack."""
+"""Passes a state's stop request to the waits in its thread, at any depth of the call stack."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _THREAD = threading.local()
 
 @contextmanager
 def stoppable(requested: Callable[[], bool]) -> Iterator[None]:
-    """Makes waiting calls of this thread end on a request to stop, as long as the context lasts.
+    """Makes waits of this thread end on a stop request, inside the context.
 
     Args:
-        requested: Whether there is such a request; asked several times a second.
+        requested: Function polled several times a second that returns whether to stop.
     """
     outer = getattr(_THREAD, "requested", None)
     _THREAD.requested = requested
@@ -26,6 +26,6 @@ def stoppable(requested: Callable[[], bool]) -> Iterator[None]:
 
 
 def stop_requested() -> bool:
-    """Returns whether this thread has been asked to stop; always False outside of ``stoppable``."""
+    """Returns whether this thread has been asked to stop; always False outside `stoppable`."""
     requested: Callable[[], bool] | None = getattr(_THREAD, "requested", None)
     return requested is not None and requested()

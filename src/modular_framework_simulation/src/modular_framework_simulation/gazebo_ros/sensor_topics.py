@@ -14,7 +14,7 @@ from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import Imu as ImuMsg
 from sensor_msgs.msg import LaserScan
 
-from modular_framework_ros.seeds import LARGEST_SEED, derived_seed, seed_parameter
+from modular_framework_ros.seeds import MAX_SEED, derived_seed, seed_parameter
 from modular_framework_simulation.errors import SimulationError
 from modular_framework_simulation.gazebo_ros import sensor_messages
 from modular_framework_simulation.gazebo_ros.camera_messages import header
@@ -203,4 +203,4 @@ def noise_seed() -> int:
         SeedError: The parameter is no seed.
     """
     seed = seed_parameter()
-    return secrets.randbelow(LARGEST_SEED) if seed is None else derived_seed(seed, "noise of sensors")
+    return secrets.randbelow(MAX_SEED) if seed is None else derived_seed(seed, "noise of sensors")

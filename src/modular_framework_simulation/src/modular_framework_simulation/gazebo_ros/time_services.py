@@ -28,7 +28,7 @@ _WAIT_SLICE_S = 0.2
 _LONGEST_ADVANCE_S = 3600.0
 _LONGEST_STEP_S = 1.0
 """Steps are made one after the other, while no other request is carried out."""
-_SLOWEST_FACTOR = 0.02
+_MIN_REAL_TIME_FACTOR = 0.02
 """Simulated over real time below which a request for time to pass is given up."""
 
 
@@ -137,7 +137,7 @@ class TimeServices:
         """Waits until a duration has passed, in whole physics steps, or the world has begun again."""
         holds, count = self._loop.holds, self._whole_steps(duration_s)
         asked: Advance = self._in_loop(ros_names.ADVANCE_TIME, lambda: holds.advance(self._loop.world.steps + count))
-        waited_s, limit_s = 0.0, _ANSWER_TIMEOUT_S + duration_s / _SLOWEST_FACTOR
+        waited_s, limit_s = 0.0, _ANSWER_TIMEOUT_S + duration_s / _MIN_REAL_TIME_FACTOR
         while not asked.passed.wait(_WAIT_SLICE_S):
             waited_s += _WAIT_SLICE_S
             if waited_s > limit_s or rospy.is_shutdown():
