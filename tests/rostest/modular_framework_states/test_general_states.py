@@ -162,7 +162,7 @@ def test_fields_of_requests_come_from_userdata_and_fields_of_the_answer_go_there
     for values, reason in (
         ({"where": pose.pose, "who": "me"}, "'pose': there is no 'pose'; there are: position, "),
         ({"where": pose, "who": 3}, "do not fit modular_framework_core/AddPoseStampedRequest"),
-        ({"where": None, "who": "me"}, "userdata 'where' is empty; let a state before write it"),
+        ({"where": None, "who": "me"}, "userdata 'where' is empty; add a previous state that writes the key"),
         ({"who": "me"}, "'userdata.where.pose' refers to userdata that is not there"),
     ):
         assert run(ask, **values)[0] == "fail"
@@ -180,7 +180,10 @@ def test_a_field_of_the_answer_decides_about_the_outcome_where_it_is_named() -> 
     outcomes = ("found", "nothing", "fail")
     state = CallService("detect", outcome_field="count", outcomes=outcomes)
     assert [ended(state) for _ in range(4)] == ["found", "nothing", "fail", "fail"]
-    assert "count is 7, which stands for no outcome; allowed are a truth value, 0 to 2, or one of found" in state.reason
+    assert (
+        "count is 7, which selects no outcome; expected a boolean, an index from 0 to 2, or one of found"
+        in state.reason
+    )
     codes = iter((10, 20, 21, 3))
     state = CallService(
         "detect",

@@ -139,9 +139,9 @@ def test_a_named_trajectory_begins_where_the_arm_is_and_ends_at_its_last_point(a
     ("name", "reason"),
     [
         ("through_the_wall", "on the way to point 1 the robot would be in collision ('tip' with 'wall')"),
-        ("in_a_hurry", "joint 'j' has 0.10 s to get to point 2 and needs 0.17 s at its greatest velocity, 6.00"),
+        ("in_a_hurry", "joint 'j' has 0.10 s to get to point 2 and needs 0.17 s at its maximum velocity, 6.00"),
         ("nowhere", "no trajectory named 'nowhere' is stored"),
-        ("other_robot", "the joints ['k'] are none of the arm's"),
+        ("other_robot", "the joints ['k'] are not joints of the arm"),
     ],
 )
 def test_a_trajectory_that_cannot_be_run_is_not_begun(arm: Arm, name: str, reason: str) -> None:
@@ -155,7 +155,7 @@ def test_a_trajectory_that_ends_elsewhere_has_failed(arm: Arm) -> None:
     arm.stuck = True
     state = ExecuteTrajectory("there")
     assert run(state, arm_commander=arm) == "fail"
-    assert "joint 'j' is 1.5000 away from its last point, allowed is 0.03" in state.reason
+    assert "joint 'j' is 1.5000 away from its last point; the tolerance is 0.03" in state.reason
 
 
 def test_a_straight_line_is_moved_completely_or_not_at_all(arm: Arm) -> None:

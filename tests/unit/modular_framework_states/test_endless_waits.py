@@ -18,7 +18,7 @@ from modular_framework_ros.simulated_time import SimulatedTime
 from modular_framework_states.states.call_action import CallAction
 from modular_framework_states.states.call_service import CallService
 from modular_framework_states.states.cartesian_move import CartesianMove
-from modular_framework_states.states.execute_trajectory import ExecuteTrajectory, samples
+from modular_framework_states.states.execute_trajectory import ExecuteTrajectory, sample_path
 from modular_framework_states.states.grasp import Grasp
 from modular_framework_states.states.gripper import Gripper
 from modular_framework_states.states.move import Move
@@ -102,4 +102,4 @@ def test_calls_take_an_infinite_timeout() -> None:
 
 def test_an_infinite_step_checks_the_points_alone() -> None:
     points = [SimpleNamespace(positions=[0.0]), SimpleNamespace(positions=[1.0])]
-    assert samples(SimpleNamespace(points=points), INF) == [(0, [0.0]), (1, [1.0])]
+    assert sample_path(SimpleNamespace(points=points), INF) == [(0, [0.0]), (1, [1.0])]

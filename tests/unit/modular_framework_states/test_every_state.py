@@ -125,7 +125,7 @@ def test_it_is_a_framework_state_that_does_nothing_while_it_is_imported(name: st
         or "_run" in source
         or "run_to_end(self," in source
         or "self._end(" in source
-        or ("end_with(self," in source)
+        or ("end_by_response(self," in source)
         or name in {"wait"}
     )
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The states a task is made of."""
+"""The states of which tasks consist."""

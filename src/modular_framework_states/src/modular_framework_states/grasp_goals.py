@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sends stages of a grasp to the manipulator's action server and evaluates the result, for the states."""
+"""Sends grasp stages to the manipulator's action server and evaluates the results, for the states."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ _RESULT_FLAGS = {"pregrasp": "pregrasped", "grasp": "grasped", "postgrasp": "pos
 
 
 class GraspGoalError(RuntimeError):
-    """A stage was not reached; the text says why."""
+    """A stage was not reached; the message gives the reason."""
 
 
 def send(
     client: Any, stage: Stage, grasp: Any, max_torque: float, timeout_s: float, stop_requested: Callable[[], bool]
 ) -> None:
-    """Sends a stage of a grasp and waits for its end; returns when the server says that the stage was reached.
+    """Sends a grasp stage and returns once the server reports that the stage was reached.
 
     Args:
-        client: Client of the manipulator's action server; None when the task has no manipulator.
+        client: Client of the manipulator's action server; None if the task has no manipulator.
         stage: Stage of the grasp.
-        grasp: The grasp message.
-        max_torque: Share of the greatest torque.
-        timeout_s: Longest wait for the end [s].
-        stop_requested: Asked all the time; True cancels the goal.
+        grasp: Grasp message.
+        max_torque: Fraction of the maximum torque.
+        timeout_s: Maximum wait for the end [s].
+        stop_requested: Function polled during the wait; the goal is cancelled when it returns True.
 
     Raises:
-        GraspGoalError: There is no manipulator or no server, or the stage was not reached, or a stop was requested.
+        GraspGoalError: The task has no manipulator or server, the stage was not reached, or a stop was requested.
     """
     if client is None:
         raise GraspGoalError("the task has no manipulator; set manipulator_prefix to drive one")
@@ -52,4 +52,4 @@ def send(
     result = client.get_result()
     if status == SUCCEEDED and result is not None and getattr(result, _RESULT_FLAGS[stage]).data:
         return
-    raise GraspGoalError(client.get_goal_status_text() or f"the server answered status {status} and no reason")
+    raise GraspGoalError(client.get_goal_status_text() or f"the server returned status {status} without a reason")

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decides which joint positions stand for the stages of a grasp, so that plans made apart fit together.
+"""Selects the joint positions for the stages of a grasp, so that independently made plans fit together.
 
-Plans to the pregrasp pose, from there to the grasp pose, and on from the grasp pose may be made at the same time by
-states that do not talk to each other. An arm has several joint solutions for one pose, so the end of one plan and the
-start of the next agree only if both choose the same one. The rule: the solution of a stage is the one nearest to the
-solution of the stage before it, and that of the first stage is the one nearest to where the arm is. Whoever starts at a
-stage walks the whole chain, with the fingers as they are when the arm gets there, and therefore finds what the others
-found.
+Plans to the pregrasp pose, from there to the grasp pose, and from the grasp pose may be made at the same time by
+independent states. An arm has several joint solutions for a pose, so the end of one plan and the start of the next
+agree only if both use the same solution. The rule: each stage uses the solution nearest to that of the previous stage,
+and the first stage the solution nearest to the current position. A plan that starts at a stage computes the whole
+chain, with the fingers in their posture on arrival, and therefore finds the same solutions as the other plans.
 """
 
 from __future__ import annotations
@@ -18,14 +17,14 @@ from modular_framework_core.state_api.option_uses import GRASP_STAGES
 
 
 class StageError(RuntimeError):
-    """A stage of a grasp has no joint positions; the text says which stage and why."""
+    """A stage of a grasp has no joint positions; the message gives the stage and the reason."""
 
 
 class IkCommander(Protocol):
-    """The part of the arm commander that is needed here."""
+    """Methods of the arm commander that this module uses."""
 
     def solve_ik(self, pose: Any, seed: Mapping[str, float] | None = None) -> Any:
-        """Finds joint positions for a pose, near a seed."""
+        """Returns joint positions for a pose, near a seed."""
 
     def current_joints(self) -> dict[str, float]:
         """Returns the current joint positions."""
@@ -44,24 +43,24 @@ def stage_pose(grasp: Any, stage: str) -> Any:
 
 
 def arrival_fingers(grasp: Any) -> dict[str, float]:
-    """Returns the fingers' positions with which the arm arrives at a grasp: those of its pregrasp posture."""
+    """Returns the finger positions on arrival at a grasp: its pregrasp posture."""
     posture = grasp.pregrasp.posture
     return dict(zip(posture.name, posture.position, strict=False))
 
 
 def stage_joints(commander: IkCommander, grasp: Any, stage: str) -> dict[str, float]:
-    """Finds the joint positions that stand for a stage of a grasp.
+    """Returns the joint positions for a stage of a grasp.
 
     Args:
-        commander: Solves inverse kinematics.
+        commander: Arm commander that solves inverse kinematics.
         grasp: modular_framework_core/StandardisedGrasp.
-        stage: Pregrasp, grasp or postgrasp.
+        stage: Stage of the grasp: pregrasp, grasp or postgrasp.
 
     Returns:
         {joint: position} of the arm [rad or m].
 
     Raises:
-        StageError: The stage, or one before it, cannot be reached.
+        StageError: The stage or a previous stage cannot be reached.
     """
     seed = commander.current_joints() | arrival_fingers(grasp)
     joints: dict[str, float] = {}
@@ -72,7 +71,13 @@ def stage_joints(commander: IkCommander, grasp: Any, stage: str) -> dict[str, fl
 
 
 def near_joints(commander: IkCommander, grasp: Any, stage: str, seed: Mapping[str, float]) -> dict[str, float]:
-    """Finds the joint positions for the pose of a stage that are nearest to given ones.
+    """Returns the joint positions for the pose of a stage that are nearest to a seed.
+
+    Args:
+        commander: Arm commander that solves inverse kinematics.
+        grasp: modular_framework_core/StandardisedGrasp.
+        stage: Stage of the grasp.
+        seed: {joint: position} [rad or m].
 
     Raises:
         StageError: The stage cannot be reached.

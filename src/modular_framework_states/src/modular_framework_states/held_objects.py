@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads from the planning scene the objects that the manipulator holds, and detaches them."""
+"""Finds the objects held by the manipulator in the planning scene, and detaches them."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ SERVICE_TIMEOUT_S = 10.0
 
 
 def held_objects() -> dict[str, str]:
-    """Returns {object: link} of what is attached to links of the manipulator in the planning scene.
+    """Returns {object: link} for the objects attached to links of the manipulator in the planning scene.
 
-    The links are those with a text of ``manipulator_prefix`` in their names; without that parameter, all of the robot.
+    Links of the manipulator contain ``manipulator_prefix`` in their names; without that parameter, all links count.
 
     Raises:
-        CallError: move_group does not answer.
+        CallError: move_group does not respond.
     """
     prefix = str(rospy.get_param(PREFIX_PARAMETER, ""))
     components = PlanningSceneComponents(components=PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
@@ -47,10 +47,10 @@ def detach(objects: dict[str, str]) -> None:
     """Detaches objects, which stay in the world at their present poses.
 
     Args:
-        objects: {object: link it is attached to}.
+        objects: {object: link to which it is attached}.
 
     Raises:
-        CallError: move_group does not answer, or refuses.
+        CallError: move_group does not respond or rejects the change.
     """
     scene = PlanningScene(is_diff=True)
     scene.robot_state.is_diff = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the states share that exchange the messages of a manager with a file."""
+"""Base class of the states that save a manager's messages to a file or load them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from modular_framework_states.manager_clients import Kind, ManagerError, file_re
 
 
 class ManagerFileState(FrameworkState):
-    """Base of these states.
+    """Saves the messages of a manager to a file, or loads them.
 
     Args:
         kind: Kind of messages.
-        path: A .yaml file; a relative path starts in the folder of the managers, below ``$ROS_HOME``.
+        path: Path of a .yaml file; a relative path starts in the managers' folder below ``$ROS_HOME``.
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -24,7 +24,7 @@ class ManagerFileState(FrameworkState):
         self._kind, self._path = kind, str(path)
 
     def _run(self, verb: Literal["save", "load"]) -> str:
-        """Asks the manager to save its messages to the file, or to load them; returns the outcome."""
+        """Requests the manager to save or load the file; returns the outcome."""
         try:
             file_request(verb, self._kind, self._path)
         except ManagerError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the named postures of the manipulator, and makes the grasp messages that command them."""
+"""Reads the named postures of the manipulator, and makes grasp messages that command them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modular_framework_core.grasping.grasp_messages import generate_pose_stamped
 
 
 def posture_positions(posture: str) -> dict[str, float]:
-    """Returns {joint: position} of a state of the manipulator's planning group.
+    """Returns {joint: position} of a named state of the manipulator's planning group.
 
     Raises:
         RobotModelError: The robot is not loaded, or the group has no such state.
@@ -37,7 +37,7 @@ def posture_positions(posture: str) -> dict[str, float]:
 
 
 def posture_grasp(positions: Mapping[str, float], torque: float) -> Any:
-    """Makes a grasp message whose stages all have one posture."""
+    """Returns a grasp message whose stages all have the same posture."""
     pose = generate_pose_stamped_message("world", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
     values = list(positions.values())
     return get_standardised_grasp(list(positions), values, values, values, [torque] * len(values), pose, pose, pose)

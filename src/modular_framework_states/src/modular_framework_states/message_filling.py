@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fills messages of any type with values from a task and its userdata, and compares their fields with such values."""
+"""Fills messages of any type from the values of a task and its userdata, and compares messages with such values."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from modular_framework_core.state_api.option_uses import USERDATA_PREFIX
 
 
 class FillingError(ValueError):
-    """Values do not fit a message, or a field is not there; the text names the field and what it takes."""
+    """A value does not fit a message, or a field does not exist; the message gives the field and its type."""
 
 
 def filled(message_type: Any, values: Mapping[str, Any] | None, userdata: Any = None) -> Any:
-    """Makes a message of a mapping.
+    """Returns a message filled from a mapping.
 
     Args:
-        message_type: Class of the message (or of a service's request).
-        values: Field to value, nested as the message is; fields left out keep their default. A text
-            ``userdata.<key>`` stands for what userdata has there, ``userdata.<key>.<field>`` for a field of that.
-        userdata: Where such references are looked up.
+        message_type: Class of the message or of a service's request.
+        values: Field to value, nested like the message; other fields keep their default. The string ``userdata.<key>``
+            is replaced by the userdata at that key, and ``userdata.<key>.<field>`` by a field of it.
+        userdata: Userdata for such references.
 
     Raises:
         FillingError: A field does not exist, or a value has the wrong type.
@@ -41,21 +41,21 @@ def filled(message_type: Any, values: Mapping[str, Any] | None, userdata: Any = 
 
 
 def with_userdata(value: Any, userdata: Any) -> Any:
-    """Returns a value of a task in which each reference to userdata is replaced by what is there, as plain values.
+    """Returns a value with each reference to userdata replaced by the userdata, as plain values.
 
     Raises:
-        FillingError: Userdata has no such key or field, or nothing is in it yet.
+        FillingError: The userdata lack the key or field, or the key has no value yet.
     """
     match value:
         case str() if value.startswith(USERDATA_PREFIX):
             key, _, path = value.removeprefix(USERDATA_PREFIX).partition(".")
             if userdata is None or key not in userdata:
                 raise FillingError(
-                    f"'{value}' refers to userdata that is not there; let a state before write '{key}', "
-                    "and name it in input_keys"
+                    f"'{value}' refers to userdata that is not there; add a previous state that writes '{key}', "
+                    "and list the key in input_keys"
                 )
             if userdata[key] is None:
-                raise FillingError(f"'{value}': userdata '{key}' is empty; let a state before write it")
+                raise FillingError(f"'{value}': userdata '{key}' is empty; add a previous state that writes the key")
             return plain(field_at(userdata[key], path))
         case Mapping():
             return {name: with_userdata(item, userdata) for name, item in value.items()}
@@ -68,11 +68,11 @@ def field_at(message: Any, path: str) -> Any:
     """Returns a field of a message.
 
     Args:
-        message: The message, or a part of one.
-        path: Names of fields, and numbers of items from 0, separated by points; empty for the message itself.
+        message: Message, or a part of a message.
+        path: Field names and zero-based list indices, separated by dots; empty for the message itself.
 
     Raises:
-        FillingError: There is no such field or item; says what there is.
+        FillingError: The field or item does not exist; the message lists those that do.
     """
     found = message
     for name in path.split(".") if path else ():
@@ -88,7 +88,7 @@ def field_at(message: Any, path: str) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """Returns a message as a mapping of its fields, nested as it is; other values as they are."""
+    """Returns a message as a nested mapping of its fields; other values are returned unchanged."""
     match value:
         case genpy.Message():
             return {name: plain(getattr(value, name)) for name in value.__slots__}
@@ -100,12 +100,12 @@ def plain(value: Any) -> Any:
 
 
 def difference(message: Any, expected: Mapping[str, Any], where: str = "") -> str:
-    """Says which field of a message is not as expected; nothing when all are.
+    """Describes the first field of a message that differs from the expected value; empty if none differs.
 
     Args:
-        message: The message.
-        expected: Field to value, nested as the message is; fields left out may be anything.
-        where: Path of the message, for the text.
+        message: Message to check.
+        expected: Field to value, nested like the message; other fields are not checked.
+        where: Path prefix of the message in the description.
     """
     for name, value in expected.items():
         path = f"{where}{name}"

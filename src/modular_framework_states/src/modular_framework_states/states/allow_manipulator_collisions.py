@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task say what the manipulator may touch while the next motions are planned."""
+"""A state that changes the allowed collisions of the manipulator."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MODIFICATIONS = {
     "self-collision": GetModifiedACMRequest.MANIPULATOR_SELF_COLLISION,
     "object-collision": GetModifiedACMRequest.MANIPULATOR_OBJECT_COLLISION,
 }
-OF_LINKS = {
+LINK_MODIFICATIONS = {
     "self-collision": ModifyACMRequest.ROBOT_SELF_COLLISION,
     "object-collision": ModifyACMRequest.ROBOT_OBJECT_COLLISION,
 }
@@ -30,14 +30,14 @@ SERVICE_TIMEOUT_S = 10.0
 
 
 class AllowManipulatorCollisions(FrameworkState):
-    """Changes which collisions of the manipulator are allowed; positive once the planning scene has taken the change.
+    """Changes the allowed collisions of the manipulator; positive once the planning scene has accepted the change.
 
     Args:
-        allow: True allows, False restores what the robot's description says.
-        collision_type: Self-collision, object-collision, or nothing to apply the matrix as it stands.
-        objects: Names of the objects; none means all that are known: those that were added and, in simulation, every
-            object that is free to move. ``userdata`` takes the object of ``selected_grasp``.
-        links: Names of links of the robot, instead of those of the manipulator.
+        allow: True allows collisions, False restores those of the robot description.
+        collision_type: Self-collision, object-collision, or empty to apply the current matrix.
+        objects: Names of the objects; empty for all known objects: those that were added and, in simulation, all
+            movable objects. ``userdata`` stands for the object of ``selected_grasp``.
+        links: Names of robot links, instead of the manipulator's links.
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -51,27 +51,27 @@ class AllowManipulatorCollisions(FrameworkState):
     ) -> None:
         super().__init__(**keys)
         if links and not collision_type:
-            raise ValueError("AllowManipulatorCollisions: links are of use with a collision_type only; give one")
+            raise ValueError("AllowManipulatorCollisions: links needs a collision_type; give one")
         self._type, self._allow, self._links = collision_type, bool(allow), list(links)
         self._objects = [objects] if isinstance(objects, str) else list(objects)
 
     def execute(self, userdata: Any) -> str:
-        """Has the matrix changed, and applies it."""
+        """Changes the matrix and applies it."""
         try:
             objects = self._named_objects(userdata)
             if self._links:
-                _ask(
+                _call_manager(
                     "modify_acm",
                     ModifyACM,
-                    ModifyACMRequest(OF_LINKS[self._type], self._links, objects, self._allow, True),
+                    ModifyACMRequest(LINK_MODIFICATIONS[self._type], self._links, objects, self._allow, True),
                 )
                 return self.succeed()
-            answer = _ask(
+            response = _call_manager(
                 "get_modified_acm",
                 GetModifiedACM,
                 GetModifiedACMRequest(MODIFICATIONS[self._type], objects, self._allow),
             )
-            apply_matrix(answer.acm, SERVICE_TIMEOUT_S)
+            apply_matrix(response.acm, SERVICE_TIMEOUT_S)
         except (ManagerError, CallError) as error:
             return self.fail(str(error))
         return self.succeed()
@@ -81,8 +81,8 @@ class AllowManipulatorCollisions(FrameworkState):
             return self._objects
         if "selected_grasp" not in self.get_registered_input_keys():
             raise ManagerError(
-                "the object is to be taken from userdata, but 'selected_grasp' is not among the input "
-                f"keys {sorted(self.get_registered_input_keys())}"
+                "the object is taken from userdata, but 'selected_grasp' is not among the input "
+                f"keys {sorted(self.get_registered_input_keys())}; add the key"
             )
         name = userdata.selected_grasp.object_id if userdata.selected_grasp is not None else ""
         if not name:
@@ -93,9 +93,9 @@ class AllowManipulatorCollisions(FrameworkState):
         return [name]
 
 
-def _ask(name: str, service_type: Any, request: Any) -> Any:
-    """Calls a service of the collision matrix manager; raises CallError when it does not answer or refuses."""
-    answer = request_service(name, service_type, request, SERVICE_TIMEOUT_S)
-    if not answer.success:
+def _call_manager(name: str, service_type: Any, request: Any) -> Any:
+    """Calls a service of the collision matrix manager; raises CallError without a response or on rejection."""
+    response = request_service(name, service_type, request, SERVICE_TIMEOUT_S)
+    if not response.success:
         raise CallError(f"service '{rospy.resolve_name(name)}' refused the change; its node logged the reason")
-    return answer
+    return response

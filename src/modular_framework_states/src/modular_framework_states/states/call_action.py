@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task send a goal to any action server."""
+"""A state that sends a goal to any action server."""
 
 from __future__ import annotations
 
@@ -16,31 +16,30 @@ from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.action_client import SteadyActionClient
 from modular_framework_ros.calls import CallError, wait_for_action, wait_for_result, wait_until
-from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
+from modular_framework_states.responses import KeptFields, MessageFields, OutcomeValues, ResponseRules, end_by_response
 
-RESULT = "result"
+RESULT_KEY = "result"
 
 
 class CallAction(FrameworkState):
-    """Sends a goal and waits for its end; positive when the goal succeeded and the result is as expected.
+    """Sends a goal and waits for its end; positive if the goal succeeded with the expected result.
 
-    A text ``userdata.<key>`` in a goal or expectation stands for what userdata has there, and
-    ``userdata.<key>.<field>`` for a field of it; the key must be an input key.
+    The string ``userdata.<key>`` in a goal or expectation is replaced by the userdata at that input key, and
+    ``userdata.<key>.<field>`` by a field of it.
 
     Args:
-        action_name: Action; its type is found out when it is there.
-        goal: Field to value, nested as the goal is; fields left out keep their default.
-        expect: Field to value of the result, nested as it is.
-        outcome_field: Field of the result that decides about the outcome: true is the first outcome, false the last, a
-            whole number the outcome with that number, from 0, a text the one it names. It decides for an aborted goal
-            too, for which the first outcome is never given.
-        outcome_values: Outcome to the value of that field, or a list of values, that stands for it; any other value
-            is a failure.
-        keep: Userdata key to the field of the result that it receives; the keys must be output keys.
-        timeout: Longest wait for the end of the goal [s]; a goal that takes longer is cancelled.
-        server_timeout: Longest wait for the action server [s].
-        **keys: Outcomes and userdata keys of any state; ``result`` receives the result if it is an output key.
+        action_name: Name of the action; its type is determined when the action is available.
+        goal: Field to value, nested like the goal; other fields keep their default.
+        expect: Field to expected value of the result, nested like the result.
+        outcome_field: Field of the result that selects the outcome: true the first outcome, false the last, an integer
+            the outcome at that index, a string the outcome with that name. The field also selects the outcome of an
+            aborted goal, which is never the first.
+        outcome_values: Outcome to the value, or list of values, of that field; any other value is a failure.
+        keep: Userdata key to the result field stored there; the keys must be output keys.
+        timeout: Maximum wait for the end of the goal [s], after which the goal is cancelled.
+        server_timeout: Maximum wait for the action server [s].
+        **keys: Outcomes and userdata keys of any state; the output key ``result`` receives the result.
     """
 
     def __init__(
@@ -58,10 +57,10 @@ class CallAction(FrameworkState):
         super().__init__(**keys)
         self._name, self._goal, self._expected = str(action_name), dict(goal or {}), dict(expect or {})
         self._timeout_s, self._server_timeout_s = float(timeout), float(server_timeout)
-        self._rules = AnswerRules.of(self, outcome_field, outcome_values, keep)
+        self._rules = ResponseRules.of(self, outcome_field, outcome_values, keep)
 
     def execute(self, userdata: Any) -> str:
-        """Sends the goal and waits."""
+        """Sends the goal and waits for its end."""
         name = rospy.resolve_name(self._name)
         try:
             action_type = self._type_of(name)
@@ -83,17 +82,17 @@ class CallAction(FrameworkState):
 
     def _end(self, name: str, client: Any, status: int, expected: Mapping[str, Any], userdata: Any) -> str:
         """Returns the outcome of a goal that has ended."""
-        result, reason_given = client.get_result(), client.get_goal_status_text() or "it gave no reason"
-        what = f"action '{name}' ended as {GoalStatus.to_string(status)}: {reason_given}"
+        result, stated_reason = client.get_result(), client.get_goal_status_text() or "no reason given"
+        what = f"action '{name}' ended as {GoalStatus.to_string(status)}: {stated_reason}"
         aborted = status == GoalStatus.ABORTED and self._rules.outcome_field
         if result is None or (status != GoalStatus.SUCCEEDED and not aborted):
             return self.fail(what)
-        if RESULT in self.get_registered_output_keys():
-            userdata[RESULT] = result
+        if RESULT_KEY in self.get_registered_output_keys():
+            userdata[RESULT_KEY] = result
         wrong = difference(result, expected)
         if wrong:
             return self.fail(f"action '{name}' ended as {GoalStatus.to_string(status)}, but {wrong}")
-        return end_with(self, self._rules, result, userdata, what, reason_given, aborted=bool(aborted))
+        return end_by_response(self, self._rules, result, userdata, what, stated_reason, aborted=bool(aborted))
 
     def _type_of(self, name: str) -> Any:
         found: list[str] = []
@@ -104,7 +103,7 @@ class CallAction(FrameworkState):
             return bool(kind)
 
         if not wait_until(lambda: known() or self.preempt_requested(), self._server_timeout_s, 0.1) or not found:
-            raise CallError(f"nobody offers it within {self._server_timeout_s:.1f} s; start the node that does")
+            raise CallError(f"nobody offers it within {self._server_timeout_s:.1f} s; start its node")
         action_type = roslib.message.get_message_class(found[0].removesuffix("Goal"))
         if action_type is None:
             raise CallError(f"its type {found[0].removesuffix('Goal')} is not built in this workspace")

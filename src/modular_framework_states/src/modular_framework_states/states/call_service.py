@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task call any service."""
+"""A state that calls any service."""
 
 from __future__ import annotations
 
@@ -12,31 +12,30 @@ from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import NotNegative
 from modular_framework_ros.calls import CallError, call_service, wait_until
-from modular_framework_states.answers import AnswerRules, KeptFields, MessageFields, OutcomeValues, end_with
 from modular_framework_states.message_filling import FillingError, difference, filled, with_userdata
+from modular_framework_states.responses import KeptFields, MessageFields, OutcomeValues, ResponseRules, end_by_response
 
-ANSWER = "response"
+RESPONSE_KEY = "response"
 
 
 class CallService(FrameworkState):
-    """Calls a service; positive when its answer is as expected.
+    """Calls a service; positive if the response has the expected values.
 
-    The answer's field ``success`` (or ``ok``), if it has one, must be true, too.
+    A field ``success`` or ``ok`` of the response must also be true.
 
-    A text ``userdata.<key>`` in a request or expectation stands for what userdata has there, and
-    ``userdata.<key>.<field>`` for a field of it; the key must be an input key.
+    The string ``userdata.<key>`` in a request or expectation is replaced by the userdata at that input key, and
+    ``userdata.<key>.<field>`` by a field of it.
 
     Args:
-        service_name: Service; its type is found out when it is there.
-        request: Field to value, nested as the request is; fields left out keep their default.
-        expect: Field to value of the answer, nested as it is.
-        outcome_field: Field of the answer that decides about the outcome, instead of ``success`` or ``ok``: true is the
-            first outcome, false the last, a whole number the outcome with that number, from 0, a text the one it names.
-        outcome_values: Outcome to the value of that field, or a list of values, that stands for it; any other value
-            is a failure.
-        keep: Userdata key to the field of the answer that it receives; the keys must be output keys.
-        timeout: Longest wait for the service, and again for its answer [s].
-        **keys: Outcomes and userdata keys of any state; ``response`` receives the answer if it is an output key.
+        service_name: Name of the service; its type is determined when the service is available.
+        request: Field to value, nested like the request; other fields keep their default.
+        expect: Field to expected value of the response, nested like the response.
+        outcome_field: Field of the response that selects the outcome instead of ``success`` or ``ok``: true the first
+            outcome, false the last, an integer the outcome at that index, a string the outcome with that name.
+        outcome_values: Outcome to the value, or list of values, of that field; any other value is a failure.
+        keep: Userdata key to the response field stored there; the keys must be output keys.
+        timeout: Maximum wait for the service, and then for its response [s].
+        **keys: Outcomes and userdata keys of any state; the output key ``response`` receives the response.
     """
 
     def __init__(
@@ -53,10 +52,10 @@ class CallService(FrameworkState):
         super().__init__(**keys)
         self._name, self._request, self._expected = str(service_name), dict(request or {}), dict(expect or {})
         self._timeout_s = float(timeout)
-        self._rules = AnswerRules.of(self, outcome_field, outcome_values, keep)
+        self._rules = ResponseRules.of(self, outcome_field, outcome_values, keep)
 
     def execute(self, userdata: Any) -> str:
-        """Calls the service and checks the answer."""
+        """Calls the service and checks the response."""
         name = rospy.resolve_name(self._name)
         try:
             if not wait_until(
@@ -70,23 +69,23 @@ class CallService(FrameworkState):
             service_type = rosservice.get_service_class_by_name(name)
             request = filled(service_type._request_class, self._request, userdata)
             expected = with_userdata(self._expected, userdata)
-            answer = call_service(rospy.ServiceProxy(name, service_type), request, self._timeout_s)
+            response = call_service(rospy.ServiceProxy(name, service_type), request, self._timeout_s)
         except (CallError, FillingError, rosservice.ROSServiceException) as error:
             return self.fail(f"service '{name}': {error}")
-        if ANSWER in self.get_registered_output_keys():
-            userdata[ANSWER] = answer
+        if RESPONSE_KEY in self.get_registered_output_keys():
+            userdata[RESPONSE_KEY] = response
         for field in () if self._rules.outcome_field else ("success", "ok"):
-            if getattr(answer, field, True) is False:
-                return self.fail(f"service '{name}' answered {field}: false: {_reason_in(answer)}")
-        wrong = difference(answer, expected)
+            if getattr(response, field, True) is False:
+                return self.fail(f"service '{name}' answered {field}: false: {_reason_in(response)}")
+        wrong = difference(response, expected)
         if wrong:
             return self.fail(f"service '{name}' answered, but {wrong}")
-        return end_with(self, self._rules, answer, userdata, f"service '{name}'", _reason_in(answer))
+        return end_by_response(self, self._rules, response, userdata, f"service '{name}'", _reason_in(response))
 
 
-def _reason_in(answer: Any) -> str:
-    """Returns the reason an answer gives in its fields."""
+def _reason_in(response: Any) -> str:
+    """Returns the reason in the fields of a response."""
     return next(
-        (str(getattr(answer, text)) for text in ("message", "status_message") if getattr(answer, text, "")),
-        "it gave no reason",
+        (str(getattr(response, text)) for text in ("message", "status_message") if getattr(response, text, "")),
+        "no reason given",
     )

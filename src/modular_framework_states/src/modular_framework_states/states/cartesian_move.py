@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task move the tip of the arm along a straight line."""
+"""A state that moves the tip of the arm along a straight line."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ TIMEOUT_S = 20.0
 
 
 class CartesianMove(FrameworkState):
-    """Moves the tip link in a straight line to a named pose, or by an offset; positive when the whole line was moved.
+    """Moves the tip link on a straight line to a named pose or by an offset; positive if the whole line was executed.
 
     Args:
         pose_name: Name of a pose in the pose manager; empty with an offset.
-        offset: X, y, z to move by [m], instead of a pose; the orientation stays.
-        offset_in_tip: True gives the offset in the frame of the tip link, False in the planning frame.
-        max_step: Longest step along the line [m].
-        min_fraction: Share of the line that must be free; anything less is not moved at all.
-        speed: Bound on the speed of the tip [m/s]; 0 for none.
-        avoid_collisions: False moves through contacts on purpose.
+        offset: Translation (x, y, z) [m] at constant orientation, instead of a pose.
+        offset_in_tip: Whether the offset is given in the frame of the tip link instead of the planning frame.
+        max_step: Maximum step along the line [m].
+        min_fraction: Minimum fraction of the line that must be free; with less, the arm does not move.
+        speed: Maximum speed of the tip [m/s]; 0 for no limit.
+        avoid_collisions: False allows motion in contact.
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -60,38 +60,38 @@ class CartesianMove(FrameworkState):
         self._min_fraction = float(min_fraction)
 
     def execute(self, userdata: Any) -> str:
-        """Requests the path, and moves if enough of it was found."""
+        """Requests the path, and executes the path if its fraction suffices."""
         commander = userdata.arm_commander
         try:
             target = self._target(commander)
-            answer = self._path(commander, target)
+            response = self._path(commander, target)
         except (ManagerError, CallError) as error:
             return self.fail(f"straight line: {error}")
         if self.preempt_requested():
             return self.stopped()
-        if answer.fraction < self._min_fraction - 1e-9 or not answer.solution.joint_trajectory.points:
+        if response.fraction < self._min_fraction - 1e-9 or not response.solution.joint_trajectory.points:
             return self.fail(
-                f"straight line: only {answer.fraction:.1%} of it can be moved "
-                f"({error_name(answer.error_code.val)}), needed are {self._min_fraction:.1%}; the log of "
-                "move_group says where it ends and why"
+                f"straight line: only {response.fraction:.1%} of it can be moved "
+                f"({error_name(response.error_code.val)}), but {self._min_fraction:.1%} are required; the log of "
+                "move_group gives the end of the line and the reason"
             )
-        result = commander.execute_plan(answer.solution, stop_requested=self.preempt_requested)
+        result = commander.execute_plan(response.solution, stop_requested=self.preempt_requested)
         if self.preempt_requested():
             return self.stopped()
-        return self.succeed() if result else self.fail(f"straight line: it was not moved: {result.reason}")
+        return self.succeed() if result else self.fail(f"straight line: not executed: {result.reason}")
 
     def _target(self, commander: Any) -> PoseStamped:
         if self._offset is None:
             return fetch("pose", self._pose_name)
         link = commander.group.tip_link
         request = GetPositionFKRequest(fk_link_names=[link], robot_state=robot_state(commander.current_joints()))
-        answer = request_service("compute_fk", GetPositionFK, request, TIMEOUT_S)
-        if not answer.pose_stamped:
+        response = request_service("compute_fk", GetPositionFK, request, TIMEOUT_S)
+        if not response.pose_stamped:
             raise CallError(
-                f"'{rospy.resolve_name('compute_fk')}' does not know where link '{link}' is: "
-                f"{error_name(answer.error_code.val)}"
+                f"'{rospy.resolve_name('compute_fk')}' did not return the pose of link '{link}': "
+                f"{error_name(response.error_code.val)}"
             )
-        return moved(answer.pose_stamped[0], self._offset, self._in_tip)
+        return moved(response.pose_stamped[0], self._offset, self._in_tip)
 
     def _path(self, commander: Any, target: PoseStamped) -> Any:
         request = self._request
@@ -103,12 +103,12 @@ class CartesianMove(FrameworkState):
 
 
 def moved(pose: PoseStamped, offset: Sequence[float], in_own_frame: bool) -> PoseStamped:
-    """Returns a pose moved by an offset [m], given in the pose's own frame or in that of its header."""
-    turn = pose.pose.orientation
+    """Returns a pose translated by an offset [m], given in the pose's own frame or in its header's frame."""
+    orientation = pose.pose.orientation
     step = np.asarray(offset, dtype=float)
     if in_own_frame:
-        step = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).apply(step)
-    result = PoseStamped(header=pose.header, pose=Pose(orientation=turn))
+        step = Rotation.from_quat([orientation.x, orientation.y, orientation.z, orientation.w]).apply(step)
+    result = PoseStamped(header=pose.header, pose=Pose(orientation=orientation))
     for axis, value in zip("xyz", step, strict=True):
         setattr(result.pose.position, axis, getattr(pose.pose.position, axis) + float(value))
     return result

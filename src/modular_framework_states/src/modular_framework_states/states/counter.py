@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task repeat a part of itself a number of times."""
+"""A state that repeats a part of a task a number of times."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from modular_framework_core.state_api.option_limits import Limits
 
 
 class Counter(FrameworkState):
-    """Counts how often it is passed: positive the first times, negative when the count is used up, then it starts anew.
+    """Counts its executions: positive up to the count, then once negative, after which it restarts.
 
-    For a loop, lead the positive outcome to the first state of the part to repeat. For a retry, lead the negative
-    outcomes of what may fail to the counter, and the counter's positive outcome back to it.
+    For a loop, connect the positive outcome to the first state of the repeated part. For a retry, connect the negative
+    outcomes of the part to the counter, and the counter's positive outcome to the part.
 
     Args:
-        count: How many times it is positive.
-        **keys: Outcomes and userdata keys of any state; ``counter`` receives how often it was passed, from 1, if it is
-            an output key.
+        count: Number of positive outcomes.
+        **keys: Outcomes and userdata keys of any state; the output key ``counter`` receives the number of executions.
     """
 
     def __init__(self, count: Annotated[int, Limits(at_least=1)], **keys: Unpack[StateKeys]) -> None:
@@ -27,11 +26,11 @@ class Counter(FrameworkState):
         self._count, self._passed = int(count), 0
 
     def execute(self, userdata: Any) -> str:
-        """Counts."""
+        """Increments the counter and compares it with the count."""
         self._passed += 1
         if "counter" in self.get_registered_output_keys():
             userdata.counter = self._passed
         if self._passed <= self._count:
             return self.succeed()
         self._passed = 0
-        return self.fail(f"all {self._count} times are used up")
+        return self.fail(f"all {self._count} repetitions were used")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task remove an object from the simulation."""
+"""A state that removes an object from the simulation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modular_framework_core.state_api.framework_state import FrameworkState
 
 
 class DeleteObject(FrameworkState):
-    """Deletes an object from the simulation, the map of types and the collision matrix.
+    """Deletes an object from the simulation, the type map and the collision matrix.
 
     Args:
         object_name: Name of the object.

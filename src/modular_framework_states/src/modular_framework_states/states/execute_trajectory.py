@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task run a trajectory that was written down, not planned."""
+"""A state that executes a trajectory that was written instead of planned."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ TIMEOUT_S = 10.0
 
 
 class ExecuteTrajectory(FrameworkState):
-    """Runs a trajectory of the trajectory manager from where the arm is; positive when the arm stands at its end.
+    """Executes a trajectory of the trajectory manager from the current position; positive if the arm is at its end.
 
-    The way from where the arm is to the first point is part of the motion. As nobody planned it, every state on the
-    way is checked for collisions first, and every piece of it for the joints' greatest velocities.
+    The motion from the current position to the first point is included. As no planner has checked the trajectory, its
+    path is first checked for collisions, and each segment for the joints' maximum velocities.
 
     Args:
-        trajectory_name: Name of the trajectory; empty takes the oldest anonymous one. Userdata
-            ``selected_trajectory`` is taken instead when it is an input key.
-        step: Distance of the collision checks [rad or m]; 0 leaves them out.
-        goal_tolerance: Greatest distance from the last point that counts as there [rad or m].
+        trajectory_name: Name of the trajectory; empty for the oldest anonymous trajectory. The input key
+            ``selected_trajectory`` replaces it.
+        step: Distance between collision checks [rad or m]; 0 for none.
+        goal_tolerance: Maximum deviation from the last point after the motion [rad or m].
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -52,13 +52,13 @@ class ExecuteTrajectory(FrameworkState):
         self._name, self._step, self._goal_tolerance = trajectory_name, float(step), float(goal_tolerance)
 
     def execute(self, userdata: Any) -> str:
-        """Checks the path and runs the trajectory."""
+        """Checks the path and executes the trajectory."""
         commander = userdata.arm_commander
         what = f"trajectory '{self._name or 'selected'}'"
         try:
             trajectory = selected_or_named(self, userdata, "trajectory", self._name)
-            trajectory = from_current(trajectory, commander.current_joints())
-            fault = too_fast(trajectory, {joint.name: joint.velocity for joint in commander.group.joints})
+            trajectory = start_at_current(trajectory, commander.current_joints())
+            fault = velocity_violation(trajectory, {joint.name: joint.velocity for joint in commander.group.joints})
             if not fault and self._step:
                 fault = self._first_contact(commander, trajectory)
         except (ManagerError, CallError, ValueError) as error:
@@ -66,21 +66,21 @@ class ExecuteTrajectory(FrameworkState):
         if self.preempt_requested():
             return self.stopped()
         if fault:
-            return self.fail(f"{what} was not run: {fault}")
+            return self.fail(f"{what} was not executed: {fault}")
         return run_to_end(self, commander, RobotTrajectory(joint_trajectory=trajectory), self._goal_tolerance, what)
 
     def _first_contact(self, commander: Any, trajectory: JointTrajectory) -> str:
-        """Describes the first collision on the path; empty when the path is free."""
+        """Describes the first collision on the path; empty if the path is free."""
         proxy = rospy.ServiceProxy("check_state_validity", GetStateValidity)
         wait_for_service(proxy, TIMEOUT_S)
-        for number, positions in samples(trajectory, self._step):
+        for number, positions in sample_path(trajectory, self._step):
             if self.preempt_requested():
                 return ""
             joints = dict(zip(trajectory.joint_names, positions, strict=True))
             request = GetStateValidityRequest(robot_state=robot_state(joints), group_name=commander.group_name)
-            answer = call_service(proxy, request, TIMEOUT_S)
-            if not answer.valid:
-                pairs = sorted({f"'{item.contact_body_1}' with '{item.contact_body_2}'" for item in answer.contacts})
+            response = call_service(proxy, request, TIMEOUT_S)
+            if not response.valid:
+                pairs = sorted({f"'{item.contact_body_1}' with '{item.contact_body_2}'" for item in response.contacts})
                 return (
                     f"on the way to point {number} the robot would be in collision "
                     f"({', '.join(pairs[:3]) or 'move_group says only that the state is not valid'})"
@@ -88,18 +88,18 @@ class ExecuteTrajectory(FrameworkState):
         return ""
 
 
-def from_current(trajectory: JointTrajectory, current: Mapping[str, float]) -> JointTrajectory:
-    """Returns a trajectory that begins where the arm is: with that as a point at time 0, unless it has one.
+def start_at_current(trajectory: JointTrajectory, current: Mapping[str, float]) -> JointTrajectory:
+    """Returns a trajectory that starts at the current position, added at time 0 if the first point comes later.
 
     Raises:
-        ValueError: The trajectory has no point, or a joint whose position is not known, or points of other lengths.
+        ValueError: The trajectory has no points or unknown joints, or the number of positions is wrong.
     """
     unknown = [joint for joint in trajectory.joint_names if joint not in current]
     lengths = {len(point.positions) for point in trajectory.points}
     if not trajectory.points or unknown or lengths != {len(trajectory.joint_names)}:
         raise ValueError(
             f"it has {len(trajectory.points)} points of {sorted(lengths)} positions for "
-            f"{len(trajectory.joint_names)} joints, and the joints {unknown} are none of the arm's: "
+            f"{len(trajectory.joint_names)} joints, and the joints {unknown} are not joints of the arm: "
             f"{', '.join(current)}"
         )
     if trajectory.points[0].time_from_start.to_sec() <= 0.0:
@@ -110,31 +110,35 @@ def from_current(trajectory: JointTrajectory, current: Mapping[str, float]) -> J
     return JointTrajectory(joint_names=trajectory.joint_names, points=[start, *trajectory.points])
 
 
-def too_fast(trajectory: JointTrajectory, limits: Mapping[str, float]) -> str:
-    """Describes the first segment that exceeds a joint's velocity limit; empty when none does.
+def velocity_violation(trajectory: JointTrajectory, limits: Mapping[str, float]) -> str:
+    """Describes the first segment that exceeds a joint's velocity limit; empty if none does.
 
     Args:
         trajectory: Points at increasing times.
-        limits: Greatest velocity of each joint [rad/s or m/s].
+        limits: Maximum velocity of each joint [rad/s or m/s].
     """
     for number, (start, end) in enumerate(pairwise(trajectory.points), start=1):
         time_s = (end.time_from_start - start.time_from_start).to_sec()
-        ways = np.abs(np.subtract(end.positions, start.positions))
-        needed = {joint: way / limits[joint] for joint, way in zip(trajectory.joint_names, ways, strict=True)}
+        distances = np.abs(np.subtract(end.positions, start.positions))
+        needed = {
+            joint: distance / limits[joint] for joint, distance in zip(trajectory.joint_names, distances, strict=True)
+        }
         slowest = max(needed, key=needed.__getitem__)
         if needed[slowest] > time_s:
             return (
                 f"joint '{slowest}' has {time_s:.2f} s to get to point {number} and needs {needed[slowest]:.2f} s "
-                f"at its greatest velocity, {limits[slowest]:.2f} rad/s or m/s; give that point more time"
+                f"at its maximum velocity, {limits[slowest]:.2f} rad/s or m/s; give that point more time"
             )
     return ""
 
 
-def samples(trajectory: JointTrajectory, step: float) -> list[tuple[int, list[float]]]:
-    """Returns states on the straight pieces between points, each with the number of the point it leads to, from 0."""
+def sample_path(trajectory: JointTrajectory, step: float) -> list[tuple[int, list[float]]]:
+    """Returns states on the segments between points, each with the index of the segment's end point."""
     rows = [np.asarray(point.positions, dtype=float) for point in trajectory.points]
     result = [(0, rows[0].tolist())]
     for number, (start, end) in enumerate(zip(rows[:-1], rows[1:], strict=True), start=1):
         count = max(1, int(np.ceil(np.abs(end - start).max() / step)))
-        result += [(number, (start + share / count * (end - start)).tolist()) for share in range(1, count + 1)]
+        result += [
+            (number, (start + step_number / count * (end - start)).tolist()) for step_number in range(1, count + 1)
+        ]
     return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task open, close or keep the manipulator as a grasp message says."""
+"""A state that opens, closes or holds the manipulator according to a grasp message."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ from modular_framework_states.manager_clients import ManagerError, selected_or_n
 
 SIMULATION_PARAMETER = "simulation"
 SCENE_PERIOD_S, SCENE_TIMEOUT_S = 0.1, 2.0
-"""How often the planning scene is read, and how long the simulation may take to attach what the fingers hold [s]."""
+"""Period of the planning scene requests, and maximum delay until the simulation attaches a held object [s]."""
 
 
 class Grasp(FrameworkState):
-    """Sends one stage of a grasp to the manipulator; positive only when the server says that stage was reached.
+    """Sends one stage of a grasp to the manipulator; positive only if the server reports that the stage was reached.
 
     Args:
-        grasp_type: Pregrasp, grasp or postgrasp.
-        grasp_name: Name of the grasp; empty takes the oldest anonymous one. Userdata ``selected_grasp`` is taken
-            instead when it is an input key.
-        timeout: Longest wait for the end of the motion [s].
-        verify_held: True also requires, in simulation, that the object of the grasp is attached to the manipulator in
-            the planning scene. Fingers may stop on something else, as on each other; without a simulation only their
-            positions tell.
+        grasp_type: Stage of the grasp: pregrasp, grasp or postgrasp.
+        grasp_name: Name of the grasp; empty for the oldest anonymous grasp. The input key ``selected_grasp`` replaces
+            it.
+        timeout: Maximum wait for the end of the motion [s].
+        verify_held: Whether to require, in simulation, that the object is attached to the manipulator in the planning
+            scene, since the fingers may have stopped for another reason, such as contact with each other.
         **keys: Outcomes and userdata keys of any state.
     """
 

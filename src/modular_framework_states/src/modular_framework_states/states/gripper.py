@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task open or close the manipulator without a grasp message."""
+"""A state that opens or closes the manipulator without a grasp message."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from modular_framework_states.manipulator_postures import posture_grasp, posture
 
 
 class Gripper(FrameworkState):
-    """Brings the fingers to a posture; positive when they got there or, with ``grip``, when they hold something.
+    """Moves the fingers to a posture; positive if they reach it or, with ``grip``, if they hold an object.
 
     Args:
-        posture: Name of a state of the manipulator's planning group: open, closed.
+        posture: Name of a state of the manipulator's planning group, such as open or closed.
         positions: Joint to position [rad or m], instead of a posture.
-        grip: True closes on an object: it is positive when something stops the fingers before they are shut.
-        torque: Share of the greatest torque.
-        timeout: Longest wait for the end of the motion [s].
+        grip: Whether to close on an object: positive if an object stops the fingers before they are closed.
+        torque: Fraction of the maximum torque.
+        timeout: Maximum wait for the end of the motion [s].
         **keys: Outcomes and userdata keys of any state.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task load the messages of a manager from a file."""
+"""A state that loads a manager's messages from a file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from modular_framework_states.manager_files import ManagerFileState
 
 
 class Load(ManagerFileState):
-    """Reads what ``store`` wrote into a manager, beside what it holds."""
+    """Adds the messages of a file written by ``store`` to a manager."""
 
     def execute(self, userdata: Any) -> str:
         """Loads the file into the manager."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task note a figure of its run."""
+"""A state that publishes a figure of the task."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class LogMetric(FrameworkState):
     """Publishes a figure on ``task_metrics`` (std_msgs/String, JSON: name, value, unit, time) and logs it.
 
     Args:
-        name_of_metric: What the figure is.
-        value: The figure; left out it is taken from the userdata key ``from_key``.
-        from_key: Userdata key that holds the figure; must be an input key.
-        unit: Its unit.
+        name_of_metric: Name of the figure.
+        value: Value of the figure; without it, the value of the userdata key ``from_key``.
+        from_key: Input key with the value.
+        unit: Unit of the value.
         **keys: Outcomes and userdata keys of any state.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task execute a plan, and makes sure that the arm got where the plan ends."""
+"""A state that executes a plan and checks that the arm reached its end."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from modular_framework_states.manager_clients import ManagerError, selected_or_n
 
 
 class Move(FrameworkState):
-    """Executes a plan; positive only when the joints are at its last point afterwards.
+    """Executes a plan; positive only if the joints are at its last point afterwards.
 
     Args:
-        plan_name: Name of the plan; empty takes the oldest anonymous one. Userdata ``selected_plan`` is taken instead
-            when it is an input key.
-        start_tolerance: Greatest distance of a joint from the first point of the plan before the motion [rad or m].
-        goal_tolerance: Greatest distance of a joint from the last point afterwards [rad or m].
+        plan_name: Name of the plan; empty for the oldest anonymous plan. The input key ``selected_plan`` replaces it.
+        start_tolerance: Maximum deviation of a joint from the first point of the plan before the motion [rad or m].
+        goal_tolerance: Maximum deviation of a joint from the last point afterwards [rad or m].
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -46,12 +45,12 @@ class Move(FrameworkState):
             return self.fail(str(error))
         trajectory = plan.joint_trajectory
         if not trajectory.points:
-            return self.fail(f"plan '{self._plan_name}' has no point")
+            return self.fail(f"plan '{self._plan_name}' has no points")
         first = dict(zip(trajectory.joint_names, trajectory.points[0].positions, strict=False))
-        away = worst_joint(commander.positions_of(first), first)
-        if away[1] > self._start_tolerance:
+        deviation = worst_joint(commander.positions_of(first), first)
+        if deviation[1] > self._start_tolerance:
             return self.fail(
-                f"plan '{self._plan_name}' starts elsewhere: joint '{away[0]}' is {away[1]:.4f} away from "
-                f"its first point, allowed is {self._start_tolerance}; plan again from the current state"
+                f"plan '{self._plan_name}' starts elsewhere: joint '{deviation[0]}' is {deviation[1]:.4f} away from "
+                f"its first point; the tolerance is {self._start_tolerance}; plan again from the current state"
             )
         return run_to_end(self, commander, plan, self._goal_tolerance, f"plan '{self._plan_name}'")

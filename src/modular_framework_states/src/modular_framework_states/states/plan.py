@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task plan an arm motion now and execute it later."""
+"""A state that plans an arm motion for later execution."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ StartName = Annotated[str, Named("option:starting_state_type", userdata=True)]
 
 
 class Plan(FrameworkState):
-    """Plans from one state of the arm to another and stores the plan.
+    """Plans an arm motion and stores the plan.
 
-    Targets that are poses are turned into joint positions first, always the solution nearest to where the plan starts,
-    so that plans made at the same time fit together (see ``grasp_stages``). A start at a stage of a grasp has the
-    fingers of the pregrasp posture.
+    Target poses are converted to the joint positions nearest to the start of the plan, so that plans made at the same
+    time fit together (see ``grasp_stages``). At the start stage of a grasp, the fingers have the pregrasp posture.
 
     Args:
         target_state_type: Pose, joint_state, grasp, pregrasp or postgrasp.
-        target_state_name: Name of the message; ``userdata`` takes ``selected_<type>``; empty the oldest anonymous one.
-        plan_name: Name to store the plan under; empty stores it anonymously.
-        starting_state_type: As the target's; empty starts from where the arm is.
-        starting_state_name: As the target's.
-        group: Planning group to plan for; empty for that of the arm commander (``arm_group_name``).
-        **keys: Outcomes and userdata keys of any state; ``selected_plan`` receives the plan if it is an output key.
+        target_state_name: Name of the message; ``userdata`` for ``selected_<type>``; empty for the oldest anonymous
+            message.
+        plan_name: Name of the stored plan; empty for an anonymous plan.
+        starting_state_type: As for the target; empty for the current position.
+        starting_state_name: As for the target.
+        group: Planning group; empty for the group of the arm commander (``arm_group_name``).
+        **keys: Outcomes and userdata keys of any state; the output key ``selected_plan`` receives the plan.
     """
 
     DEFAULT_IO_KEYS = ("arm_commander",)
@@ -56,7 +56,7 @@ class Plan(FrameworkState):
         self._plan_name, self._group = plan_name, group
 
     def execute(self, userdata: Any) -> str:
-        """Plans and stores the plan."""
+        """Makes and stores the plan."""
         try:
             commander = userdata.arm_commander.of_group(self._group)
             start = self._start(userdata, commander)
@@ -76,7 +76,7 @@ class Plan(FrameworkState):
         return self.succeed()
 
     def _start(self, userdata: Any, commander: Any) -> dict[str, float] | None:
-        """Returns {joint: position} to start from, None for the current state."""
+        """Returns {joint: position} at the start; None for the current state."""
         if not self._start_type:
             return None
         message = self._message(userdata, self._start_type, self._start_name)
@@ -85,7 +85,7 @@ class Plan(FrameworkState):
         return message_joints(commander, message, self._start_name, None)
 
     def _target(self, userdata: Any, commander: Any, start: Mapping[str, float] | None) -> dict[str, float]:
-        """Returns {joint: position} to go to."""
+        """Returns {joint: position} of the target."""
         message = self._message(userdata, self._target_type, self._target_name)
         if self._target_type not in GRASP_STAGES:
             return message_joints(commander, message, self._target_name, start)
@@ -102,8 +102,8 @@ class Plan(FrameworkState):
         ]
         if not keys:
             raise ManagerError(
-                f"the {state_type} is to be taken from userdata, but 'selected_{kind}' is not among the "
-                f"input keys {sorted(self.get_registered_input_keys())}"
+                f"the {state_type} is taken from userdata, but 'selected_{kind}' is not among the "
+                f"input keys {sorted(self.get_registered_input_keys())}; add the key"
             )
         message = getattr(userdata, keys[0])
         if message is None:
@@ -118,23 +118,23 @@ class Plan(FrameworkState):
 def message_joints(
     commander: Any, message: JointState | PoseStamped, name: str, seed: Mapping[str, float] | None
 ) -> dict[str, float]:
-    """Returns the joint positions of a joint state, or those of a pose that are nearest to a seed.
+    """Returns the positions of a joint state, or the joint positions for a pose that are nearest to a seed.
 
     Args:
-        commander: Solves inverse kinematics.
-        message: The joint state or pose.
+        commander: Arm commander that solves inverse kinematics.
+        message: Joint state or pose.
         name: Name of the joint state, for errors.
         seed: {joint: position} [rad or m]; None for the current state.
 
     Raises:
-        ManagerError: The joint state has no positions, or not one for each name.
+        ManagerError: The joint state has no positions, or their number differs from that of the names.
         StageError: The pose cannot be reached.
     """
     if isinstance(message, JointState):
         if not message.name or len(message.name) != len(message.position):
             raise ManagerError(
                 f"joint state '{name}' has {len(message.name)} names and {len(message.position)} positions; "
-                "it needs as many of each, at least one"
+                "it needs the same number of each, at least one"
             )
         return dict(zip(message.name, message.position, strict=True))
     result = commander.solve_ik(message, seed)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task reset the managers to the configuration."""
+"""A state that resets the managers to the configuration."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from modular_framework_states.manager_clients import Kind, ManagerError, all_kin
 
 
 class ReinitialiseManagers(FrameworkState):
-    """Makes managers forget what was added, and read their files of named messages again.
+    """Removes messages that were added to managers, and reloads their files of named messages.
 
     Args:
-        kinds: Which managers; all of them by default.
+        kinds: Kinds of messages whose managers are reset; empty for all kinds.
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -24,7 +24,7 @@ class ReinitialiseManagers(FrameworkState):
         self._kinds = tuple(kinds) or all_kinds()
 
     def execute(self, userdata: Any) -> str:
-        """Calls one manager after the other; continues after one that fails."""
+        """Resets the managers one by one, even after a failure."""
         faults = []
         for kind in self._kinds:
             try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task let go of what the manipulator holds."""
+"""A state that releases the objects held by the manipulator."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ SCENE_PERIOD_S = 0.1
 
 
 class Release(FrameworkState):
-    """Opens the manipulator wide and lets go; positive once the fingers are open and nothing is attached to it.
+    """Opens the manipulator wide; positive once the fingers are open and no object is attached to them.
 
-    The simulation detaches an object in the planning scene when the fingers have left it, which is waited for. Without
-    a simulation nobody sees that, so the object is detached here.
+    The simulation detaches an object in the planning scene when the fingers have left it, and the state waits for that.
+    Without a simulation, the state detaches the object.
 
     Args:
-        posture: Name of a state of the manipulator's planning group, as wide as it opens.
-        timeout: Longest wait for the end of the motion, and again for the simulation to let go [s].
+        posture: Name of the widest posture, a state of the manipulator's planning group.
+        timeout: Maximum wait for the end of the motion, and then for the simulation to detach the object [s].
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -42,7 +42,7 @@ class Release(FrameworkState):
         self._posture, self._timeout_s = posture, float(timeout)
 
     def execute(self, userdata: Any) -> str:
-        """Opens the fingers and detaches what they held."""
+        """Opens the fingers and detaches the held objects."""
         try:
             grasp = posture_grasp(posture_positions(self._posture), 1.0)
             client, max_torque = userdata.manipulator_controller_client, userdata.max_torque
@@ -53,13 +53,13 @@ class Release(FrameworkState):
                 detach(held)
             if self.preempt_requested():
                 return self.stopped()
-            left = held_objects()
+            remaining = held_objects()
         except (RobotModelError, GraspGoalError, CallError) as error:
             return self.fail(f"release by the posture '{self._posture}': {error}")
-        if left:
+        if remaining:
             return self.fail(
                 f"the fingers are open ('{self._posture}'), but the planning scene still has "
-                f"{', '.join(left)} attached to {', '.join(sorted(set(left.values())))} after "
-                f"{self._timeout_s:g} s; check what keeps it between the fingers"
+                f"{', '.join(remaining)} attached to {', '.join(sorted(set(remaining.values())))} after "
+                f"{self._timeout_s:g} s; check why the fingers still hold it"
             )
         return self.succeed()

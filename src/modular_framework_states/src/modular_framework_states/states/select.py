@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task choose the message its next states work with."""
+"""A state that selects the message for the following states."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Names = Annotated[Sequence[str] | str | None, Named("option:message_type")]
 
 
 class Select(FrameworkState):
-    """Takes the next message from a manager and puts it into the userdata key ``selected_<type>``.
+    """Copies the next message of a manager to the userdata key ``selected_<type>``.
 
-    Every execution takes the next name of the list, or the oldest anonymous message when there is no list. When the
-    names are used up the outcome is negative, and the next execution begins with the first name again. All types of
-    grasp go to ``selected_grasp``.
+    Every execution selects the next name of the list, or the oldest anonymous message without a list. After the last
+    name the outcome is negative, and the next execution starts again with the first. All grasp stages use
+    ``selected_grasp``.
 
     Args:
-        message_type: joint_state, trajectory, plan, pose, grasp, pregrasp or postgrasp.
-        message_names: Names to take one after the other; None takes anonymous messages.
+        message_type: Type of message: joint_state, trajectory, plan, pose, grasp, pregrasp or postgrasp.
+        message_names: Names to select in turn; None for anonymous messages.
         **keys: Outcomes and userdata keys of any state; ``selected_<type>`` must be an output key.
     """
 
@@ -39,11 +39,11 @@ class Select(FrameworkState):
         self._next = 0
 
     def execute(self, userdata: Any) -> str:
-        """Takes the next message."""
+        """Selects the next message."""
         if self._key not in self.get_registered_output_keys():
             return self.fail(
                 f"the key '{self._key}' is not among the output keys {sorted(self._output_keys)}; add it, "
-                "or the message goes nowhere"
+                "or the message is lost"
             )
         if self._next >= len(self._names):
             self._next = 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task choose how its next motions are planned."""
+"""A state that changes the planner settings for the following motions."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from modular_framework_core.state_api.option_uses import Named
 
 
 class SetPlanner(FrameworkState):
-    """Changes the settings of the arm commander; what is left out stays as it is.
+    """Changes the settings of the arm commander; omitted settings are kept.
 
     Args:
-        planner_id: Name of the planner, or ``pipeline/planner``; empty leaves it.
-        planning_time: Time a plan may take [s].
-        attempts: How often a plan is tried for.
-        speed_factor: Share of the joints' velocity and acceleration limits.
-        group: Planning group whose settings change; empty for that of the arm commander (``arm_group_name``).
+        planner_id: Name of the planner, or ``pipeline/planner``; empty keeps the planner.
+        planning_time: Maximum planning time [s].
+        attempts: Maximum number of planning attempts.
+        speed_factor: Fraction of the joints' velocity and acceleration limits.
+        group: Planning group whose settings change; empty for the group of the arm commander (``arm_group_name``).
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -43,7 +43,7 @@ class SetPlanner(FrameworkState):
         }
 
     def execute(self, userdata: Any) -> str:
-        """Sets what was given, if there is such a planner."""
+        """Applies the given settings, if the planner exists."""
         try:
             commander = userdata.arm_commander.of_group(self._group)
             if self._planner_id:

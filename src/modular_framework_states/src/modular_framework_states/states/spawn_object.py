@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task add an object to the simulation."""
+"""A state that adds an object to the simulation."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from modular_framework_core.state_api.option_limits import Vector
 
 
 class SpawnObject(FrameworkState):
-    """Spawns an object; positive when simulation, map of types and collision matrix all have it.
+    """Spawns an object; positive if simulation, type map and collision matrix all contain it.
 
     Args:
-        object_type: Folder of the model in the folder of models (parameter ``gazebo_model_path``).
-        object_name: Name of the object; empty takes the type.
-        position: x, y, z [m].
-        orientation: Roll, pitch, yaw [rad].
+        object_type: Folder of the model below the folder of models (parameter ``gazebo_model_path``).
+        object_name: Name of the object; empty for the name of the type.
+        position: Position (x, y, z) [m].
+        orientation: Roll, pitch and yaw [rad].
         reference_frame: Frame of the pose.
         **keys: Outcomes and userdata keys of any state.
     """

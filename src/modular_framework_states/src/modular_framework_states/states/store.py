@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task save the messages of a manager to a file."""
+"""A state that saves a manager's messages to a file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from modular_framework_states.manager_files import ManagerFileState
 
 
 class Store(ManagerFileState):
-    """Writes what a manager holds to a file."""
+    """Writes the messages of a manager to a file."""
 
     def execute(self, userdata: Any) -> str:
         """Saves the messages of the manager."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task pause."""
+"""A state that waits for a time."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from modular_framework_core.state_api.option_limits import NotNegative, Positive
 from modular_framework_ros.calls import CallError
 from modular_framework_ros.simulated_time import SimulatedTime
 
-PIECE_S = 0.5
+STEP_S = 0.5
 
 
 class Wait(FrameworkState):
-    """Waits for some time of the robot's clock: simulated time in simulation.
+    """Waits for a duration on the ROS clock: simulated time in simulation.
 
     Args:
-        duration: How long [s].
-        timeout: Longest wait of wall time [s], for a clock that stands still; None waits three times the duration and
-            ten seconds more.
+        duration: Duration [s].
+        timeout: Maximum wait in real time [s], in case the clock stops; None for three times the duration plus ten
+            seconds.
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -34,7 +34,7 @@ class Wait(FrameworkState):
         self._time = SimulatedTime()
 
     def execute(self, userdata: Any) -> str:
-        """Waits."""
+        """Waits until the duration has passed."""
         if self._time.enabled:
             return self._wait_in_held_time()
         begun = rospy.Time.now()
@@ -44,18 +44,18 @@ class Wait(FrameworkState):
             return self.stopped()
         passed = (rospy.Time.now() - begun).to_sec()
         return self.fail(
-            f"only {passed:.2f} of {self._duration_s} s passed on the robot's clock within "
+            f"only {passed:.2f} of {self._duration_s} s passed on the ROS clock within "
             f"{self._timeout_s:.1f} s; is the simulation paused or slow?"
         )
 
     def _wait_in_held_time(self) -> str:
-        """Asks for simulated time to pass, in pieces, so that a request to stop is noticed."""
+        """Advances simulated time in short steps, so that a stop request is noticed."""
         passed_s = 0.0
         while passed_s < self._duration_s and not self.stop_requested():
-            piece_s = min(PIECE_S, self._duration_s - passed_s)
+            step_s = min(STEP_S, self._duration_s - passed_s)
             try:
-                self._time.sleep(piece_s)
+                self._time.sleep(step_s)
             except CallError as error:
                 return self.fail(f"{passed_s:.2f} of {self._duration_s} s passed: {error}")
-            passed_s += piece_s
+            passed_s += step_s
         return self.stopped() if self.stop_requested() else self.succeed()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task wait for a message of any type."""
+"""A state that waits for a message of any type."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ import rospy
 from modular_framework_core.state_api.constructor_keys import StateKeys
 from modular_framework_core.state_api.framework_state import FrameworkState
 from modular_framework_core.state_api.option_limits import Positive
-from modular_framework_states.answers import MessageFields
 from modular_framework_states.message_filling import FillingError, difference, with_userdata
+from modular_framework_states.responses import MessageFields
 
-FOUND = "message"
+MESSAGE_KEY = "message"
 
 
 class WaitForMessage(FrameworkState):
-    """Waits for a message that is published after the state begins (or was latched), and may check its fields.
+    """Waits for a message published after the state starts, or latched, and optionally checks its fields.
 
     Args:
-        topic_name: Topic.
-        timeout: Longest wait [s]; None waits without limit.
-        expect: Field to value, nested as the message is; other messages are passed over. A text ``userdata.<key>``
-            stands for what userdata has there, and ``userdata.<key>.<field>`` for a field of it.
-        **keys: Outcomes and userdata keys of any state; ``message`` receives the message if it is an output key.
+        topic_name: Name of the topic.
+        timeout: Maximum wait [s]; None for no limit.
+        expect: Field to expected value, nested like the message; other messages are ignored. The string
+            ``userdata.<key>`` is replaced by the userdata at that key, and ``userdata.<key>.<field>`` by a field of it.
+        **keys: Outcomes and userdata keys of any state; the output key ``message`` receives the message.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class WaitForMessage(FrameworkState):
         self._last_difference = ""
 
     def execute(self, userdata: Any) -> str:
-        """Waits for a publisher, whose type it takes, then subscribes, waits and unsubscribes."""
+        """Waits for a publisher, subscribes with its type, waits for a message and unsubscribes."""
         self._found, self._last_difference = [], "nobody publishes it"
         try:
             self._wanted = with_userdata(self._expected, userdata)
@@ -58,18 +58,18 @@ class WaitForMessage(FrameworkState):
         if not arrived:
             what = "no message as expected" if self._expected else "no message"
             return self.fail(f"{what} came on topic '{name}' within {self._timeout_s} s ({self._last_difference})")
-        if FOUND in self.get_registered_output_keys():
-            userdata[FOUND] = self._found[0]
+        if MESSAGE_KEY in self.get_registered_output_keys():
+            userdata[MESSAGE_KEY] = self._found[0]
         return self.succeed()
 
     def _receive(self, name: str, end: float | None) -> bool:
-        """Subscribes with the topic's own type, because all subscribers of one node to a topic share one type."""
+        """Subscribes with the type of the publisher, since all subscribers of a node to a topic share one type."""
         kind = published_type(name)
         message_type = roslib.message.get_message_class(kind)
         if message_type is None:
             self._last_difference = f"its type {kind or 'is not known any more, and'} is not built in this workspace"
             return False
-        self._last_difference = "it is published, but nothing was sent"
+        self._last_difference = "it has a publisher, but no message was sent"
         subscriber = rospy.Subscriber(name, message_type, self._on_message, queue_size=10)
         try:
             return self._wait(lambda: bool(self._found), end)
@@ -86,7 +86,7 @@ class WaitForMessage(FrameworkState):
 
 
 def published_type(name: str) -> str:
-    """Returns the type of a topic that is published, "" when nobody publishes it.
+    """Returns the message type of a topic; "" if no node publishes it.
 
     Args:
         name: Resolved name of the topic.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lets a task wait until another component says that it has done its part."""
+"""A state that waits for a signal of another component."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ REASON_WAIT_S = 0.5
 
 
 class WaitForSignal(FrameworkState):
-    """Waits for one Bool on a topic; True is the positive outcome.
+    """Waits for a Bool on a topic; True gives the positive outcome.
 
-    The topic is listened to from the moment the state is made: the latest signal that was not read yet counts, however
-    early it came. A component may explain a False by a text on ``<topic_name>/reason`` (std_msgs/String).
+    The state subscribes when it is constructed and uses the latest unread signal, even if that came before the
+    execution. A component may give the reason of a False on ``<topic_name>/reason`` (std_msgs/String).
 
-    A latched signal may be left from an earlier task. A component that offers the service ``<topic_name>/renew``
-    (std_srvs/Trigger) makes it true again, or answers why it cannot; its answer counts instead of the signal.
+    A latched signal may come from an earlier task. A component that offers the service ``<topic_name>/renew``
+    (std_srvs/Trigger) is asked to make the signal true again; its response replaces the signal.
 
-    A component that is still starting has the time that every node has for another one at the start, the parameter
-    ``/start_timeout``; `timeout` counts from when it publishes the topic.
+    A component that has not yet published the topic has the time of the parameter ``/start_timeout`` to start;
+    `timeout` counts from then.
 
     Args:
         topic_name: Topic of the signal (std_msgs/Bool).
-        timeout: Longest wait [s]; None waits without limit, until stopped.
+        timeout: Maximum wait [s]; None for no limit.
         **keys: Outcomes and userdata keys of any state.
     """
 
@@ -52,7 +52,7 @@ class WaitForSignal(FrameworkState):
         ]
 
     def execute(self, userdata: Any) -> str:
-        """Waits for a signal that was not read yet."""
+        """Waits for an unread signal."""
         topic = rospy.resolve_name(self._topic)
         if self._timeout_s is not None and not self._is_published():
             limit_s = start_timeout()
@@ -63,20 +63,22 @@ class WaitForSignal(FrameworkState):
                 return self._is_published()
 
             if not self.wait_until(is_published, limit_s):
-                return self.fail(f"no node publishes topic '{topic}' after {limit_s:g} s, start the one that does")
+                return self.fail(f"no node publishes topic '{topic}' after {limit_s:g} s; start its publisher")
         if not self.wait_until(lambda: self._signal is not None, self._timeout_s):
             publishers = self._subscribers[0].get_num_connections()
             return self.fail(
                 f"no signal came on topic '{topic}' within {self._timeout_s} s; "
-                f"the log of its {publishers} publishers says what they wait for"
+                f"the logs of its {publishers} publishers give the reason"
             )
         with self._lock:
             signal, self._signal = self._signal, None
         try:
             renew = rospy.resolve_name(f"{self._topic}/renew")
             if rosservice.get_service_uri(renew) is not None:
-                answer = call_service(rospy.ServiceProxy(renew, Trigger), TriggerRequest(), self._timeout_s or math.inf)
-                signal, self._explanation = answer.success, answer.message
+                response = call_service(
+                    rospy.ServiceProxy(renew, Trigger), TriggerRequest(), self._timeout_s or math.inf
+                )
+                signal, self._explanation = response.success, response.message
         except (CallError, rosservice.ROSServiceException) as error:
             return self.fail(str(error))
         if signal:

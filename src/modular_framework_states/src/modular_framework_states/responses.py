@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The outcome and the userdata that a task derives from the answer of a service or action."""
+"""Maps the response of a service, or the result of an action, to the outcome and userdata of a state."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ KeptFields = Annotated[Mapping[str, str], OutputKeys()]
 
 
 @dataclass(frozen=True, slots=True)
-class AnswerRules:
-    """Rules that map an answer to an outcome and userdata.
+class ResponseRules:
+    """Rules that map a response to an outcome and userdata.
 
     Attributes:
-        outcome_field: Field that decides about the outcome; empty when none does.
-        outcome_values: Outcome to the value of the field, or a list of values, that stands for it.
-        keep: Userdata key to the field that it receives.
+        outcome_field: Field that selects the outcome; empty for none.
+        outcome_values: Outcome to the value, or list of values, of that field.
+        keep: Userdata key to the response field stored there.
     """
 
     outcome_field: str = ""
@@ -37,11 +37,17 @@ class AnswerRules:
         outcome_field: str,
         outcome_values: Mapping[str, Any] | None,
         keep: Mapping[str, str] | None,
-    ) -> AnswerRules:
-        """Returns the rules that the options of a state give.
+    ) -> ResponseRules:
+        """Returns the rules given by the options of a state.
+
+        Args:
+            state: State with the outcomes and output keys.
+            outcome_field: Option of the state.
+            outcome_values: Option of the state.
+            keep: Option of the state.
 
         Raises:
-            ValueError: The state does not declare an outcome or a key, or values are given without a field.
+            ValueError: The state does not declare an outcome or a key, or `outcome_values` lacks an `outcome_field`.
         """
         rules = cls(outcome_field, dict(outcome_values or {}), dict(keep or {}))
         name, output_keys = type(state).__name__, state.get_registered_output_keys()
@@ -55,16 +61,20 @@ class AnswerRules:
             raise ValueError(f"{name}: keep writes {missing}; its output keys are {sorted(output_keys)}; add them")
         return rules
 
-    def outcome(self, answer: Any, outcomes: Sequence[str]) -> str:
-        """Returns the outcome that the answer's field stands for.
+    def outcome(self, response: Any, outcomes: Sequence[str]) -> str:
+        """Returns the outcome selected by the response.
 
-        Without ``outcome_values`` a true value stands for the first outcome and a false one for the last, a whole
-        number for the outcome with that number, from 0, and a text for the outcome of that name.
+        Without ``outcome_values``, true selects the first outcome, false the last, an integer the outcome at that
+        index, and a string the outcome with that name.
+
+        Args:
+            response: Response message.
+            outcomes: Outcomes of the state.
 
         Raises:
-            FillingError: The field is not there, or its value stands for no outcome.
+            FillingError: The field does not exist, or its value selects no outcome.
         """
-        value = field_at(answer, self.outcome_field)
+        value = field_at(response, self.outcome_field)
         if self.outcome_values:
             for name, wanted in self.outcome_values.items():
                 if value in (wanted if isinstance(wanted, list | tuple) else [wanted]):
@@ -80,49 +90,49 @@ class AnswerRules:
             case str() if value in outcomes:
                 return value
         raise FillingError(
-            f"{self.outcome_field} is {value!r}, which stands for no outcome; allowed are a truth "
-            f"value, 0 to {len(outcomes) - 1}, or one of {', '.join(outcomes)}; say others in "
+            f"{self.outcome_field} is {value!r}, which selects no outcome; expected a boolean, an index from "
+            f"0 to {len(outcomes) - 1}, or one of {', '.join(outcomes)}; map other values with "
             "outcome_values"
         )
 
-    def kept(self, answer: Any) -> dict[str, Any]:
-        """Returns the userdata that fields of the answer give.
+    def kept(self, response: Any) -> dict[str, Any]:
+        """Returns the userdata taken from fields of the response.
 
         Raises:
-            FillingError: A field is not there.
+            FillingError: A field does not exist.
         """
-        return {key: field_at(answer, path) for key, path in self.keep.items()}
+        return {key: field_at(response, path) for key, path in self.keep.items()}
 
 
-def end_with(
+def end_by_response(
     state: FrameworkState,
-    rules: AnswerRules,
-    answer: Any,
+    rules: ResponseRules,
+    response: Any,
     userdata: Any,
     what: str,
-    reason_given: str,
+    stated_reason: str,
     aborted: bool = False,
 ) -> str:
-    """Ends a state by an answer: keeps its fields and returns the outcome.
+    """Ends a state by a response: stores fields in userdata and returns the outcome.
 
     Args:
-        state: The state.
-        rules: How the outcome follows from it.
-        answer: The answer.
-        userdata: Where fields are kept.
-        what: What answered, for reasons.
-        reason_given: Reason in the answer.
-        aborted: Whether what answered calls it a failure, which the first outcome cannot be then.
+        state: State to end.
+        rules: Rules for the outcome and userdata.
+        response: Response message.
+        userdata: Userdata of the state.
+        what: Description of the service or action, for reasons.
+        stated_reason: Reason in the response.
+        aborted: Whether the action was aborted, which excludes the first outcome.
     """
     try:
-        outcome = rules.outcome(answer, state.outcomes) if rules.outcome_field else state.outcomes[0]
+        outcome = rules.outcome(response, state.outcomes) if rules.outcome_field else state.outcomes[0]
         if aborted and outcome == state.outcomes[0]:
             return state.fail(f"{what}; its {rules.outcome_field} says '{outcome}'")
-        for key, value in rules.kept(answer).items():
+        for key, value in rules.kept(response).items():
             userdata[key] = value
     except FillingError as error:
         return state.fail(f"{what}: {error}")
     if outcome == state.outcomes[0]:
         return state.succeed()
-    reason = f"{what}: its {rules.outcome_field} is {field_at(answer, rules.outcome_field)!r}: {reason_given}"
+    reason = f"{what}: its {rules.outcome_field} is {field_at(response, rules.outcome_field)!r}: {stated_reason}"
     return state.end(outcome, reason)
