@@ -77,7 +77,7 @@ def source(monkeypatch: pytest.MonkeyPatch) -> CloudSource:
     monkeypatch.setattr(rospy, "Subscriber", CameraFake)
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
     monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time.from_sec(NOW_S))
-    monkeypatch.setattr(ros_cloud_source, "STANDSTILL_S", 5.0)
+    monkeypatch.setattr(ros_cloud_source, "MAX_REAL_WAIT_S", 5.0)
     return CloudSource()
 
 

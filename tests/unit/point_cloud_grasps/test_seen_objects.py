@@ -41,7 +41,7 @@ def test_each_thing_in_the_crop_box_is_an_object_that_reaches_down_to_the_table(
 
 def test_an_empty_table_and_no_table_are_told_apart() -> None:
     with pytest.raises(
-        NoCandidatesError, match="nothing of at least 20 points and 6 mm stands on the plane at 0.840 m"
+        NoCandidatesError, match="no cluster of at least 20 points and 6 mm height is on the plane at 0.840 m"
     ):
         seen_objects(seen([TABLE]), CROP, CloudSettings(), seed=1)
     with pytest.raises(NoCandidatesError, match="no level plane in the crop box"):

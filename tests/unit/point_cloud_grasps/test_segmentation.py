@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from point_cloud_grasps.segmentation import clusters, find_support, has_neighbours, point_spacing, thinned
+from point_cloud_grasps.segmentation import cluster_labels, downsampled, find_support, has_neighbours, point_spacing
 
 GENERATOR = np.random.default_rng(1)
 
@@ -44,10 +44,10 @@ def test_the_seed_decides_which_plane_is_found() -> None:
 
 def test_clusters_are_what_no_gap_divides() -> None:
     points = np.vstack([grid(0.04), grid(0.04) + [0.06, 0.0, 0.0], grid(0.04) + [0.0, 0.0, 0.1]])
-    labels = clusters(points, 0.01)
+    labels = cluster_labels(points, 0.01)
     assert [len(set(labels[start : start + 100])) for start in (0, 100, 200)] == [1, 1, 1]
     assert len(set(labels)) == 3
-    assert len(set(clusters(points, 0.03))) == 2
+    assert len(set(cluster_labels(points, 0.03))) == 2
 
 
 def test_a_point_alone_has_no_neighbours_and_the_others_have() -> None:
@@ -58,7 +58,7 @@ def test_a_point_alone_has_no_neighbours_and_the_others_have() -> None:
 
 def test_points_are_thinned_to_one_in_a_cube_at_their_middle() -> None:
     points = np.array([[0.0002, 0.0, 0.0], [0.0012, 0.001, 0.0], [0.0042, 0.0, 0.0]])
-    assert sorted(thinned(points).tolist()) == [
+    assert sorted(downsampled(points).tolist()) == [
         [pytest.approx(0.0007), pytest.approx(0.0005), 0.0],
         [pytest.approx(0.0042), 0.0, 0.0],
     ]

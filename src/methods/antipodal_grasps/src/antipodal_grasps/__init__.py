@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A method that generates grasps: antipodal pairs of contacts, with the hand from above, inclined or from the side."""
+"""A grasp generator for antipodal contact pairs, approached from above, at an incline or from the side."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds and ranks antipodal grasps: two fingers close on opposite sides, the hand comes from above, inclined or level.
+"""Generates and ranks antipodal grasps of a two-finger gripper that approaches from above, inclined or level.
 
-Pairs of contacts come from lines through the object (:mod:`contact_pairs`); what the hand does with each is that of
-every method which begins with pairs, :mod:`modular_framework_core.grasp_generation.pair_grasps`.
+Contact pairs are found by ray casting (:mod:`contact_pairs`); the hand poses at each pair come from
+:mod:`modular_framework_core.grasp_generation.pair_grasps`, as in all methods based on contact pairs.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from modular_framework_core.grasp_generation.pair_grasps import PairGrasp, PairG
 
 @dataclass(frozen=True, slots=True)
 class AntipodalSettings(PairGraspSettings):
-    """What counts as usable, how much is tried, and how grasps are ranked.
+    """Feasibility limits, search effort and ranking of grasps.
 
     Attributes:
-        pairs: How pairs of contacts are found.
+        pairs: Settings of the contact pairs.
     """
 
     pairs: PairSettings = field(default_factory=PairSettings)
 
 
 def antipodal_grasps(query: GraspQuery, settings: AntipodalSettings) -> list[PairGrasp]:
-    """Finds the grasps of an object; the same query gives the same grasps.
+    """Returns the grasps of an object; deterministic for a given query.
 
     Args:
-        query: The object, what stands around it, and the hand.
-        settings: What counts as usable.
+        query: Object, surroundings and hand.
+        settings: Feasibility limits.
 
     Returns:
-        Usable grasps in the order in which their reachability should be checked.
+        Feasible grasps in the order in which their reachability should be checked.
     """
     generator = np.random.default_rng(query.seed)
     widest = settings.widest(query.gripper)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds pairs of contacts at which two fingers can hold an object: each in the friction cone of its surface."""
+"""Finds antipodal contact pairs, in which each contact is in the friction cone of the other's surface."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from antipodal_grasps.ray_casting import Crossing, lines_through
+from antipodal_grasps.ray_casting import Crossing, line_crossings
 from modular_framework_core.grasp_generation import solid_meshes
 from modular_framework_core.grasp_generation.contact_pair import ContactPair, PairRules, distinct_pairs
 from modular_framework_urdf.mesh_reader import TriangleMesh
@@ -18,17 +18,17 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 Array = npt.NDArray[np.float64]
 
 ALIGNMENT_DIGITS = 3
-SAME_PLACE_M = 1e-5
-"""Crossings that are nearer to each other than this are at the same place."""
+SAME_POSITION_M = 1e-5
+"""Maximum distance between crossings at the same position."""
 
 
 @dataclass(frozen=True, slots=True)
 class PairSettings(PairRules):
-    """What counts as a pair of contacts, and how many are looked for.
+    """Feasibility limits of a contact pair, and search effort.
 
     Attributes:
-        surface_samples: Points of the surface from which lines are cast.
-        lines_per_sample: Lines from each point: one along the normal, the others within the friction cone.
+        surface_samples: Number of surface points from which rays are cast.
+        lines_per_sample: Number of rays from each point: one along the normal, the others in the friction cone.
     """
 
     surface_samples: int = 300
@@ -42,20 +42,20 @@ def contact_pairs(
     settings: PairSettings,
     generator: np.random.Generator,
 ) -> list[ContactPair]:
-    """Finds pairs of contacts of an object.
+    """Returns contact pairs of an object.
 
-    Lines go inwards from points of its surface, and in the same directions through its centre of mass. Wherever one
-    enters the object from free space and wherever it then leaves it, is a pair: of a mug, both the wall and the whole.
+    Rays are cast inwards from surface points, and in the same directions through the centre of mass. Each entry into
+    the object from free space forms a pair with each following exit: on a mug, both the wall and the whole body.
 
     Args:
         solids: Closed parts of the object.
-        centroid: (3,) its centre of mass [m].
-        max_width: Greatest distance of the contacts [m].
-        settings: What counts as a pair.
-        generator: Source of all random choices.
+        centroid: Centre of mass, shape (3,) [m].
+        max_width: Maximum distance between the contacts [m].
+        settings: Feasibility limits of a pair.
+        generator: Random number generator.
 
     Returns:
-        The pairs, best aligned first, and of those equally aligned the most central first.
+        The pairs in order of alignment, equally aligned pairs in order of their distance from the centre of mass.
     """
     mesh = solid_meshes.joined(solids)
     points, normals = _samples(mesh, settings.surface_samples, generator)
@@ -65,8 +65,10 @@ def contact_pairs(
     origins = np.concatenate([np.tile(points, (settings.lines_per_sample, 1)), np.tile(centroid, (len(points), 1))])
     directions = np.concatenate([directions, -normals])
     found = []
-    for origin, direction, crossings in zip(origins, directions, lines_through(mesh, origins, directions), strict=True):
-        for entry, end in _passages(crossings):
+    for origin, direction, crossings in zip(
+        origins, directions, line_crossings(mesh, origins, directions), strict=True
+    ):
+        for entry, end in _inside_intervals(crossings):
             alignment = min(float(-entry.normal @ direction), float(end.normal @ direction))
             if end.distance - entry.distance <= max_width and alignment >= settings.cone_cosine:
                 ends = (origin + entry.distance * direction, origin + end.distance * direction)
@@ -76,7 +78,7 @@ def contact_pairs(
 
 
 def _samples(mesh: TriangleMesh, count: int, generator: np.random.Generator) -> tuple[Array, Array]:
-    """Returns random points of the surface and its normals there, both (n, 3)."""
+    """Returns random surface points and the surface normals there, both of shape (n, 3)."""
     import trimesh  # slow to load
 
     drawn = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
@@ -85,23 +87,23 @@ def _samples(mesh: TriangleMesh, count: int, generator: np.random.Generator) -> 
 
 
 def _in_cone(axes: Array, friction: float, generator: np.random.Generator) -> Array:
-    """Returns unit vectors (n, 3) spread evenly over the cones around these (n, 3)."""
+    """Returns unit vectors sampled uniformly from the cones around the axes, both of shape (n, 3)."""
     radius = friction * np.sqrt(generator.random(len(axes)))
     angle = 2 * math.pi * generator.random(len(axes))
     helper = np.where(np.abs(axes[:, :1]) < 0.8, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    one = np.cross(axes, helper)
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
-    other = np.cross(axes, one)
-    tilted = axes + radius[:, None] * (np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * other)
+    first_axis = np.cross(axes, helper)
+    first_axis /= np.linalg.norm(first_axis, axis=1, keepdims=True)
+    second_axis = np.cross(axes, first_axis)
+    tilted = axes + radius[:, None] * (np.cos(angle)[:, None] * first_axis + np.sin(angle)[:, None] * second_axis)
     return tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
 
 
-def _passages(crossings: list[Crossing]) -> list[tuple[Crossing, Crossing]]:
-    """Returns each way into the object from free space with each way out of it behind that.
+def _inside_intervals(crossings: list[Crossing]) -> list[tuple[Crossing, Crossing]]:
+    """Returns each entry into the object from free space with each following exit.
 
-    Empty when the mesh is not closed along the line.
+    Empty if the mesh is not closed along the ray.
     """
-    ordered = sorted(crossings, key=lambda crossing: (round(crossing.distance / SAME_PLACE_M), not crossing.enters))
+    ordered = sorted(crossings, key=lambda crossing: (round(crossing.distance / SAME_POSITION_M), not crossing.enters))
     depth = 0
     entries: list[Crossing] = []
     found: list[tuple[Crossing, Crossing]] = []
@@ -110,5 +112,5 @@ def _passages(crossings: list[Crossing]) -> list[tuple[Crossing, Crossing]]:
             entries.append(crossing)
         depth += 1 if crossing.enters else -1
         if depth == 0:
-            found += [(entry, crossing) for entry in entries if crossing.distance - entry.distance > SAME_PLACE_M]
+            found += [(entry, crossing) for entry in entries if crossing.distance - entry.distance > SAME_POSITION_M]
     return found if depth == 0 else []

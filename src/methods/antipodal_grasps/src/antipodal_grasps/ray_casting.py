@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cuts straight lines with closed meshes, after Moeller and Trumbore (1997)."""
+"""Intersects straight lines with closed meshes, after Moeller and Trumbore (1997)."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from modular_framework_urdf.mesh_reader import TriangleMesh
 
 Array = npt.NDArray[np.float64]
 
-ROUNDING = 1e-9
-"""A line meets no triangle to whose plane it is parallel within this, and goes through one that it passes this near."""
+TOLERANCE = 1e-9
+"""Tolerance for lines parallel to a triangle's plane, and for lines that pass a triangle's edge."""
 BATCH = 2_000_000
-"""Pairs of a line and a triangle that are computed at once."""
+"""Number of line-triangle combinations that are computed at once."""
 
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """Where a line goes through a triangle.
+    """Intersection of a line with a triangle.
 
     Attributes:
-        distance: From the line's origin along its direction [m]; negative behind it.
-        normal: (3,) outward unit normal of the triangle.
-        enters: Whether the line goes into the solid there.
+        distance: Distance from the line's origin along its direction [m]; negative behind the origin.
+        normal: Outward unit normal of the triangle, shape (3,).
+        enters: Whether the line enters the solid.
     """
 
     distance: float
@@ -33,13 +33,13 @@ class Crossing:
     enters: bool
 
 
-def lines_through(mesh: TriangleMesh, origins: Array, directions: Array) -> list[list[Crossing]]:
-    """Returns where each line crosses triangles of a mesh, in order along the line.
+def line_crossings(mesh: TriangleMesh, origins: Array, directions: Array) -> list[list[Crossing]]:
+    """Returns the intersections of each line with a mesh, in order along the line.
 
     Args:
         mesh: Triangles, counter-clockwise seen from outside.
-        origins: (n, 3) a point of each line [m].
-        directions: (n, 3) unit vectors.
+        origins: Point of each line, shape (n, 3) [m].
+        directions: Unit vectors, shape (n, 3).
     """
     corners = mesh.vertices[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -50,7 +50,7 @@ def lines_through(mesh: TriangleMesh, origins: Array, directions: Array) -> list
     batch = max(1, BATCH // max(1, len(corners)))
     for start in range(0, len(origins), batch):
         along = directions[start : start + batch]
-        distances, hits = _cut(corners, normals, origins[start : start + batch], along)
+        distances, hits = _intersect(corners, normals, origins[start : start + batch], along)
         for row in range(len(along)):
             numbers = np.flatnonzero(hits[row])
             numbers = numbers[np.argsort(distances[row, numbers], kind="stable")]
@@ -63,17 +63,19 @@ def lines_through(mesh: TriangleMesh, origins: Array, directions: Array) -> list
     return found
 
 
-def _cut(corners: Array, normals: Array, origins: Array, directions: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Returns distances and whether there is a crossing, both of shape (lines, triangles).
+def _intersect(
+    corners: Array, normals: Array, origins: Array, directions: Array
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Returns the distances and whether there is an intersection, both of shape (lines, triangles).
 
-    Every triple product is one product of matrices: det[o - c, d, e] = e . (o x d) - d . (e x c).
+    Each triple product is computed as a matrix product: det[o - c, d, e] = e . (o x d) - d . (e x c).
     """
     corner, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     facing = directions @ normals.T
-    parallel = np.abs(facing) < ROUNDING * np.linalg.norm(normals, axis=1)
+    parallel = np.abs(facing) < TOLERANCE * np.linalg.norm(normals, axis=1)
     inverse = -1.0 / np.where(parallel, 1.0, facing)
     moments = np.cross(origins, directions)
     u = (moments @ second.T - directions @ np.cross(second, corner).T) * inverse
     v = (directions @ np.cross(first, corner).T - moments @ first.T) * inverse
     distances = (origins @ normals.T - (corner * normals).sum(axis=1)) * inverse
-    return distances, ~parallel & (u >= -ROUNDING) & (v >= -ROUNDING) & (u + v <= 1.0 + ROUNDING)
+    return distances, ~parallel & (u >= -TOLERANCE) & (v >= -TOLERANCE) & (u + v <= 1.0 + TOLERANCE)

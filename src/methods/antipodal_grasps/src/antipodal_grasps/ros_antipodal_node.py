@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node of the method: its parameters, and its grasps in the form that all grasp generators share."""
+"""The ROS node of the method: its parameters, and its grasps as candidates."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from modular_framework_core.grasp_generation.ros_grasp_generator import run_gras
 
 
 class AntipodalMethod(ParameterisedMethod):
-    """Antipodal grasps; the parameters of :func:`read_antipodal_settings` are read again for every object."""
+    """Antipodal grasps; the parameters of :func:`read_antipodal_settings` are read anew for every object."""
 
     manner = "between two opposite sides"
     declared_in = ("antipodal_grasps", "antipodal_grasp_generator")
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
-        """Returns the grasps of an object in the order of :func:`antipodal_grasps`, then with the hand half turned."""
+        """Returns the grasps in the order of :func:`antipodal_grasps`, followed by those with the hand turned by pi."""
         settings = read_antipodal_settings(self.read)
         return candidates_of(antipodal_grasps(query, settings), query.gripper, settings)
 
     def reached_quality(self, candidate: GraspCandidate, joint_travel: float) -> float:
-        """Ranks by the quality of the hold, and by how little the arm moves between the poses of the grasp."""
+        """Returns the grasp quality combined with the joint travel between the poses of the grasp."""
         return quality_with_travel(candidate.quality, joint_travel)
 
 
@@ -34,7 +34,7 @@ def read_antipodal_settings(read: ReadNumber) -> AntipodalSettings:
     """Reads the parameters of the method.
 
     Args:
-        read: Reads a parameter.
+        read: Function that reads a parameter.
     """
     pairs = PairSettings(
         surface_samples=int(read("~surface_samples")),
@@ -46,5 +46,5 @@ def read_antipodal_settings(read: ReadNumber) -> AntipodalSettings:
 
 
 def main() -> int:
-    """Runs the node ``antipodal_grasp_generator``; returns 1 when something it needs is missing."""
+    """Runs the node ``antipodal_grasp_generator``; returns 1 if a requirement is missing."""
     return run_grasp_generator("antipodal_grasp_generator", AntipodalMethod())

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A method that generates grasps: antipodal pairs of contacts on what a depth camera sees of an object."""
+"""A grasp generator for antipodal contact pairs on the visible surface in a depth camera's point cloud."""

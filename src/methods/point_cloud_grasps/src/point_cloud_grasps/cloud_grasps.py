@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds and ranks antipodal grasps of an object in a point cloud.
+"""Generates and ranks antipodal grasps of an object in a point cloud.
 
-Of the planning scene only the name, the place and the rough size of the object are used: where to look. Its shape is
-what the camera sees there (:mod:`segmentation`, :mod:`seen_shape`). Pairs of contacts are drawn from it
-(:mod:`cloud_pairs`), not deeper below what was seen than the pads are long in half: nobody knows what is there. The
-hand keeps off the other points of the cloud as well as off the objects of the planning scene.
+The planning scene gives only the search region: the name, position and approximate size of the object. Its shape comes
+from the cloud (:mod:`segmentation`, :mod:`seen_shape`). Contact pairs are sampled from that shape (:mod:`cloud_pairs`),
+at most half a pad height below the visible surface, since the shape further below is unknown. The hand avoids the other
+points of the cloud as well as the objects of the planning scene.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ from point_cloud_grasps.cloud_pairs import CloudPairSettings, sample_pairs
 from point_cloud_grasps.seen_shape import SeenShape, completed_shape
 from point_cloud_grasps.segmentation import (
     SupportPlane,
-    clusters,
+    cluster_labels,
+    downsampled,
     find_support,
     has_neighbours,
     point_spacing,
-    thinned,
 )
 
 Array = npt.NDArray[np.float64]
 
 SUPPORT_SEARCH_M = 0.03
-"""What the object stands on is looked for this far above and below where the planning scene says it is."""
-GAP_SPACINGS, LEAST_GAP_M = 2.5, 0.008
-"""Of two things the points are farther apart than this."""
+"""Range above and below the planning scene's support height in which the support is searched."""
+GAP_SPACINGS, MIN_GAP_M = 2.5, 0.008
+"""Minimum gap between the points of two objects."""
 OBSTACLE_CELL_M = 0.01
-FEWEST_POINTS = 6
+MIN_POINTS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class CloudSettings(PairGraspSettings):
-    """What counts as usable, how much is tried, and how grasps are ranked.
+    """Feasibility limits, search effort and ranking of grasps.
 
     Attributes:
-        pairs: How pairs of contacts are found.
-        region_padding_m: The object is looked for this far around where the planning scene has it [m].
-        min_height_m: Points less than this above the support belong to it [m].
+        pairs: Settings of the contact pairs.
+        region_padding_m: Padding of the object's bounding box in the planning scene, for the search region [m].
+        min_height_m: Maximum height above the support at which points belong to the support [m].
     """
 
     pairs: CloudPairSettings = field(default_factory=CloudPairSettings)
@@ -61,58 +61,58 @@ class CloudSettings(PairGraspSettings):
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A box along the axes of the planning frame.
+    """An axis-aligned box in the planning frame.
 
     Attributes:
-        low: (3,) smallest x, y, z [m].
-        high: (3,) greatest [m].
+        low: Minimum corner, shape (3,) [m].
+        high: Maximum corner, shape (3,) [m].
     """
 
     low: Array
     high: Array
 
     def padded(self, margin: float) -> Region:
-        """Returns the region with so much more on each side [m]."""
+        """Returns the region extended by a margin on each side [m]."""
         return Region(self.low - margin, self.high + margin)
 
-    def hold(self, points: Array) -> npt.NDArray[np.bool_]:
-        """Returns which points (n, 3) are inside."""
+    def contains(self, points: Array) -> npt.NDArray[np.bool_]:
+        """Returns whether each of the points, shape (n, 3), is inside."""
         return np.asarray(((points >= self.low) & (points <= self.high)).all(axis=1))
 
 
-def gap_between_things(spacing: float) -> float:
-    """Returns the gap between points beyond which they are of two things [m], if a thing's are so far apart [m]."""
-    return max(LEAST_GAP_M, GAP_SPACINGS * spacing)
+def cluster_gap(spacing: float) -> float:
+    """Returns the minimum gap between two objects [m] for a point spacing [m]."""
+    return max(MIN_GAP_M, GAP_SPACINGS * spacing)
 
 
-def region_of(target: SceneObject, settings: CloudSettings) -> Region:
-    """Returns where the points of an object may be."""
+def object_region(target: SceneObject, settings: CloudSettings) -> Region:
+    """Returns the region in which the points of an object are searched."""
     points = target.surface.points
     return Region(points.min(axis=0), points.max(axis=0)).padded(settings.region_padding_m)
 
 
-def surroundings_of(query: GraspQuery, settings: CloudSettings) -> Region:
-    """Returns where points matter: around the object as far as the hand reaches that comes to it."""
+def relevant_region(query: GraspQuery, settings: CloudSettings) -> Region:
+    """Returns the region of the relevant points: the object's region, extended by the reach of the approaching hand."""
     hand = max(float(np.linalg.norm(part.corners.reshape(-1, 3), axis=1).max()) for part in query.gripper.parts)
-    return region_of(query.target, settings).padded(hand + settings.hand.approach_distance_m)
+    return object_region(query.target, settings).padded(hand + settings.hand.approach_distance_m)
 
 
 def cloud_grasps(query: GraspQuery, points: Array, settings: CloudSettings) -> list[PairGrasp]:
-    """Finds the grasps of an object; the same query and points give the same grasps.
+    """Returns the grasps of an object; deterministic for given points and query.
 
     Args:
-        query: The object and where it is, what is known to stand around it, and the hand.
-        points: (n, 3) what the camera sees in the planning frame, none of them on the robot [m].
-        settings: What counts as usable.
+        query: Object with its position, known surroundings, and hand.
+        points: Points seen by the camera in the planning frame without those on the robot, shape (n, 3) [m].
+        settings: Feasibility limits.
 
     Returns:
-        Usable grasps in the order in which their reachability should be checked.
+        Feasible grasps in the order in which their reachability should be checked.
 
     Raises:
-        NoCandidatesError: There are none; the text says why.
+        NoCandidatesError: The object has no feasible grasp; the message gives the reason.
     """
     generator = np.random.default_rng(query.seed)
-    points = thinned(points[surroundings_of(query, settings).hold(points)])
+    points = downsampled(points[relevant_region(query, settings).contains(points)])
     support = _support(query, points, generator)
     points = points[support.heights(points) > settings.min_height_m]
     points, spacing = _surface_points(query, points, settings)
@@ -128,49 +128,49 @@ def cloud_grasps(query: GraspQuery, points: Array, settings: CloudSettings) -> l
     grasps = grasps_on_pairs(pairs, seen_query, settings)
     if not grasps:
         raise NoCandidatesError(
-            f"{len(pairs)} pairs of contacts fit the gripper, but in none of the directions tried does the hand come "
-            "to one without touching the object, the support, other points of the cloud or objects of the scene"
+            f"{len(pairs)} contact pairs fit the gripper, but in no approach direction does the hand reach one without "
+            "contact with the object, the support, other points of the cloud or objects of the scene"
         )
     return grasps
 
 
 def _support(query: GraspQuery, points: Array, generator: np.random.Generator) -> SupportPlane:
-    """Returns what the object stands on: as it is seen, or where it is said to be if nothing of it is seen."""
+    """Returns the support plane in the cloud; if it is not visible, the support of the planning scene."""
     around = points[np.abs(points[:, 2] - query.support_z) <= SUPPORT_SEARCH_M]
     return find_support(around, generator) or SupportPlane(np.array([0.0, 0.0, 1.0]), query.support_z)
 
 
 def _surface_points(query: GraspQuery, points: Array, settings: CloudSettings) -> tuple[Array, float]:
-    """Returns the points above the support without those that are alone, and how far those of the object are apart [m].
+    """Returns the points above the support without isolated ones, and the point spacing on the object [m].
 
     Raises:
-        NoCandidatesError: There are too few on the object.
+        NoCandidatesError: The object has too few points.
     """
-    region = region_of(query.target, settings)
-    spacing = point_spacing(points[region.hold(points)])
+    region = object_region(query.target, settings)
+    spacing = point_spacing(points[region.contains(points)])
     points = points[has_neighbours(points, spacing)] if len(points) else points
-    found = int(region.hold(points).sum())
-    if found < FEWEST_POINTS:
+    found = int(region.contains(points).sum())
+    if found < MIN_POINTS:
         low, high = (", ".join(f"{value:.3f}" for value in end) for end in (region.low, region.high))
         raise NoCandidatesError(
-            f"the cloud has {found} points on '{query.target.name}', at least {FEWEST_POINTS} are needed, more than "
-            f"{settings.min_height_m * 1000:.0f} mm above what it stands on and off the robot, between ({low}) and "
-            f"({high}) m; is it in view of the camera, and nothing in front of it?"
+            f"the cloud has {found} points on '{query.target.name}', at least {MIN_POINTS} are needed, more than "
+            f"{settings.min_height_m * 1000:.0f} mm above its support and off the robot, between ({low}) and "
+            f"({high}) m; is the object in view of the camera and not occluded?"
         )
     return points, spacing
 
 
 def _own_points(query: GraspQuery, points: Array, spacing: float, settings: CloudSettings) -> npt.NDArray[np.bool_]:
-    """Returns which points above the support are those of the object.
+    """Returns whether each point above the support belongs to the object.
 
-    They are those in its region; without the clusters that reach into it from outside, unless nothing else is left,
-    as where the object touches something larger.
+    These are the points in the object's region, without clusters that extend mostly outside. If too few points remain,
+    as for an object in contact with a larger one, all points in the region are returned.
     """
-    inside = region_of(query.target, settings).hold(points)
-    labels = clusters(points[:, :2], gap_between_things(spacing))
-    shares = np.bincount(labels, weights=inside) / np.bincount(labels)
-    own = inside & (shares[labels] > 0.5)
-    return own if own.sum() >= FEWEST_POINTS else inside
+    inside = object_region(query.target, settings).contains(points)
+    labels = cluster_labels(points[:, :2], cluster_gap(spacing))
+    inside_fractions = np.bincount(labels, weights=inside) / np.bincount(labels)
+    own = inside & (inside_fractions[labels] > 0.5)
+    return own if own.sum() >= MIN_POINTS else inside
 
 
 def _pairs(
@@ -185,21 +185,21 @@ def _pairs(
     if found.pairs:
         return found.pairs
     opening = (
-        f"the gripper opens to {gripper.max_opening * 1000:.0f} mm, of which {widest * 1000:.0f} mm are free with "
-        f"{settings.hand.min_finger_clearance_m * 1000:.0f} mm of room on each side"
+        f"the gripper opens to {gripper.max_opening * 1000:.0f} mm, of which {widest * 1000:.0f} mm remain with a "
+        f"clearance of {settings.hand.min_finger_clearance_m * 1000:.0f} mm on each side"
     )
     if math.isinf(found.narrowest_m):
         raise NoCandidatesError(
-            f"of {int(known.sum())} contacts that were seen no two face each other within the friction cone of "
+            f"none of {int(known.sum())} visible contacts face each other within the friction cone of "
             f"{settings.pairs.friction:g}; {opening}"
         )
     raise NoCandidatesError(
-        f"no pair of contacts fits: the narrowest is {found.narrowest_m * 1000:.0f} mm wide, and {opening}"
+        f"no contact pair fits: the narrowest is {found.narrowest_m * 1000:.0f} mm wide, and {opening}"
     )
 
 
 def _columns(points: Array, support_z: float) -> SceneObject | None:
-    """Returns what else was seen as square columns that stand on the support; None if there is nothing else."""
+    """Returns the other visible points as square columns on the support; None without other points."""
     if not len(points):
         return None
     cells = np.floor(points[:, :2] / OBSTACLE_CELL_M).astype(np.int64)

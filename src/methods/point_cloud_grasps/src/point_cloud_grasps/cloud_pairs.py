@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Samples pairs of contacts on points with normals: both in the friction cone, no wider than the gripper opens."""
+"""Samples antipodal contact pairs from points with normals, no wider than the gripper's opening."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from modular_framework_core.grasp_generation.contact_pair import ContactPair, Pa
 
 Array = npt.NDArray[np.float64]
 
-NARROWEST_M = 1e-3
-"""Contacts that are nearer than this are not on two sides."""
+MIN_WIDTH_M = 1e-3
+"""Minimum width of a pair; closer contacts are not on opposite sides."""
 
 
 @dataclass(frozen=True, slots=True)
 class CloudPairSettings(PairRules):
-    """What counts as a pair of contacts, and how many are looked for.
+    """Feasibility limits of a contact pair, and search effort.
 
     Attributes:
-        contact_samples: Contacts that are drawn; all pairs of them are looked at.
-        max_pairs: Greatest number of pairs that are kept, the best aligned and most central ones.
+        contact_samples: Number of sampled contacts, of which all pairs are evaluated.
+        max_pairs: Maximum number of kept pairs, ranked by alignment and distance from the centre.
     """
 
     contact_samples: int = 800
@@ -32,12 +32,11 @@ class CloudPairSettings(PairRules):
 
 @dataclass(frozen=True, slots=True)
 class FoundPairs:
-    """Pairs of contacts.
+    """Contact pairs.
 
     Attributes:
-        pairs: Those that fit the gripper, best first.
-        narrowest_m: Least distance of two contacts in each other's friction cone, fitting or not [m]; inf: there are
-            none.
+        pairs: Pairs that fit the gripper, best first.
+        narrowest_m: Minimum width of all pairs in the friction cone [m]; inf without a pair.
     """
 
     pairs: list[ContactPair]
@@ -52,22 +51,22 @@ def sample_pairs(
     settings: CloudPairSettings,
     generator: np.random.Generator,
 ) -> FoundPairs:
-    """Draws contacts and returns the pairs among them that two fingers can hold.
+    """Samples contacts and returns the pairs that two fingers can hold.
 
     Args:
-        points: (n, 3) where a pad may touch [m].
-        normals: (n, 3) outward unit normals there.
-        centroid: (3,) centre of mass of the object [m].
-        max_width: Greatest distance of the contacts [m].
-        settings: What counts as a pair.
-        generator: Source of all random choices.
+        points: Possible contacts, shape (n, 3) [m].
+        normals: Outward unit normals at the points, shape (n, 3).
+        centroid: Centre of mass of the object, shape (3,) [m].
+        max_width: Maximum distance between the contacts [m].
+        settings: Feasibility limits of a pair.
+        generator: Random number generator.
     """
     chosen = generator.permutation(len(points))[: settings.contact_samples]
     points, normals = points[chosen], normals[chosen]
     first, second = np.triu_indices(len(points), k=1)
     lines = points[second] - points[first]
     widths = np.linalg.norm(lines, axis=1)
-    apart = widths > NARROWEST_M
+    apart = widths > MIN_WIDTH_M
     first, second, widths = first[apart], second[apart], widths[apart]
     lines = lines[apart] / widths[:, None]
     alignments = np.minimum(-(normals[first] * lines).sum(axis=1), (normals[second] * lines).sum(axis=1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the points that lie on the robot, from the collision shapes of its description and the poses of its links."""
+"""Finds the points on the robot from its collision shapes and link poses."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Mask = npt.NDArray[np.bool_]
 
 
 class RobotBodies:
-    """The collision shapes of a robot as convex bodies; a mesh counts as its convex hull.
+    """The collision shapes of a robot as convex bodies; meshes are replaced by their convex hulls.
 
     Args:
-        urdf: Text of the robot description; empty for no robot.
+        urdf: Robot description; empty for no robot.
 
     Attributes:
-        links: Links that have shapes.
-        faults: One sentence for each shape that cannot be used, and is not seen as part of the robot.
+        links: Names of the links with collision shapes.
+        faults: Errors of invalid shapes, whose points are not recognised as part of the robot.
     """
 
     def __init__(self, urdf: str) -> None:
@@ -45,12 +45,12 @@ class RobotBodies:
         self.links = tuple(self._bodies)
 
     def hide(self, points: Array, poses: Mapping[str, Array], padding: float) -> Mask:
-        """Returns which points (n, 3) [m] are on or in a link, or nearer to one than the padding [m].
+        """Returns whether each point is in a link or closer to it than the padding.
 
         Args:
-            points: In any frame.
-            poses: (4, 4) transforms from the links to that frame; links without one are passed over.
-            padding: By how much each face of a shape is moved outwards [m].
+            points: Points in any frame, shape (n, 3) [m].
+            poses: Transforms from the links to that frame, shape (4, 4); links without a transform are ignored.
+            padding: Outward offset of each face of a shape [m].
         """
         hidden = np.zeros(len(points), dtype=bool)
         for link, pose in poses.items():

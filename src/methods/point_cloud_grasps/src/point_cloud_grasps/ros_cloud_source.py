@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Takes one point cloud from a camera when it is needed, with the transforms of its time."""
+"""Receives one point cloud from a camera on demand, with the transforms at its time."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from point_cloud_grasps.ros_transforms import Transforms
 Array = npt.NDArray[np.float64]
 
 TRANSFORM_TIMEOUT_S = 5.0
-"""Longest wait for the transforms of a cloud's time [s of real time]; a fault ends it, also on a busy machine."""
-STANDSTILL_S = 300.0
-"""Longest wait for a cloud in real time [s], for a world that is paused, or whose time is held while a camera draws."""
+"""Maximum wait for the transforms at a cloud's time [s of real time]; only a failure takes as long."""
+MAX_REAL_WAIT_S = 300.0
+"""Maximum wait for a cloud [s of real time], for a paused world or time held during rendering."""
 WARNING_PERIOD_S = 30.0
 BUFFER_BYTES = 1 << 25
 
 
 @dataclass(frozen=True, slots=True)
 class SeenCloud:
-    """What a camera saw.
+    """A point cloud in the planning frame.
 
     Attributes:
-        points: (n, 3) in the planning frame, all finite [m].
-        stamp: When.
-        frame: The camera's frame.
+        points: Finite points in the planning frame, shape (n, 3) [m].
+        stamp: Time stamp of the message.
+        frame: Frame of the camera.
     """
 
     points: Array
@@ -45,30 +45,30 @@ class SeenCloud:
 
 
 class CloudSource:
-    """Takes point clouds; subscribes to the camera only while it waits for one, since a camera draws for subscribers.
+    """Receives point clouds; subscribes to the camera only while waiting, since a camera renders only for subscribers.
 
-    Subscribers: the topic of the cloud (sensor_msgs/PointCloud2); those of :class:`Transforms` all the time.
+    Subscribers: topic of the cloud (sensor_msgs/PointCloud2); those of :class:`Transforms` permanently.
     """
 
     def __init__(self) -> None:
-        """Connects to nothing yet, see :meth:`connect`."""
+        """Creates the source without any subscription, see :meth:`connect`."""
         self._transforms = Transforms()
         self._time = SimulatedTime()
 
     def connect(self) -> None:
-        """Starts to listen to TF."""
+        """Subscribes to TF."""
         self._transforms.connect()
 
     def take(self, topic: str, frame: str, timeout_s: float) -> SeenCloud:
-        """Waits for a cloud that is not older than this call, and brings it to a frame.
+        """Waits for a cloud that is not older than this call, and transforms it to a frame.
 
         Args:
             topic: Topic of the cloud.
-            frame: Frame of the result.
-            timeout_s: Longest wait [s of the ROS clock; of real time for a publisher].
+            frame: Target frame.
+            timeout_s: Maximum wait [s of the ROS clock; s of real time without a publisher].
 
         Raises:
-            NoCandidatesError: There is none in time, or it cannot be used; the text says why.
+            NoCandidatesError: No usable cloud arrived in time; the message gives the reason.
         """
         message = self._message(topic, timeout_s)
         where = f"the cloud of topic '{rospy.resolve_name(topic)}'"
@@ -93,7 +93,7 @@ class CloudSource:
         return SeenCloud(points @ transform[:3, :3].T + transform[:3, 3], header.stamp, header.frame_id)
 
     def link_poses(self, links: Sequence[str], frame: str, stamp: rospy.Time) -> dict[str, Array]:
-        """Returns the pose (4, 4) of each link in a frame at a time; a link without one is left out, and logged."""
+        """Returns the pose (4, 4) of each link in a frame at a time; missing links are logged and omitted."""
         stamps = self._stamps(frame, links, stamp)
         if missing := [link for link in links if link not in stamps]:
             rospy.logwarn_throttle(
@@ -101,15 +101,15 @@ class CloudSource:
                 f"{rospy.get_name()}: no transform from {', '.join(missing)} to '{frame}' at {stamp.to_sec():.3f} s; "
                 "points on these links count as obstacles. Is robot_state_publisher running?",
             )
-        return {link: self._transforms.matrix(frame, link, at) for link, at in stamps.items()}
+        return {link: self._transforms.matrix(frame, link, found_stamp) for link, found_stamp in stamps.items()}
 
     def _stamps(self, frame: str, others: Sequence[str], stamp: rospy.Time) -> dict[str, rospy.Time]:
         return self._transforms.stamps(frame, others, stamp, TRANSFORM_TIMEOUT_S)
 
     def _message(self, topic: str, timeout_s: float) -> PointCloud2:
-        """Returns the first message that shows the world as it is now, or later.
+        """Returns the first message that shows the world at the current time or later.
 
-        Where time is held, it is the message of the very time: a later one is of the world before it began again.
+        If time is held, only a message with that exact stamp counts; a later stamp comes from before a world reset.
         """
         held, messages = self._time.now(), list[PointCloud2]()
         begun = held or rospy.Time.now()
@@ -123,17 +123,17 @@ class CloudSource:
         limit, since_s = WaitLimit(), time.monotonic()
 
         def is_over() -> bool:
-            real_s = STANDSTILL_S if subscriber.get_num_connections() else timeout_s
+            real_s = MAX_REAL_WAIT_S if subscriber.get_num_connections() else timeout_s
             return limit.is_exceeded(rospy.get_time(), timeout_s) or time.monotonic() - since_s > real_s
 
         try:
-            wait_until(lambda: bool(messages) or is_over(), STANDSTILL_S)
+            wait_until(lambda: bool(messages) or is_over(), MAX_REAL_WAIT_S)
             if not messages:
                 published = subscriber.get_num_connections()
                 raise NoCandidatesError(
                     f"no point cloud arrived on topic '{subscriber.resolved_name}' within {timeout_s:g} s, "
                     + (
-                        f"from {published} publisher(s); is the camera running and its clock the one of ROS?"
+                        f"from {published} publisher(s); is the camera running, and does it use the ROS clock?"
                         if published
                         else "nobody publishes it; start the camera, or set pointcloud_topic_name in "
                         "sensors_config.yaml"

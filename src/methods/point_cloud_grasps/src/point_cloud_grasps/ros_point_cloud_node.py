@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node of the method: its parameters, its cloud, and its grasps in the form that all grasp generators share."""
+"""The ROS node of the method: its parameters, its point cloud, and its grasps as candidates."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from modular_framework_core.grasp_generation.ros_generator_settings import (
     read_pair_grasps,
 )
 from modular_framework_core.grasp_generation.ros_grasp_generator import run_grasp_generator
-from point_cloud_grasps.cloud_grasps import CloudSettings, Region, cloud_grasps, surroundings_of
+from point_cloud_grasps.cloud_grasps import CloudSettings, Region, cloud_grasps, relevant_region
 from point_cloud_grasps.cloud_pairs import CloudPairSettings
 from point_cloud_grasps.robot_bodies import RobotBodies
 from point_cloud_grasps.ros_cloud_source import CloudSource
-from point_cloud_grasps.seen_objects import region_of_crop, seen_objects
+from point_cloud_grasps.seen_objects import crop_region, seen_objects
 
 Array = npt.NDArray[np.float64]
 
@@ -34,10 +34,10 @@ TOPIC_PARAMETERS = ("~point_cloud_topic", "pointcloud_topic_name")
 
 
 class PointCloudMethod(ParameterisedMethod):
-    """Antipodal grasps on a point cloud, of which a new one is taken for every object.
+    """Antipodal grasps on a point cloud, which is received anew for every object.
 
-    Parameters: those of :func:`read_cloud_settings`, read again for every object; ``~point_cloud_topic`` (empty: what
-        ``pointcloud_topic_name`` says), ``~cloud_timeout`` [s], ``~robot_padding`` [m], ``origin_frame_name``,
+    Parameters: those of :func:`read_cloud_settings`, read anew for every object; ``~point_cloud_topic`` (empty for the
+        topic in ``pointcloud_topic_name``), ``~cloud_timeout`` [s], ``~robot_padding`` [m], ``origin_frame_name``,
         ``robot_description``.
     Subscribers: see :class:`CloudSource`.
     """
@@ -46,24 +46,24 @@ class PointCloudMethod(ParameterisedMethod):
     declared_in = ("point_cloud_grasps", "point_cloud_grasp_generator")
 
     def __init__(self, read: ReadNumber | None = None) -> None:
-        """Connects to nothing yet."""
+        """Creates the method without any subscription."""
         super().__init__(read)
         self._source = CloudSource()
         self._robot: RobotBodies | None = None
 
     def connect(self) -> None:
-        """Starts to listen to TF."""
+        """Subscribes to TF."""
         self._source.connect()
 
     def candidates(self, query: GraspQuery) -> list[GraspCandidate]:
-        """Returns the grasps of an object in the order of :func:`cloud_grasps`, then with the hand half turned.
+        """Returns the grasps in the order of :func:`cloud_grasps`, followed by those with the hand turned by pi.
 
         Raises:
-            NoCandidatesError: There are none; the text says why.
+            NoCandidatesError: The object has no feasible grasp; the message gives the reason.
         """
         settings = read_cloud_settings(self.read)
         begun = time.perf_counter()
-        points = self._points(surroundings_of(query, settings))
+        points = self._points(relevant_region(query, settings))
         taken = time.perf_counter()
         grasps = cloud_grasps(query, points, settings)
         rospy.logdebug(
@@ -73,32 +73,32 @@ class PointCloudMethod(ParameterisedMethod):
         return candidates_of(grasps, query.gripper, settings)
 
     def seen_objects(self, crop: CropBox, seed: int) -> list[SceneObject]:
-        """Returns what stands in the crop box, where the planning scene knows of nothing: see :func:`seen_objects`.
+        """Returns the objects in the crop box for an empty planning scene, see :func:`seen_objects`.
 
         Raises:
-            NoCandidatesError: There is nothing; the text says why.
+            NoCandidatesError: The crop box has no object; the message gives the reason.
         """
-        return seen_objects(self._points(region_of_crop(crop)), crop, read_cloud_settings(self.read), seed)
+        return seen_objects(self._points(crop_region(crop)), crop, read_cloud_settings(self.read), seed)
 
     def _points(self, region: Region) -> Array:
-        """Takes a cloud and returns its points (n, 3) in a region and off the robot, in the planning frame [m]."""
+        """Receives a cloud and returns its points in a region and off the robot, in the planning frame, (n, 3) [m]."""
         if not rospy.core.is_initialized():
-            raise NoCandidatesError("a camera is needed, in a simulation or on a robot; use the mode `task`")
+            raise NoCandidatesError("the method needs a camera, in a simulation or on a robot; use the mode `task`")
         topic = next((name for name in map(_text, TOPIC_PARAMETERS) if name), "")
         if not topic:
             raise NoCandidatesError(
-                f"no topic of a point cloud is known; set parameter '{rospy.resolve_name(TOPIC_PARAMETERS[0])}' in "
+                f"no point cloud topic is set; set parameter '{rospy.resolve_name(TOPIC_PARAMETERS[0])}' in "
                 f"generative_methods_config.yaml, or '{TOPIC_PARAMETERS[1]}' in sensors_config.yaml"
             )
         frame = _text("origin_frame_name") or "world"
         cloud = self._source.take(topic, frame, self.read("~cloud_timeout"))
-        points = cloud.points[region.hold(cloud.points)]
+        points = cloud.points[region.contains(cloud.points)]
         robot = self._robot_bodies()
         poses = self._source.link_poses(robot.links, frame, cloud.stamp)
         return points[~robot.hide(points, poses, self.read("~robot_padding"))]
 
     def reached_quality(self, candidate: GraspCandidate, joint_travel: float) -> float:
-        """Ranks by the quality of the hold, and by how little the arm moves between the poses of the grasp."""
+        """Returns the grasp quality combined with the joint travel between the poses of the grasp."""
         return quality_with_travel(candidate.quality, joint_travel)
 
     def _robot_bodies(self) -> RobotBodies:
@@ -113,7 +113,7 @@ def read_cloud_settings(read: ReadNumber) -> CloudSettings:
     """Reads the parameters of the method.
 
     Args:
-        read: Reads a parameter.
+        read: Function that reads a parameter.
     """
     pairs = CloudPairSettings(contact_samples=int(read("~contact_samples")), friction=read("~friction"))
     shared = read_pair_grasps(pairs.cone_cosine, read)
@@ -133,5 +133,5 @@ def _text(name: str) -> str:
 
 
 def main() -> int:
-    """Runs the node ``point_cloud_grasp_generator``; returns 1 when something it needs is missing."""
+    """Runs the node ``point_cloud_grasp_generator``; returns 1 if a requirement is missing."""
     return run_grasp_generator("point_cloud_grasp_generator", PointCloudMethod())

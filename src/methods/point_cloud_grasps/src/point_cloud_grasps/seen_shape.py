@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Completes what a camera sees of an object from above to a surface with normals.
+"""Completes the part of an object that a camera sees from above to a surface with normals.
 
-A camera above a table sees the tops of things and little of their sides. What it sees is taken as the upper end of a
-column that reaches down to the support. The columns fill a grid of cells; smoothed with a Gaussian, how full a cell is
-falls from 1 inside to 0 outside. The surface is where it is 1/2, and its normal is against the gradient. This holds
-for any order of the points, needs no view point, and averages noise over the width of the Gaussian.
+A camera above a table sees the tops of objects and little of their sides. Each visible point is taken as the top of a
+column that extends down to the support. The columns fill a grid of cells; after smoothing with a Gaussian, the
+occupancy falls from 1 inside to 0 outside. The surface is at 1/2, and its normal opposes the gradient. The result does
+not depend on the order of the points or the view point, and averages noise over the width of the Gaussian.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ Array = npt.NDArray[np.float64]
 
 CELL_M = 0.002
 MAX_CELLS = 150
-"""Cells along the longest side; larger things have larger cells."""
+"""Number of cells along the longest side, above which the cells are larger."""
 MARGIN = 4
-"""Empty cells around the object, and filled ones below the support, so that the Gaussian sees no border."""
+"""Number of empty cells around the object and filled cells below the support, to avoid border effects."""
 COLUMN_SPACINGS = 0.75
-"""Half the diagonal between points of a square grid, and a little more: columns of this radius leave no holes."""
+"""Column radius: half the diagonal of a square grid of points plus a margin, so that columns leave no holes."""
 SMOOTH_SPACINGS = 1.6
-"""Width of the Gaussian in spacings of the points."""
+"""Standard deviation of the Gaussian."""
 
 
 @dataclass(frozen=True, slots=True)
 class SeenShape:
-    """The surface of an object, as far as it follows from what was seen.
+    """The surface of an object completed from a point cloud.
 
     Attributes:
-        surface: Its points with normals.
-        unseen_m: (n,) how far each point is below what was seen above it [m].
+        surface: Surface points with normals.
+        unseen_m: Depth of each point below the visible surface, shape (n,) [m].
     """
 
     surface: Surface
@@ -48,9 +48,9 @@ def completed_shape(points: Array, spacing: float, support_z: float) -> SeenShap
     """Completes the points of an object down to its support.
 
     Args:
-        points: (n, 3) on its surface in a frame with z upwards, none below the support [m]; n >= 1.
-        spacing: How far neighbouring points are apart [m].
-        support_z: Height of what it stands on [m].
+        points: Surface points in a frame with z upwards, none below the support, shape (n, 3) with n >= 1 [m].
+        spacing: Distance between neighbouring points [m].
+        support_z: Height of the support [m].
     """
     size = max(float(np.ptp(points, axis=0).max()), float(points[:, 2].max()) - support_z)
     cell = max(CELL_M, size / MAX_CELLS)
@@ -73,7 +73,7 @@ def completed_shape(points: Array, spacing: float, support_z: float) -> SeenShap
     clear = steepness > 1e-6
     border, slopes, steepness = border[clear], slopes[clear], steepness[clear]
     normals = -slopes / steepness[:, None]
-    # of a step smoothed with a Gaussian, so far from the step the value is that of the normal distribution
+    # a step smoothed with a Gaussian has the cumulative normal distribution of the distance from the step
     beyond = _standard_quantile(smooth[tuple(border.T)]) * sigma
     offsets = np.array([*low, support_z - MARGIN * cell]) + cell / 2
     places = border * cell + offsets + normals * (beyond * cell)[:, None]
@@ -84,22 +84,22 @@ def completed_shape(points: Array, spacing: float, support_z: float) -> SeenShap
 
 
 def _column_tops(points: Array, radius: float, cell: float, support_z: float) -> tuple[Array, Array]:
-    """Returns the top of each column (i, j) [m], that of the support where nothing was seen, and its origin (2,)."""
+    """Returns the top (i, j) of each column [m], the support where it is empty, and the grid origin (2,) [m]."""
     reach = math.ceil(radius / cell)
     low = points[:, :2].min(axis=0) - (MARGIN + reach) * cell
     shape = np.ceil((points[:, :2].max(axis=0) - low) / cell).astype(int) + MARGIN + reach + 1
     tops = np.full(shape, support_z)
-    own = np.floor((points[:, :2] - low) / cell).astype(int)
+    point_cells = np.floor((points[:, :2] - low) / cell).astype(int)
     for shift in np.ndindex(2 * reach + 1, 2 * reach + 1):
-        at = own + shift - reach
-        near = np.linalg.norm((at + 0.5) * cell + low - points[:, :2], axis=1) <= radius
-        near |= (at == own).all(axis=1)
-        np.maximum.at(tops, tuple(at[near].T), points[near, 2])
+        cells = point_cells + shift - reach
+        near = np.linalg.norm((cells + 0.5) * cell + low - points[:, :2], axis=1) <= radius
+        near |= (cells == point_cells).all(axis=1)
+        np.maximum.at(tops, tuple(cells[near].T), points[near, 2])
     return tops, low
 
 
 def _filled_cells(tops: Array, cell: float, support_z: float) -> Array:
-    """Returns how full each cell (i, j, k) is, from 0 to 1; the columns go on below the support."""
+    """Returns the occupancy of each cell (i, j, k) from 0 to 1; columns extend below the support."""
     levels = math.ceil((float(tops.max()) - support_z) / cell) + 2 * MARGIN
     bottoms = support_z + (np.arange(levels) - MARGIN) * cell
     filled = np.clip((tops[:, :, None] - bottoms) / cell, 0.0, 1.0)
@@ -107,10 +107,10 @@ def _filled_cells(tops: Array, cell: float, support_z: float) -> Array:
     return np.asarray(filled)
 
 
-def _standard_quantile(share: Array) -> Array:
-    from scipy.special import ndtri  # by SciPy's own name: the inverse of the standard normal distribution
+def _standard_quantile(probability: Array) -> Array:
+    from scipy.special import ndtri  # inverse of the standard normal distribution
 
-    return np.asarray(ndtri(np.clip(share, 1e-3, 1.0 - 1e-3)))
+    return np.asarray(ndtri(np.clip(probability, 1e-3, 1.0 - 1e-3)))
 
 
 def _surface(points: Array, normals: Array, filled: Array, cell: float, offsets: Array, support_z: float) -> Surface:

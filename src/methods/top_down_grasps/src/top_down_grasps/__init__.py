@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A method that generates grasps: top-down grasps for the objects of the planning scene."""
+"""A grasp generator for top-down grasps of the objects in the planning scene."""

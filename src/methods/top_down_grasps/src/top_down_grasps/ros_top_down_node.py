@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node of the method: its parameters, and its grasps in the form that all grasp generators share."""
+"""The ROS node of the method: its parameters, and its grasps as candidates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from top_down_grasps.top_down import TopDownGrasp, TopDownSettings, top_down_gra
 
 
 class TopDownMethod(ParameterisedMethod):
-    """Grasps from above; the parameters of :func:`read_top_down_settings` are read again for every object."""
+    """Top-down grasps; the parameters of :func:`read_top_down_settings` are read anew for every object."""
 
     manner = "from above"
     declared_in = ("top_down_grasps", "top_down_grasp_generator")
@@ -29,7 +29,7 @@ class TopDownMethod(ParameterisedMethod):
         ]
 
     def reached_quality(self, candidate: GraspCandidate, joint_travel: float) -> float:
-        """Returns the quality as it was found: any reachable grasp is as good as its hold."""
+        """Returns the grasp quality, independent of the joint travel."""
         return candidate.quality
 
 
@@ -49,18 +49,18 @@ def read_top_down_settings(read: ReadNumber) -> TopDownSettings:
     """Reads the parameters of the method.
 
     Args:
-        read: Reads a parameter.
+        read: Function that reads a parameter.
     """
     return TopDownSettings(
         **asdict(read_hand_motion(read)),
         min_side_alignment=read("~min_side_alignment"),
         yaw_step_rad=read("~yaw_step"),
-        place_step_m=read("~place_step"),
+        position_step_m=read("~place_step"),
         best_reach_m=read("~best_reach"),
         base_xy_m=(read("~base_x"), read("~base_y")),
     )
 
 
 def main() -> int:
-    """Runs the node ``top_down_grasp_generator``; returns 1 when something it needs is missing."""
+    """Runs the node ``top_down_grasp_generator``; returns 1 if a requirement is missing."""
     return run_grasp_generator("top_down_grasp_generator", TopDownMethod())

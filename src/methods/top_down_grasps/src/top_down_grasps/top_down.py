@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds and ranks ways to grasp an object from above with a two-finger gripper.
+"""Generates and ranks top-down grasps of an object with a two-finger gripper.
 
 The hand points straight down. For several closing directions and positions along the object, the part of the object
-between the pads is measured: it must fit the opening with room to spare, its sides must face the pads, and the
-fingertips must stay above the support. No other part of the hand may touch the object, neither on the way down nor
-while the pads close: where it would, the hand opens wider or stays higher. What remains is ranked by how squarely the
-sides face the pads, how near the grasp is to the centre of mass, how much room there is, how much of the pads touches,
-and how convenient the position is for the arm.
+between the pads must fit the opening with clearance, its sides must face the pads, and the fingertips must stay above
+the support. No other part of the hand may touch the object during descent or closing; if it does, the hand opens wider
+or stays higher. The remaining grasps are ranked by the alignment of the sides with the pads, the distance from the
+centre of mass, the clearance, the pad overlap, and the convenience of the position for the arm.
 """
 
 from __future__ import annotations
@@ -37,33 +36,33 @@ SAME_DIRECTION_RAD = math.radians(3.0)
 
 @dataclass(frozen=True, slots=True)
 class TopDownSettings(HandMotionSettings):
-    """Limits of a usable grasp.
+    """Feasibility limits of a grasp.
 
     Attributes:
-        min_side_alignment: Least cosine between a side's normal and the closing direction.
+        min_side_alignment: Minimum cosine between a side's normal and the closing direction.
         yaw_step_rad: Step between closing directions [rad].
-        place_step_m: Step between places along the object [m].
-        best_reach_m: Horizontal distance from the arm's base at which it works best [m].
-        base_xy_m: Place of the arm's base in the world [m].
+        position_step_m: Step between positions along the object [m].
+        best_reach_m: Preferred horizontal distance from the arm's base [m].
+        base_xy_m: Position (x, y) of the arm's base in the world [m].
     """
 
     min_side_alignment: float = 0.95
     yaw_step_rad: float = math.pi / 12
-    place_step_m: float = 0.015
+    position_step_m: float = 0.015
     best_reach_m: float = 0.5
     base_xy_m: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class TopDownGrasp:
-    """One way to grasp.
+    """A top-down grasp.
 
     Attributes:
-        position: (x, y, z) of the grasp frame in the world [m].
+        position: Position (x, y, z) of the grasp frame in the world [m].
         yaw: Closing direction as an angle about world z [rad].
         width: Width of the object between the pads [m].
-        pregrasp_joint: Gripper joint position with which to come down [rad or m].
-        quality: Rank in [0, 1]; more is better.
+        pregrasp_joint: Gripper joint position during descent [rad or m].
+        quality: Quality in [0, 1]; larger is better.
     """
 
     position: tuple[float, float, float]
@@ -81,16 +80,16 @@ class TopDownGrasp:
 def top_down_grasps(
     surface: Surface, support_z: float, gripper: GripperGeometry, settings: TopDownSettings
 ) -> list[TopDownGrasp]:
-    """Finds the grasps of an object.
+    """Returns the grasps of an object.
 
     Args:
         surface: Surface of the object in the world frame.
-        support_z: Height of what the object stands on [m].
+        support_z: Height of the object's support [m].
         gripper: Geometry of the hand.
-        settings: What counts as usable.
+        settings: Feasibility limits.
 
     Returns:
-        Usable grasps, best first; empty when the object cannot be grasped from above.
+        Feasible grasps, best first; empty if the object cannot be grasped from above.
     """
     grasps = []
     top = highest_points(surface.points)
@@ -102,7 +101,7 @@ def top_down_grasps(
         flat = _Slice(
             x, y, surface.points[:, 2], facing, np.column_stack([top[:, :2] @ closing, top[:, :2] @ across, top[:, 2]])
         )
-        for y_grasp in _grasp_positions(y, float(surface.centroid[:2] @ across), settings.place_step_m):
+        for y_grasp in _grasp_positions(y, float(surface.centroid[:2] @ across), settings.position_step_m):
             grasp = _grasp_at(flat, y_grasp, yaw, surface, support_z, gripper, settings)
             if grasp is not None:
                 grasps.append(grasp)
@@ -111,10 +110,11 @@ def top_down_grasps(
 
 @dataclass(frozen=True, slots=True)
 class _Slice:
-    """Surface points in the directions of the hand: x closing, y across, z up, and how much each faces along x.
+    """Surface points in the axes of the hand: x closing, y across, z up.
 
     Attributes:
-        top: (n, 3) the highest points alone.
+        facing: Component of each normal along x.
+        top: Highest points, shape (n, 3).
     """
 
     x: Array
@@ -129,7 +129,7 @@ class _Slice:
 
 
 def _directions(surface: Surface, step: float) -> list[float]:
-    """Closing directions within half a turn: those of the object's sides first, then a regular fan."""
+    """Returns closing directions within half a turn: the object's sides first, then regular steps."""
     sides = [math.atan2(axis[1], axis[0]) % math.pi for axis in surface.axes if math.hypot(axis[0], axis[1]) > 0.9]
     fan = [index * step for index in range(max(1, round(math.pi / step)))]
     chosen: list[float] = []
@@ -141,7 +141,7 @@ def _directions(surface: Surface, step: float) -> list[float]:
 
 
 def _grasp_positions(y: Array, centre: float, step: float) -> Iterable[float]:
-    """Yields positions along the object [m]: at its centre of mass, then outwards to both ends."""
+    """Yields positions along the object [m]: its centre of mass, then alternately towards both ends."""
     yield centre
     for index in range(1, 1 + int(max(y.max() - centre, centre - y.min()) / step)):
         for y_grasp in (centre + index * step, centre - index * step):
@@ -187,15 +187,15 @@ def _grasp_at(
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
-    """Pose of the hand at one position along the object, and its contact.
+    """Pose and contact of the hand at one position along the object.
 
     Attributes:
         z: Height of the grasp frame [m].
-        pad_z: Height of the pads' centre when they touch [m].
-        low, high: Where the pads touch, along the closing direction [m].
-        overlap: Height over which they touch [m].
-        opening: Free width between the pads on the way down [m].
-        touching: Points between the pads.
+        pad_z: Height of the pads' centre at contact [m].
+        low, high: Positions of the contacts along the closing direction [m].
+        overlap: Height of the contact between pads and object [m].
+        opening: Free width between the pads during descent [m].
+        touching: Whether each point is between the pads.
     """
 
     z: float
@@ -216,10 +216,9 @@ def _highest_hold(
     gripper: GripperGeometry,
     settings: TopDownSettings,
 ) -> _Hold | None:
-    """Raises the hand from where the pads are over the centre of mass until all of it is clear of the object.
+    """Raises the hand from the height of the centre of mass until it is clear of the object.
 
-    How wide the hand must open depends on how deep it goes, and how deep it can go on how wide it is: a few rounds
-    settle both, since the hand only ever goes up.
+    The required opening depends on the height and vice versa; since the hand only moves up, a few iterations converge.
     """
     pad_offset = gripper.pad_centre_at(min(float(np.ptp(flat.x[between])), gripper.max_opening))
     top = float(flat.z[np.abs(flat.y - y_grasp) <= gripper.pad_half_width + 0.01].max())
@@ -255,7 +254,7 @@ def _alignment(flat: _Slice, side: npt.NDArray[np.bool_], sign: float) -> float:
 def _quality(
     alignment: float,
     offset_m: float,
-    room: float,
+    clearance: float,
     overlap: float,
     position: tuple[float, float, float],
     settings: TopDownSettings,
@@ -264,4 +263,4 @@ def _quality(
     reach_score = 1.0 - min(1.0, abs(reach - settings.best_reach_m) / 0.5)
     centred = 1.0 - min(1.0, offset_m / 0.06)
     squareness = (alignment - settings.min_side_alignment) / (1.0 - settings.min_side_alignment)
-    return 0.3 * squareness + 0.3 * centred + 0.15 * room + 0.1 * min(1.0, overlap) + 0.15 * reach_score
+    return 0.3 * squareness + 0.3 * centred + 0.15 * clearance + 0.1 * min(1.0, overlap) + 0.15 * reach_score
