@@ -146,6 +146,11 @@ def _stop_error(target: str) -> CallError:
 def wait_for_action(client: actionlib.SimpleActionClient, name: str, timeout_s: float) -> None:
     """Waits until an action server is connected to a client.
 
+    Args:
+        client: Client of the action.
+        name: Name of the action, for messages.
+        timeout_s: Maximum wait [s of real time].
+
     Raises:
         CallError: No server was connected in time, or the task was asked to stop.
     """

@@ -27,7 +27,13 @@ QUIT_WORDS = ("q", "quit", "exit")
 
 
 def completions(keywords: Mapping[str, Sequence[str]], line: str, text: str) -> list[str]:
-    """Returns the completions of `text`, the last word of `line`."""
+    """Returns the completions of the last word of a line.
+
+    Args:
+        keywords: Possible arguments of each command.
+        line: Line up to the cursor.
+        text: Last word of the line.
+    """
     before = line[: len(line) - len(text)].split()
     words = keywords if not before else keywords.get(before[0].lower(), ())
     return sorted(word + " " for word in words if word.startswith(text))

@@ -60,27 +60,67 @@ class PlanningSceneInterface:
         self._submit(collision_object)
 
     def add_sphere(self, name: str, pose: PoseStamped, radius: float = 1) -> None:
-        """Adds a sphere [m]."""
+        """Adds a sphere.
+
+        Args:
+            name: Id of the object.
+            pose: Pose of the object in the frame of its header.
+            radius: Radius [m].
+        """
         self._submit(self.make_sphere(name, pose, radius))
 
     def add_cylinder(self, name: str, pose: PoseStamped, height: float, radius: float) -> None:
-        """Adds a cylinder along z [m]."""
+        """Adds a cylinder along z.
+
+        Args:
+            name: Id of the object.
+            pose: Pose of the object in the frame of its header.
+            height: Height [m].
+            radius: Radius [m].
+        """
         self._submit(self.make_cylinder(name, pose, height, radius))
 
     def add_cone(self, name: str, pose: PoseStamped, height: float, radius: float) -> None:
-        """Adds a cone along z [m]."""
+        """Adds a cone along z.
+
+        Args:
+            name: Id of the object.
+            pose: Pose of the object in the frame of its header.
+            height: Height [m].
+            radius: Radius of the base [m].
+        """
         self._submit(self.make_cone(name, pose, height, radius))
 
     def add_mesh(self, name: str, pose: PoseStamped, filename: str, size: Vector = (1, 1, 1)) -> None:
-        """Adds a mesh file scaled along x, y, z."""
+        """Adds the mesh of a file.
+
+        Args:
+            name: Id of the object.
+            pose: Pose of the object in the frame of its header.
+            filename: Path of the mesh file.
+            size: Scale along x, y and z.
+        """
         self._submit(self.make_mesh(name, pose, filename, size))
 
     def add_box(self, name: str, pose: PoseStamped, size: Vector = (1, 1, 1)) -> None:
-        """Adds a box [m]."""
+        """Adds a box.
+
+        Args:
+            name: Id of the object.
+            pose: Pose of the object in the frame of its header.
+            size: Edge lengths along x, y and z [m].
+        """
         self._submit(self.make_box(name, pose, size))
 
     def add_plane(self, name: str, pose: PoseStamped, normal: Vector = (0, 0, 1), offset: float = 0) -> None:
-        """Adds the plane normal . p + offset = 0 in the pose's frame [m]."""
+        """Adds the plane normal . p + offset = 0 in the pose's frame.
+
+        Args:
+            name: Id of the object.
+            pose: Pose of the object in the frame of its header.
+            normal: Normal vector.
+            offset: Offset [m].
+        """
         self._submit(self.make_plane(name, pose, normal, offset))
 
     def attach_object(
@@ -113,7 +153,16 @@ class PlanningSceneInterface:
         size: Vector = (1, 1, 1),
         touch_links: Names | None = None,
     ) -> None:
-        """Attaches a mesh file; without pose and file, the object with this id."""
+        """Attaches the mesh of a file, or the object with this id.
+
+        Args:
+            link: Link to which the object is attached.
+            name: Id of the object.
+            pose: Pose of the new object; None for the object with this id.
+            filename: Path of the mesh file; empty for the object with this id.
+            size: Scale along x, y and z.
+            touch_links: Links that may touch the object; None for the link only.
+        """
         new = self.make_mesh(name, pose, filename, size) if pose is not None and filename else name
         self.attach_object(new, link, touch_links)
 
@@ -125,13 +174,29 @@ class PlanningSceneInterface:
         size: Vector = (1, 1, 1),
         touch_links: Names | None = None,
     ) -> None:
-        """Attaches a box [m]; without pose, the object with this id."""
+        """Attaches a box, or the object with this id.
+
+        Args:
+            link: Link to which the object is attached.
+            name: Id of the object.
+            pose: Pose of the new object; None for the object with this id.
+            size: Edge lengths along x, y and z [m].
+            touch_links: Links that may touch the object; None for the link only.
+        """
         self.attach_object(name if pose is None else self.make_box(name, pose, size), link, touch_links)
 
     def attach_sphere(
         self, link: str, name: str, pose: PoseStamped | None = None, radius: float = 1, touch_links: Names | None = None
     ) -> None:
-        """Attaches a sphere [m]; without pose, the object with this id."""
+        """Attaches a sphere, or the object with this id.
+
+        Args:
+            link: Link to which the object is attached.
+            name: Id of the object.
+            pose: Pose of the new object; None for the object with this id.
+            radius: Radius [m].
+            touch_links: Links that may touch the object; None for the link only.
+        """
         self.attach_object(name if pose is None else self.make_sphere(name, pose, radius), link, touch_links)
 
     def attach_cylinder(
@@ -143,7 +208,16 @@ class PlanningSceneInterface:
         radius: float = 1,
         touch_links: Names | None = None,
     ) -> None:
-        """Attaches a cylinder [m]; without pose, the object with this id."""
+        """Attaches a cylinder along z, or the object with this id.
+
+        Args:
+            link: Link to which the object is attached.
+            name: Id of the object.
+            pose: Pose of the new object; None for the object with this id.
+            height: Height [m].
+            radius: Radius [m].
+            touch_links: Links that may touch the object; None for the link only.
+        """
         self.attach_object(name if pose is None else self.make_cylinder(name, pose, height, radius), link, touch_links)
 
     def clear(self) -> None:
@@ -172,7 +246,17 @@ class PlanningSceneInterface:
     def get_known_object_names_in_roi(
         self, minx: float, miny: float, minz: float, maxx: float, maxy: float, maxz: float, with_type: bool = False
     ) -> list[str]:
-        """Returns the ids of objects whose shapes all have their origin in a box of the planning frame [m]."""
+        """Returns the ids of objects whose shapes all have their origin in a box.
+
+        Args:
+            minx: Minimum x of the box in the planning frame [m].
+            miny: Minimum y [m].
+            minz: Minimum z [m].
+            maxx: Maximum x [m].
+            maxy: Maximum y [m].
+            maxz: Maximum z [m].
+            with_type: Whether to omit objects without a type.
+        """
         region = Region((minx, miny, minz), (maxx, maxy, maxz))
         return [
             item.id
@@ -213,32 +297,32 @@ class PlanningSceneInterface:
 
     @staticmethod
     def make_box(name: str, pose: PoseStamped, size: Vector) -> CollisionObject:
-        """Returns a box [m]."""
+        """Returns a box, as in `add_box`."""
         return collision_objects.primitive(name, pose, SolidPrimitive.BOX, size)
 
     @staticmethod
     def make_mesh(name: str, pose: PoseStamped, filename: str, scale: Vector = (1, 1, 1)) -> CollisionObject:
-        """Returns an object of a mesh file."""
+        """Returns an object with the mesh of a file, as in `add_mesh`."""
         return collision_objects.mesh(name, pose, filename, scale)
 
     @staticmethod
     def make_sphere(name: str, pose: PoseStamped, radius: float) -> CollisionObject:
-        """Returns a sphere [m]."""
+        """Returns a sphere, as in `add_sphere`."""
         return collision_objects.primitive(name, pose, SolidPrimitive.SPHERE, [radius])
 
     @staticmethod
     def make_cylinder(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
-        """Returns a cylinder [m]."""
+        """Returns a cylinder, as in `add_cylinder`."""
         return collision_objects.primitive(name, pose, SolidPrimitive.CYLINDER, [height, radius])
 
     @staticmethod
     def make_cone(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
-        """Returns a cone [m]."""
+        """Returns a cone, as in `add_cone`."""
         return collision_objects.primitive(name, pose, SolidPrimitive.CONE, [height, radius])
 
     @staticmethod
     def make_plane(name: str, pose: PoseStamped, normal: Vector = (0, 0, 1), offset: float = 0) -> CollisionObject:
-        """Returns a plane."""
+        """Returns a plane, as in `add_plane`."""
         return collision_objects.plane(name, pose, normal, offset)
 
     def _world(self, components: int) -> list[CollisionObject]:

@@ -100,7 +100,13 @@ class StateMachine(Container):
         self._connector_label, self._connector_outcomes = None, []
 
     def check_state_spec(self, label: str, state: State, transitions: NameMap) -> None:
-        """Raises an error if a state cannot be added with this label and these transitions."""
+        """Checks that a state can be added; raises an error if not.
+
+        Args:
+            label: Label of the state.
+            state: State to add.
+            transitions: Outcome to label of the next state.
+        """
         if label in self._states:
             raise InvalidStateError(f"the machine already has a state with the label '{label}'")
         if label in self._outcomes:

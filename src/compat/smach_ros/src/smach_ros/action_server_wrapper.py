@@ -133,7 +133,13 @@ class ActionServerWrapper:
         self.publish_feedback(userdata)
 
     def termination_cb(self, userdata: Any, terminal_states: list[str], container_outcome: str | None) -> None:
-        """Logs the end of the container."""
+        """Logs the end of the container; called by the container.
+
+        Args:
+            userdata: Userdata of the container.
+            terminal_states: Labels of the last states.
+            container_outcome: Outcome of the container.
+        """
         smach.logdebug(f"'{self._server_name}': container ended in {terminal_states} with '{container_outcome}'")
 
     def publish_feedback(self, userdata: Any) -> None:

@@ -93,7 +93,13 @@ class CloudSource:
         return SeenCloud(points @ transform[:3, :3].T + transform[:3, 3], header.stamp, header.frame_id)
 
     def link_poses(self, links: Sequence[str], frame: str, stamp: rospy.Time) -> dict[str, Array]:
-        """Returns the pose (4, 4) of each link in a frame at a time; missing links are logged and omitted."""
+        """Returns the pose (4, 4) of each link; missing links are logged and omitted.
+
+        Args:
+            links: Names of the links.
+            frame: Target frame.
+            stamp: Time of the poses.
+        """
         stamps = self._stamps(frame, links, stamp)
         if missing := [link for link in links if link not in stamps]:
             rospy.logwarn_throttle(

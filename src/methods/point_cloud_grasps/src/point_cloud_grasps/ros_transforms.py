@@ -72,7 +72,13 @@ class Transforms:
         return found
 
     def matrix(self, frame: str, other: str, stamp: rospy.Time) -> Array:
-        """Returns the transform (4, 4) from another frame to a frame at a time returned by :meth:`stamps`."""
+        """Returns a transform, shape (4, 4).
+
+        Args:
+            frame: Target frame.
+            other: Source frame.
+            stamp: Time returned by :meth:`stamps`.
+        """
         found = self._buffer.lookup_transform_core(frame, other, stamp).transform
         matrix = np.eye(4)
         rotation, translation = found.rotation, found.translation

@@ -79,7 +79,15 @@ def read_experiment(
     known_metrics: KnownMetrics,
     checks: SettingChecks | None = None,
 ) -> Experiment:
-    """Reads and checks the text of an experiment file; `load_experiment` describes arguments and errors."""
+    """Reads and checks the text of an experiment file, as `load_experiment` does.
+
+    Args:
+        text: Text of the file.
+        path: Path of the file, for messages and relative paths.
+        resources: Lookup of the references.
+        known_metrics: Metrics that need no definition.
+        checks: Checks of the settings, keyed by mode.
+    """
     faults = FaultList()
     start = SourceLocation(str(path), 1, 1)
     if not any(line.strip() and not line.lstrip().startswith("#") for line in text.splitlines()):

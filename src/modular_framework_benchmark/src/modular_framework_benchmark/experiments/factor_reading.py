@@ -35,7 +35,13 @@ Levels = Map[str, Map[str, Level]]
 
 
 def read_factors(node: Node, mode_keys: Collection[str], reading: Reading) -> Levels:
-    """Returns the levels of each factor by label, and adds faults."""
+    """Returns the levels of each factor by label, and adds faults.
+
+    Args:
+        node: Value of the key `factors`.
+        mode_keys: Keys of the mode.
+        reading: Reader that collects faults.
+    """
     mapping = reading.mapping(node, "factors", EXAMPLE)
     if mapping is None:
         return {}
@@ -96,7 +102,14 @@ def _note_conflicts(factors: Levels, reading: Reading) -> None:
 
 
 def note_unused(factors: Levels, base: Mapping, node: Mapping, reading: Reading) -> None:
-    """Adds a fault for each factor without effect: its levels set nothing and no value refers to it."""
+    """Adds a fault for each factor without effect: its levels set nothing and no value refers to it.
+
+    Args:
+        factors: Levels of each factor.
+        base: Settings of every combination.
+        node: Value of the key `factors`.
+        reading: Reader that collects faults.
+    """
     effective = {name for name, _ in references(base)}
     for levels in factors.values():
         for level in levels.values():
@@ -149,7 +162,13 @@ def combined(base: Mapping, factors: Levels, configuration: Map[str, str], meant
 
 
 def read_design(node: Node | None, factors: Levels, reading: Reading) -> list[dict[str, str]]:
-    """Returns the combinations of levels to run: all combinations, or those that the file lists."""
+    """Returns the combinations of levels to run: all combinations, or those listed in the file.
+
+    Args:
+        node: Value of the key `design`; None for all combinations.
+        factors: Levels of each factor.
+        reading: Reader that collects faults.
+    """
     full = [dict(zip(factors, labels, strict=True)) for labels in itertools.product(*factors.values())]
     if node is None or isinstance(node, Scalar) and node.value == "full":
         return full

@@ -83,6 +83,11 @@ def finish(node: Mapping, values: dict[str, Any], reading: Reading) -> dict[str,
     """Checks the arguments against the launch file, finds the models, and returns the settings.
 
     The settings lack `arguments` if an invalid argument leaves the launched nodes unknown.
+
+    Args:
+        node: Settings of a combination.
+        values: Values of the keys that could be read.
+        reading: Reader that collects faults and looks up references.
     """
     if "launch" not in values:
         return values

@@ -55,7 +55,13 @@ class ValueReading:
         return None
 
     def choice(self, node: Node, what: str, allowed: Collection[str]) -> str | None:
-        """Returns one of the allowed texts."""
+        """Returns one of the allowed texts.
+
+        Args:
+            node: Value of the file.
+            what: Name of the value in fault messages.
+            allowed: Allowed texts.
+        """
         text = self.text(node, what)
         if text is None or text in allowed:
             return text
@@ -103,7 +109,13 @@ class ValueReading:
         return None
 
     def items(self, node: Node, what: str, example: str) -> tuple[Node, ...] | None:
-        """Returns the items of a nonempty list."""
+        """Returns the items of a nonempty list.
+
+        Args:
+            node: Value of the file.
+            what: Name of the value in fault messages.
+            example: Example for fault messages.
+        """
         if isinstance(node, Sequence) and node.items:
             return node.items
         found = "an empty list" if isinstance(node, Sequence) else kind_of(node)
@@ -111,7 +123,13 @@ class ValueReading:
         return None
 
     def mapping(self, node: Node, what: str, example: str) -> Mapping | None:
-        """Returns a mapping; an empty value counts as an empty mapping."""
+        """Returns a mapping; an empty value counts as an empty mapping.
+
+        Args:
+            node: Value of the file.
+            what: Name of the value in fault messages.
+            example: Example for fault messages.
+        """
         if isinstance(node, Mapping):
             return node
         if isinstance(node, Scalar) and node.value is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Looks up the names that move_group itself answers with a default: collision detector, managers and capabilities."""
+"""Checks the names that move_group would replace by a default: collision detector, managers and capabilities."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ CAPABILITIES = (*DEFAULT_CAPABILITIES, *OPTIONAL_CAPABILITIES)
 
 
 def move_group_faults(names: DeclaredNames, given: Mapping[str, Any]) -> Iterator[LaunchFault]:
-    """Yields the names that nothing answers to.
+    """Yields unknown names.
 
     Args:
         names: Parameters of the launch.
-        given: Parameters by whole name that an experiment sets. Capabilities are looked up for these alone: a
-            configuration package of others may name capabilities that only MoveIt has.
+        given: Parameters set by the experiment, by full name. Capabilities are checked only in these, since other
+            configuration packages may name capabilities that only MoveIt has.
     """
     for name, value in names.naming(DETECTOR):
         try:
@@ -57,11 +57,11 @@ def _capability_faults(name: str, value: Any) -> Iterator[LaunchFault]:
 
 
 def resolved_names(launch: LaunchPreview, node: LaunchedNode) -> dict[str, str]:
-    """Returns what the names stand for; equal for names of the same implementation.
+    """Returns the implementation of each name.
 
     Args:
-        launch: The launch, without faults.
-        node: Its move_group.
+        launch: Launch without faults.
+        node: Node move_group of the launch.
     """
     places = (f"{node.name}/{DETECTOR}", f"{node.namespace}{DETECTOR}", f"/{DETECTOR}")
     detector = next((launch.parameters[place] for place in places if place in launch.parameters), "")

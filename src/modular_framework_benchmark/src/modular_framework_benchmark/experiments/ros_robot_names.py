@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of a robot that parameters, controllers and files of an experiment refer to."""
+"""Names in a robot description to which parameters, controllers and files of an experiment refer."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from modular_framework_urdf.xml_text import XmlError
 
 @dataclass(frozen=True, slots=True)
 class RobotNames:
-    """Names of a robot; empty if its description is not there or cannot be read.
+    """Names in a robot description; empty if the description is missing or invalid.
 
     Attributes:
         groups: Planning groups.
         joints: All joints.
-        movable_joints: Joints that move, and the variables of a planar or floating virtual joint.
+        movable_joints: Movable joints, and the variables of planar or floating virtual joints.
         links: All links.
-        fault: Reason why the URDF cannot be read; empty if it can.
+        fault: Error of an invalid URDF; empty for a valid one.
     """
 
     groups: tuple[str, ...] = ()
@@ -31,14 +31,14 @@ class RobotNames:
     fault: str = ""
 
     def by_kind(self) -> dict[str, tuple[str, ...]]:
-        """Returns the names that are known, by the kinds that declarations of parameters use."""
+        """Returns the known names, keyed by the kinds in parameter declarations."""
         kinds = {"group": self.groups, "joint": self.movable_joints, "link": self.links}
         return {kind: names for kind, names in kinds.items() if names}
 
 
 @lru_cache(maxsize=16)
 def robot_names(urdf: str, srdf: str) -> RobotNames:
-    """Returns the names in two descriptions; either may be an empty text."""
+    """Returns the names in a URDF and an SRDF; both may be empty."""
     groups: tuple[str, ...] = ()
     variables: tuple[str, ...] = ()
     try:
@@ -50,7 +50,7 @@ def robot_names(urdf: str, srdf: str) -> RobotNames:
                     own = MultiDofJoint(joint.name, joint.kind, joint.parent_frame, joint.child_link)
                     variables += (*own.variables, *joint.variables)
     except XmlError:
-        pass  # the task's check says what is wrong with it
+        pass  # reported by the check of the task
     try:
         robot = read_urdf(urdf) if urdf else None
     except XmlError as error:

@@ -31,7 +31,13 @@ def references(node: Node) -> Iterator[tuple[str, Scalar]]:
 
 
 def check_references(node: Node, factors: Map[str, object], faults: FaultList) -> list[str]:
-    """Adds a fault for each `$NAME` that is not a factor, and returns these names."""
+    """Adds a fault for each `$NAME` that is not a factor, and returns these names.
+
+    Args:
+        node: Value to search.
+        factors: Factors by name.
+        faults: List to which faults are added.
+    """
     unknown = []
     for name, text in references(node):
         if name not in factors:

@@ -132,7 +132,7 @@ def load_method(reference: str, parameters: Mapping[str, Any]) -> GraspMethod:
 
 
 def method_class(reference: str) -> Any:
-    """Returns the class of a method; its argument and its errors are those of `load_method`."""
+    """Returns the class of a method; argument and errors are those of `load_method`."""
     module, _, name = reference.partition(":")
     try:
         return getattr(importlib.import_module(module), name)

@@ -112,7 +112,7 @@ def check_solver(name: str) -> None:
 
 
 def solver_parameters(parameters: Mapping[str, Any], group: str) -> dict[str, Any]:
-    """Returns the settings of a group's solver that ROS parameters give, by their names in kinematics.yaml.
+    """Returns the solver settings of a group that ROS parameters override, keyed as in kinematics.yaml.
 
     Raises:
         ModeError: A parameter is not below the group's name in robot_description_kinematics.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ROS parameters that mode `planning` reads: those of the pipeline that plans."""
+"""Reads the ROS parameters of the mode `planning`, which are those of the planning pipeline."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ NOT_READ = {"seed": "each episode has its own seed", "capabilities": "this mode 
 
 
 def pipeline_parameters(parameters: Mapping[str, Any], pipeline: str) -> dict[str, Any]:
-    """Returns the parameters of a pipeline, nested; a name below the pipeline comes before the same name of the node.
+    """Returns the nested parameters of a pipeline; those of the pipeline take precedence over those of the node.
 
     Args:
-        parameters: Values by whole name.
-        pipeline: Name of the pipeline that plans.
+        parameters: Values by full name.
+        pipeline: Name of the pipeline.
 
     Raises:
-        ModeError: The mode does not read a parameter; names each.
+        ModeError: The mode ignores some parameters, which the message lists.
     """
     own, given = f"{NODE}planning_pipelines/{pipeline}/", leaves(parameters)
     declared = existing_declaration("modular_framework_planning", "planning_pipeline").parameters

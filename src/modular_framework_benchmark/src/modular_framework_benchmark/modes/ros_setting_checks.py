@@ -188,7 +188,7 @@ def _planning_check(robot: Robot, settings: Mapping[str, Any]) -> LaunchCheck:
 
 
 def _parameter_faults(check: LaunchCheck, settings: Mapping[str, Any]) -> Iterator[SettingFault]:
-    """Yields what is wrong with the parameters of mode `planning`, and with those of its pipeline."""
+    """Yields the errors in the parameters of the mode `planning`, including those of its pipeline."""
     given = leaves(settings.get("parameters", {}))
     pipeline, unread = str(settings["pipeline"]), set()
     for name, value in given.items():
@@ -201,7 +201,7 @@ def _parameter_faults(check: LaunchCheck, settings: Mapping[str, Any]) -> Iterat
     for found in check.faults():
         if found.name not in unread and (
             found.name != plugin or plugin in given
-        ):  # else it is a fault of the pipeline's name
+        ):  # otherwise the pipeline's name is wrong
             yield SettingFault(("parameters", found.name), found.text)
 
 

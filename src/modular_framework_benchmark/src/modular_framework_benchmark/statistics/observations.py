@@ -136,6 +136,11 @@ def other_factors(results: ExperimentResults) -> tuple[Factor, ...]:
 def restricted(results: ExperimentResults, factor: str, level: str) -> ExperimentResults:
     """Returns the results of the episodes at one level of a factor.
 
+    Args:
+        results: Results of the experiment.
+        factor: Name of the factor.
+        level: Label of the level.
+
     Raises:
         ValueError: The experiment lacks the factor.
     """

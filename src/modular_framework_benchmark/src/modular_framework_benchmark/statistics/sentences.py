@@ -23,12 +23,27 @@ def claim(metric: Metric, better: str, worse: str, figures_text: str) -> str:
 
 
 def no_claim(metric: Metric, first: str, second: str, figures_text: str) -> str:
-    """Returns the sentence for a comparison without a shown difference; `claim` describes the arguments."""
+    """Returns the sentence for a comparison without a shown difference.
+
+    Args:
+        metric: Compared metric.
+        first: First method.
+        second: Second method.
+        figures_text: Text of the figures, from `figures`.
+    """
     return f"no difference in {spaced_name(metric)} shown between {first} and {second} ({figures_text})"
 
 
 def not_showable(metric: Metric, first: str, second: str, counts: PairCounts, noun: str) -> str:
-    """Returns the sentence for a comparison with too few units to show any difference."""
+    """Returns the sentence for a comparison with too few units to show any difference.
+
+    Args:
+        metric: Compared metric.
+        first: First method.
+        second: Second method.
+        counts: Pairs of the comparison.
+        noun: Name of a unit.
+    """
     units = count(counts.units, "pair" if counts.units == counts.pairs else noun)
     return (
         f"a difference in {spaced_name(metric)} between {first} and {second} could not have been shown with {units} "
@@ -37,7 +52,14 @@ def not_showable(metric: Metric, first: str, second: str, counts: PairCounts, no
 
 
 def nothing_to_compare(metric: Metric, first: str, second: str, reason: str) -> str:
-    """Returns the sentence for a comparison without data."""
+    """Returns the sentence for a comparison without data.
+
+    Args:
+        metric: Compared metric.
+        first: First method.
+        second: Second method.
+        reason: Reason of the missing data.
+    """
     return f"nothing to compare between {first} and {second} in {spaced_name(metric)}: {reason}"
 
 
@@ -78,7 +100,14 @@ def figures(metric: Metric, comparison: PairFigures, swapped: bool = False) -> s
 
 
 def summary(metric: Metric, method: str, estimate: Estimate | None, counts: EpisodeCounts) -> str:
-    """Returns the sentence that summarises a metric of a method."""
+    """Returns the sentence that summarises a metric of a method.
+
+    Args:
+        metric: Metric to summarise.
+        method: Name of the method.
+        estimate: Estimate of the metric; None without a value.
+        counts: Counts of the method's episodes.
+    """
     if estimate is None:
         reason = f"none of {count(counts.episodes, 'episode')} has a value" if counts.episodes else "no episodes"
         return f"{method}: no {spaced_name(metric)} ({reason})"

@@ -103,7 +103,13 @@ class CartesianMove(FrameworkState):
 
 
 def moved(pose: PoseStamped, offset: Sequence[float], in_own_frame: bool) -> PoseStamped:
-    """Returns a pose translated by an offset [m], given in the pose's own frame or in its header's frame."""
+    """Returns a pose translated by an offset.
+
+    Args:
+        pose: Pose to translate.
+        offset: Translation (x, y, z) [m].
+        in_own_frame: Whether the offset is given in the pose's own frame instead of its header's frame.
+    """
     orientation = pose.pose.orientation
     step = np.asarray(offset, dtype=float)
     if in_own_frame:
