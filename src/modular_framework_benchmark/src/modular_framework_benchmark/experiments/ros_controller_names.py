@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Looks up the types and joints of controllers, and the types of hardware, that a launch names."""
+"""Checks the controller types, hardware types and joints in the configuration of a launch."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ JOINT_KEYS = (
 )  # fmt: skip
 """Keys of a controller that name joints."""
 KEYS_BY_JOINT = ("constraints", "gains", "velocity_ff")
-"""Keys of a controller below which each mapping belongs to one of its joints."""
+"""Keys of a controller with a mapping per joint."""
 
 
 def controller_faults(launch: LaunchPreview, joints: tuple[str, ...]) -> Iterator[LaunchFault]:
-    """Yields controller files that cannot be read, and the types and joints in them that do not exist.
+    """Yields unreadable controller files, and unknown controller types and joints in them.
 
     Args:
-        launch: The launch.
-        joints: Joints of the robot that move; empty if they are not known.
+        launch: Launch to check.
+        joints: Movable joints of the robot; empty if unknown.
     """
     for node in launch.nodes:
         if node.executable != SPAWNER or len(node.arguments.split()) != 2:
@@ -75,7 +75,7 @@ def _unknown_joints(entry: Mapping[str, Any], joints: tuple[str, ...]) -> list[s
 
 
 def _misplaced_joints(entry: Mapping[str, Any]) -> Iterator[str]:
-    """Yields settings of a joint that is none of the controller's."""
+    """Yields settings of joints that the controller does not use."""
     own = [*_names(entry.get("joints")), *_names(entry.get("joint"))]
     for key in KEYS_BY_JOINT if own else ():
         below = entry.get(key)
@@ -85,7 +85,7 @@ def _misplaced_joints(entry: Mapping[str, Any]) -> Iterator[str]:
 
 
 def hardware_faults(names: DeclaredNames, launch: LaunchPreview) -> Iterator[LaunchFault]:
-    """Yields hardware without a section, and types of hardware that no package offers."""
+    """Yields hardware without parameters, and unknown hardware types."""
     for part in names.hardware():
         parameter, parent = f"{part}/type", part.rpartition("/")[0]
         sections = [
@@ -105,11 +105,11 @@ def hardware_faults(names: DeclaredNames, launch: LaunchPreview) -> Iterator[Lau
 
 @cache
 def _controller_types() -> tuple[str, ...]:
-    """Returns the types of controllers: the framework's own, and those that packages export."""
+    """Returns the controller types of the framework and of the packages."""
     return tuple(ControllerTypes().names)
 
 
 @cache
 def _hardware_types() -> tuple[str, ...]:
-    """Returns the types of hardware that packages export."""
+    """Returns the hardware types of the packages."""
     return tuple(PluginIndex(ROBOT_HW_BASE).names)

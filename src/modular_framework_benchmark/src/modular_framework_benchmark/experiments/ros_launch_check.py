@@ -191,7 +191,7 @@ class LaunchCheck:
             yield LaunchFault(name, f"{text}{nearest(machine, there)}", ARGUMENTS)
 
     def _named_state_faults(self, config: str) -> Iterator[LaunchFault]:
-        """Yields the joints and joint states that the files of named states and trajectories name in vain."""
+        """Yields unknown joints and joint states in the files of named states and trajectories."""
         joints = self._robot.movable_joints
         try:
             found = list(named_joint_faults(Path(config), joints)) if config and joints else []
