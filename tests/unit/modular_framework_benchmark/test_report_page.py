@@ -90,7 +90,7 @@ def test_two_trials_print_values_and_one_line_for_all_that_could_not_be_shown(
     assert len(lines) == 1 + 10 + 1 + 2
     assert re.search(r"planner_3 +\d of 2 +[\d.]+ ", printed)
     assert "(interval)" in lines[0] and " to " not in "".join(lines[1:11])
-    assert re.match(r"none could have been shown with 1?.*2 scenes in \d+ of 315 comparisons", lines[12])
+    assert re.match(r"no difference could have been shown with 1?.*2 scenes in \d+ of 315 comparisons", lines[12])
 
 
 def test_it_says_how_many_of_the_planned_episodes_are_finished(page: Page) -> None:

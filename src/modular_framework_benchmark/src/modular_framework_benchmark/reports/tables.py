@@ -185,7 +185,7 @@ def _not_showable(comparisons: Sequence[Comparison]) -> str:
         return ""
     span = f"{min(units)}" if len(units) == 1 else f"{min(units)} to {max(units)}"
     noun = next(item.unit_noun for item in comparisons if item.verdict is Verdict.NOT_SHOWABLE)
-    return f"none could have been shown with {span} {noun}{'' if units == {1} else 's'}"
+    return f"no difference could have been shown with {span} {noun}{'' if units == {1} else 's'}"
 
 
 def _better_than_all(comparisons: Sequence[Comparison], methods: Sequence[str]) -> str | None:

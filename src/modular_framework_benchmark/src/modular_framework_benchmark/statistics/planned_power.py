@@ -58,7 +58,7 @@ def _line(units: int, nouns: str, error_rate: float, discordance: float) -> str:
     needed_text = f"{_difference_text(differences, of_success)} need {counts} {nouns}"
     smallest, minimum = detectable_difference(units, error_rate, discordance), min_units(error_rate)
     if units < minimum:
-        return f"nothing, whatever happens: at least {minimum} {nouns} would have to be won; {needed_text}"
+        return f"no difference, since at least {minimum} {nouns} would have to be won; {needed_text}"
     shown = "none is likely to be shown" if smallest is None else f"from {_difference_text([smallest], of_success)}"
     return f"{shown}; {needed_text}" + (f", if {100 * discordance:g} % of the pairs differ" if of_success else "")
 
