@@ -102,13 +102,13 @@ class SimulatedTime:
         """
         if not self.enabled:
             return
-        answer = self._advance(0.0)
-        now_s = answer.stamp.to_sec()
+        response = self._advance(0.0)
+        now_s = response.stamp.to_sec()
 
         def is_of_now() -> bool:
             stamp = latest()
             late_s = None if stamp is None else stamp.to_sec() - now_s
-            return late_s is not None and (abs(late_s) < SAME_TIME_S if answer.held else late_s > -SAME_TIME_S)
+            return late_s is not None and (abs(late_s) < SAME_TIME_S if response.held else late_s > -SAME_TIME_S)
 
         if latest() is not None and not wait_until(is_of_now, timeout_s, 0.002):
             raise CallError(
@@ -122,8 +122,8 @@ class SimulatedTime:
         Raises:
             CallError: The simulation does not respond.
         """
-        answer = self._advance(0.0) if self.enabled else None
-        return answer.stamp if answer is not None and answer.held else None
+        response = self._advance(0.0) if self.enabled else None
+        return response.stamp if response is not None and response.held else None
 
     def wait_until(self, condition: Callable[[], bool], timeout_s: float, period_s: float) -> bool:
         """Waits for a condition while simulated time advances; returns whether it was met in time.
@@ -144,14 +144,14 @@ class SimulatedTime:
     @staticmethod
     def _advance(duration_s: float) -> AdvanceTimeResponse:
         request = AdvanceTimeRequest(duration=rospy.Duration.from_sec(duration_s))
-        answer = request_service(
+        response = request_service(
             ADVANCE_SERVICE, AdvanceTime, request, ANSWER_TIMEOUT_S + duration_s / MIN_REAL_TIME_FACTOR
         )
-        if not answer.success:
-            raise CallError(f"service '{ADVANCE_SERVICE}': {answer.message}")
-        if answer.held and not rospy.rostime.is_wallclock():
-            wait_until(lambda: _clock_shows(answer.stamp.to_sec()), CLOCK_TIMEOUT_S, 0.001)
-        return answer
+        if not response.success:
+            raise CallError(f"service '{ADVANCE_SERVICE}': {response.message}")
+        if response.held and not rospy.rostime.is_wallclock():
+            wait_until(lambda: _clock_shows(response.stamp.to_sec()), CLOCK_TIMEOUT_S, 0.001)
+        return response
 
 
 def _clock_shows(time_s: float) -> bool:
@@ -161,9 +161,9 @@ def _clock_shows(time_s: float) -> bool:
 
 
 def _hold(request: HoldTimeRequest) -> None:
-    answer = request_service(HOLD_SERVICE, HoldTime, request, ANSWER_TIMEOUT_S)
-    if not answer.success:
-        raise CallError(f"service '{HOLD_SERVICE}': {answer.message}")
+    response = request_service(HOLD_SERVICE, HoldTime, request, ANSWER_TIMEOUT_S)
+    if not response.success:
+        raise CallError(f"service '{HOLD_SERVICE}': {response.message}")
 
 
 def _release(owner: str) -> None:

@@ -58,13 +58,13 @@ def forward_kinematics(servers: Servers, frame: str, link: str, state: RobotStat
     """
     request = GetPositionFKRequest(fk_link_names=[link], robot_state=state)
     request.header.frame_id = frame
-    answer = servers.call("compute_fk", GetPositionFK, request)
-    if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.pose_stamped:
+    response = servers.call("compute_fk", GetPositionFK, request)
+    if response.error_code.val != MoveItErrorCodes.SUCCESS or not response.pose_stamped:
         raise MoveItCommanderException(
             f"service {servers.resolve('compute_fk')}: no pose of link '{link}' in frame "
-            f"'{frame}': {code_text(answer.error_code)}"
+            f"'{frame}': {code_text(response.error_code)}"
         )
-    return answer.pose_stamped[0]
+    return response.pose_stamped[0]
 
 
 def held_frames(servers: Servers) -> dict[str, str]:
@@ -147,10 +147,12 @@ class GroupConnection:
 
     def get_interface_description(self) -> PlannerInterfaceDescription:
         """Returns the name and planner ids of move_group's first planner interface."""
-        answer = self._servers.call("query_planner_interface", QueryPlannerInterfaces, QueryPlannerInterfacesRequest())
-        if not answer.planner_interfaces:
+        response = self._servers.call(
+            "query_planner_interface", QueryPlannerInterfaces, QueryPlannerInterfacesRequest()
+        )
+        if not response.planner_interfaces:
             raise ServerError("service query_planner_interface: the list is empty; move_group has no planning pipeline")
-        return answer.planner_interfaces[0]
+        return response.planner_interfaces[0]
 
     def get_current_joint_values(self) -> list[float]:
         """Returns the group's current joint positions [rad or m], in the order of its variables."""

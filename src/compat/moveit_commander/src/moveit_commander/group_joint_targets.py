@@ -177,17 +177,17 @@ class GroupJointTargets(GroupSettings):
         ik_request.pose_stamped.header.frame_id = stamped.header.frame_id or self.get_pose_reference_frame()
         ik_request.robot_state = self._state.message_of(self._joint_target)
         ik_request.robot_state.is_diff = True
-        answer = self._servers.call("compute_ik", GetPositionIK, request)
-        if answer.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and approximate:
+        response = self._servers.call("compute_ik", GetPositionIK, request)
+        if response.error_code.val == MoveItErrorCodes.NO_IK_SOLUTION and approximate:
             self._set_values(self._nearest_values(ik_request.ik_link_name, ik_request.pose_stamped))
             return
-        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+        if response.error_code.val != MoveItErrorCodes.SUCCESS:
             raise MoveItCommanderException(
                 f"Error setting joint target: service {self._servers.resolve('compute_ik')}"
-                f" answers {code_text(answer.error_code)}. Is the pose within reach, and "
+                f" answers {code_text(response.error_code)}. Is the pose within reach, and "
                 "the IK solver functional?"
             )
-        found, wanted = self._state.values_of(answer.solution), set(self._group_names())
+        found, wanted = self._state.values_of(response.solution), set(self._group_names())
         self._set_values({name: value for name, value in found.items() if name in wanted})
 
     def _nearest_values(self, link: str, pose: PoseStamped) -> dict[str, float]:

@@ -146,11 +146,11 @@ class GroupMotion(GroupPoseTargets):
         request.waypoints = [pose if isinstance(pose, Pose) else conversions.list_to_pose(pose) for pose in waypoints]
         request.header.frame_id = self.get_pose_reference_frame()
         request.header.stamp = rospy.Time.now()
-        answer = self._servers.call("compute_cartesian_path", GetCartesianPath, request)
-        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
-            self._check_result(answer.error_code, "compute_cartesian_path")
+        response = self._servers.call("compute_cartesian_path", GetCartesianPath, request)
+        if response.error_code.val != MoveItErrorCodes.SUCCESS:
+            self._check_result(response.error_code, "compute_cartesian_path")
             return RobotTrajectory(), -1.0
-        return answer.solution, answer.fraction
+        return response.solution, response.fraction
 
     def _named_values(self, name: str) -> dict[str, float]:
         """Returns the joint values of a remembered or named target."""

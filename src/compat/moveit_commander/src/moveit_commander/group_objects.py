@@ -150,7 +150,7 @@ class GroupObjects(GroupMotion):
         request = GraspPlanningRequest(group_name=self._group.name, support_surfaces=[self._support_surface])
         request.target.id = object_name
         try:
-            answer = self._servers.call("plan_grasps", GraspPlanning, request)
+            response = self._servers.call("plan_grasps", GraspPlanning, request)
         except ServerError as error:
             rospy.logwarn(
                 "pick of '%s': no grasp is given and no service plans one (%s); give grasps to pick()",
@@ -158,14 +158,14 @@ class GroupObjects(GroupMotion):
                 error,
             )
             return []
-        if answer.error_code.val != MoveItErrorCodes.SUCCESS or not answer.grasps:
+        if response.error_code.val != MoveItErrorCodes.SUCCESS or not response.grasps:
             rospy.logwarn(
                 "pick of '%s': no grasp is given, and service plan_grasps has %d (code %d); give grasps to pick()",
                 object_name,
-                len(answer.grasps),
-                answer.error_code.val,
+                len(response.grasps),
+                response.error_code.val,
             )
-        return list(answer.grasps)
+        return list(response.grasps)
 
     def _publish(self, messages: Sequence[AttachedCollisionObject]) -> bool:
         if not is_heard(self._attachments):

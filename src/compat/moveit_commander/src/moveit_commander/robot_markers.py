@@ -40,12 +40,12 @@ def robot_markers(model: RobotModel, servers: Servers, state: RobotState, links:
         return MarkerArray()
     request = GetPositionFKRequest(fk_link_names=shown, robot_state=state)
     request.header.frame_id = model.planning_frame
-    answer = servers.call("compute_fk", GetPositionFK, request)
-    if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+    response = servers.call("compute_fk", GetPositionFK, request)
+    if response.error_code.val != MoveItErrorCodes.SUCCESS:
         raise MoveItCommanderException(
-            f"service {servers.resolve('compute_fk')}: no poses of {', '.join(shown)}: code {answer.error_code.val}"
+            f"service {servers.resolve('compute_fk')}: no poses of {', '.join(shown)}: code {response.error_code.val}"
         )
-    poses = dict(zip(answer.fk_link_names, answer.pose_stamped, strict=True))
+    poses = dict(zip(response.fk_link_names, response.pose_stamped, strict=True))
     array = MarkerArray()
     for link in shown:
         for number, visual in enumerate(model.visuals[link]):

@@ -52,12 +52,12 @@ def line_crossings(mesh: TriangleMesh, origins: Array, directions: Array) -> lis
         along = directions[start : start + batch]
         distances, hits = _intersect(corners, normals, origins[start : start + batch], along)
         for row in range(len(along)):
-            numbers = np.flatnonzero(hits[row])
-            numbers = numbers[np.argsort(distances[row, numbers], kind="stable")]
+            hit_indices = np.flatnonzero(hits[row])
+            hit_indices = hit_indices[np.argsort(distances[row, hit_indices], kind="stable")]
             found.append(
                 [
                     Crossing(float(distances[row, number]), units[number], bool(units[number] @ along[row] < 0.0))
-                    for number in numbers
+                    for number in hit_indices
                 ]
             )
     return found

@@ -82,7 +82,7 @@ def sample_pairs(
     squareness = (alignments - settings.cone_cosine) / (1.0 - settings.cone_cosine)
     best = np.argsort(offsets / extent - squareness, kind="stable")[: settings.max_pairs]
     found = (
-        ContactPair(points[one], points[other], float(alignment))
-        for one, other, alignment in zip(first[best], second[best], alignments[best], strict=True)
+        ContactPair(points[first_index], points[second_index], float(alignment))
+        for first_index, second_index, alignment in zip(first[best], second[best], alignments[best], strict=True)
     )
     return FoundPairs(distinct_pairs(found, settings), narrowest)

@@ -109,8 +109,8 @@ class CloudSource:
             )
         return {link: self._transforms.matrix(frame, link, found_stamp) for link, found_stamp in stamps.items()}
 
-    def _stamps(self, frame: str, others: Sequence[str], stamp: rospy.Time) -> dict[str, rospy.Time]:
-        return self._transforms.stamps(frame, others, stamp, TRANSFORM_TIMEOUT_S)
+    def _stamps(self, frame: str, sources: Sequence[str], stamp: rospy.Time) -> dict[str, rospy.Time]:
+        return self._transforms.stamps(frame, sources, stamp, TRANSFORM_TIMEOUT_S)
 
     def _message(self, topic: str, timeout_s: float) -> PointCloud2:
         """Returns the first message that shows the world at the current time or later.

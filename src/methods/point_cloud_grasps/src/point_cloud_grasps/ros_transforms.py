@@ -48,46 +48,46 @@ class Transforms:
         """Names of the frames that have a parent."""
         return sorted(yaml.safe_load(self._buffer.all_frames_as_yaml()) or [])
 
-    def stamps(self, frame: str, others: Sequence[str], stamp: rospy.Time, timeout_s: float) -> dict[str, rospy.Time]:
+    def stamps(self, frame: str, sources: Sequence[str], stamp: rospy.Time, timeout_s: float) -> dict[str, rospy.Time]:
         """Returns the time at which each source frame has a transform: the requested time, or slightly earlier.
 
         While time is held, joints with a low publication rate have no transform at the current time.
 
         Args:
             frame: Target frame.
-            others: Source frames; those without a transform near that time are omitted.
+            sources: Source frames; those without a transform near that time are omitted.
             stamp: Requested time.
             timeout_s: Maximum wait for transforms at that time [s of real time].
         """
-        known = [other for other in others if self._is_known(frame, other, rospy.Time(0))] or list(others)
-        wait_until(lambda: all(self._is_known(frame, other, stamp) for other in known), timeout_s)
+        known = [source for source in sources if self._is_known(frame, source, rospy.Time(0))] or list(sources)
+        wait_until(lambda: all(self._is_known(frame, source, stamp) for source in known), timeout_s)
         found = {}
-        for other in others:
-            if self._is_known(frame, other, stamp):
-                found[other] = stamp
-            elif self._is_known(frame, other, rospy.Time(0)):
-                latest = self._buffer.get_latest_common_time(frame, other)
+        for source in sources:
+            if self._is_known(frame, source, stamp):
+                found[source] = stamp
+            elif self._is_known(frame, source, rospy.Time(0)):
+                latest = self._buffer.get_latest_common_time(frame, source)
                 if abs((stamp - latest).to_sec()) <= LATE_TRANSFORM_S:
-                    found[other] = latest
+                    found[source] = latest
         return found
 
-    def matrix(self, frame: str, other: str, stamp: rospy.Time) -> Array:
+    def matrix(self, frame: str, source: str, stamp: rospy.Time) -> Array:
         """Returns a transform, shape (4, 4).
 
         Args:
             frame: Target frame.
-            other: Source frame.
+            source: Source frame.
             stamp: Time returned by :meth:`stamps`.
         """
-        found = self._buffer.lookup_transform_core(frame, other, stamp).transform
+        found = self._buffer.lookup_transform_core(frame, source, stamp).transform
         matrix = np.eye(4)
         rotation, translation = found.rotation, found.translation
         matrix[:3, :3] = Rotation.from_quat([rotation.x, rotation.y, rotation.z, rotation.w]).as_matrix()
         matrix[:3, 3] = translation.x, translation.y, translation.z
         return matrix
 
-    def _is_known(self, frame: str, other: str, stamp: rospy.Time) -> bool:
-        return bool(self._buffer.can_transform_core(frame, other, stamp)[0])
+    def _is_known(self, frame: str, source: str, stamp: rospy.Time) -> bool:
+        return bool(self._buffer.can_transform_core(frame, source, stamp)[0])
 
     def _on_transforms(self, message: TFMessage) -> None:
         for transform in message.transforms:

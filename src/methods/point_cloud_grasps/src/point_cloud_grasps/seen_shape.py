@@ -63,7 +63,7 @@ def completed_shape(points: Array, spacing: float, support_z: float) -> SeenShap
     slopes = np.stack(
         [
             ndimage.gaussian_filter(
-                filled, sigma, order=tuple(int(axis == other) for other in range(3)), mode="nearest"
+                filled, sigma, order=tuple(int(axis == derivative_axis) for derivative_axis in range(3)), mode="nearest"
             )[tuple(border.T)]
             for axis in range(3)
         ],
@@ -76,11 +76,11 @@ def completed_shape(points: Array, spacing: float, support_z: float) -> SeenShap
     # a step smoothed with a Gaussian has the cumulative normal distribution of the distance from the step
     beyond = _standard_quantile(smooth[tuple(border.T)]) * sigma
     offsets = np.array([*low, support_z - MARGIN * cell]) + cell / 2
-    places = border * cell + offsets + normals * (beyond * cell)[:, None]
-    kept = places[:, 2] >= support_z
+    positions = border * cell + offsets + normals * (beyond * cell)[:, None]
+    kept = positions[:, 2] >= support_z
     edges = np.where(tops > support_z, tops, ndimage.maximum_filter(tops, 3))
-    unseen = np.maximum(0.0, edges[border[:, 0], border[:, 1]] - places[:, 2])
-    return SeenShape(_surface(places[kept], normals[kept], filled, cell, offsets, support_z), unseen[kept])
+    unseen = np.maximum(0.0, edges[border[:, 0], border[:, 1]] - positions[:, 2])
+    return SeenShape(_surface(positions[kept], normals[kept], filled, cell, offsets, support_z), unseen[kept])
 
 
 def _column_tops(points: Array, radius: float, cell: float, support_z: float) -> tuple[Array, Array]:

@@ -42,9 +42,9 @@ def spawn(entry: dict[str, Any]) -> None:
     x, y, z, w = Rotation.from_euler("xyz", entry["rpy"]).as_quat()
     pose = Pose(Point(*entry["position"]), Quaternion(x, y, z, w))
     request = SpawnModel._request_class(entry["name"], _description(entry["model"]), "", pose, "world")
-    answer = call_service(proxy, request, SERVICE_TIMEOUT_S)
-    if not answer.success:
-        raise WorldError(f"object '{entry['name']}' cannot be spawned: {answer.status_message}")
+    response = call_service(proxy, request, SERVICE_TIMEOUT_S)
+    if not response.success:
+        raise WorldError(f"object '{entry['name']}' cannot be spawned: {response.status_message}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +92,10 @@ def judge() -> Judgement:
     nodes = next((nodes for name, nodes in services if name == REFEREE_SERVICE), [])
     if nodes and nodes != [SIMULATION_NODE]:
         raise InterferenceError(f"'{REFEREE_SERVICE}' is answered by '{', '.join(nodes)}', not by the simulation")
-    answer = request_service(REFEREE_SERVICE, Trigger, TriggerRequest(), SERVICE_TIMEOUT_S)
-    if not answer.success:
-        raise WorldError(f"the simulation does not judge the world: {answer.message}")
-    return Judgement(**json.loads(answer.message))
+    response = request_service(REFEREE_SERVICE, Trigger, TriggerRequest(), SERVICE_TIMEOUT_S)
+    if not response.success:
+        raise WorldError(f"the simulation does not judge the world: {response.message}")
+    return Judgement(**json.loads(response.message))
 
 
 def _description(model: str) -> str:

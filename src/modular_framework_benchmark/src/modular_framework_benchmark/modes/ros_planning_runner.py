@@ -66,28 +66,28 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         """Plans one problem and writes the motion to `trajectory.parquet` in the folder."""
         prepared = self.prepared(spec.settings)
         problem = _read_problem(spec.settings, prepared.model)
-        started_s, answer, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
+        started_s, response, code, reason = watch.elapsed_s(), None, ErrorCode.SUCCESS, ""
         statistics: PlanStatistics | None = None
         try:
-            answer = prepared.seeded.plan(prepared.pipeline, problem.request, spec.seed)
-            statistics = answer.statistics
+            response = prepared.seeded.plan(prepared.pipeline, problem.request, spec.seed)
+            statistics = response.statistics
         except PlanningError as error:
             statistics = error.statistics
             code, reason = error.code, f"{problem.name}: {error.code.name}: {error.reason}"
         ended_s = watch.elapsed_s()
-        if answer is not None and spec.settings.get("record", {}).get("trajectories", True):
-            write_motion(answer.trajectory, folder / "trajectory.parquet")
+        if response is not None and spec.settings.get("record", {}).get("trajectories", True):
+            write_motion(response.trajectory, folder / "trajectory.parquet")
         report = ComponentReport(
             component="planning",
             name=problem.name,
-            succeeded=answer is not None,
+            succeeded=response is not None,
             reason=reason,
             started_s=started_s,
             ended_s=ended_s,
             wall_s=ended_s - started_s,
             figures=({} if statistics is None else {PROCESSOR_TIME: statistics.processor_s})
-            | (_figures(problem, answer, spec.settings) if answer is not None else {}),
-            motion=_motion(answer.trajectory) if answer is not None else None,
+            | (_figures(problem, response, spec.settings) if response is not None else {}),
+            motion=_motion(response.trajectory) if response is not None else None,
             ran=_ran(statistics, prepared.model),
         )
         return measured_record(spec, _status(code), code.name, report, folder, watch)
@@ -168,11 +168,11 @@ def _status(code: ErrorCode) -> EpisodeStatus:
             return EpisodeStatus.FAILED
 
 
-def _figures(problem: MotionProblem, answer: PlanningAnswer, settings: Mapping[str, Any]) -> dict[Figure, float]:
+def _figures(problem: MotionProblem, response: PlanningAnswer, settings: Mapping[str, Any]) -> dict[Figure, float]:
     """Returns the figures of `metrics.planning`; the clearance only on request, because it takes seconds."""
-    figures = {PLANNING_TIME: answer.total_time_s, SEARCH_TIME: answer.planning_time_s}
+    figures = {PLANNING_TIME: response.total_time_s, SEARCH_TIME: response.planning_time_s}
     if "clearance" in settings.get("metrics", ()):
-        figures[CLEARANCE] = _clearance(problem, answer)
+        figures[CLEARANCE] = _clearance(problem, response)
     return figures
 
 
@@ -182,12 +182,12 @@ def _motion(trajectory: Trajectory) -> Motion:
     return Motion(trajectory.joint_names, times, trajectory.positions_at(times))
 
 
-def _clearance(problem: MotionProblem, answer: PlanningAnswer) -> float:
+def _clearance(problem: MotionProblem, response: PlanningAnswer) -> float:
     """Returns the minimum distance of the checked pairs along the motion [m]."""
-    motion, model = answer.trajectory, problem.request.scene.model
+    motion, model = response.trajectory, problem.request.scene.model
     checker = DEFAULT_CHECKER(problem.request.scene, model.group(problem.request.group).indices)
     times = np.linspace(0.0, motion.duration_s, min(CLEARANCE_STATES, len(motion.sample_times())))
-    positions = np.tile(answer.start, (len(times), 1))
+    positions = np.tile(response.start, (len(times), 1))
     positions[:, [model.index[name] for name in motion.joint_names]] = motion.positions_at(times)
     return min(checker.distance(model.with_mimics(row)) for row in positions)
 
