@@ -14,7 +14,7 @@ from modular_framework_planning.collision_detection.exact_collision_checker impo
 from modular_framework_planning.collision_detection.kernels import compiled_paths
 from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD, World
 from modular_framework_planning.collision_detection.kernels.compiled_distance_field import field_distance
-from modular_framework_planning.collision_detection.reaches import farthest_end
+from modular_framework_planning.collision_detection.reaches import max_reach
 from modular_framework_planning.geometry.shapes import Box, Cylinder, Mesh, Shape, Sphere
 from modular_framework_planning.planning_scene.planning_scene import CollisionObject, PlanningScene, empty_scene
 from modular_framework_planning.robot_model.robot_model import RobotModel
@@ -179,7 +179,7 @@ def test_a_body_moves_no_farther_than_the_bound_and_the_bound_of_a_straight_moti
         change = rng.uniform(-1.0, 1.0, len(middle)) * rng.choice([0.01, 0.1, 0.5])
         samples = compiled_paths.sample(np.array([middle - change, middle + change]), 1.0e-3)
         stretch = compiled_paths.new_workspace(world).stretch
-        compiled_paths.look_at(world, samples, 0, int(samples.numbers[-1]), True, stretch)
+        compiled_paths.evaluate_middle(world, samples, 0, int(samples.at_vertices[-1]), True, stretch)
         for body in np.flatnonzero(world.joints >= 0):
             joint = int(world.joints[body]) + 1
             x, y, z, radius = world.spheres[body]
@@ -210,5 +210,5 @@ def test_the_farthest_end_bounds_where_points_of_the_robot_can_be(small: RobotMo
                 for item in small.link_geometries
             ),
         )
-    assert 0.8 * farthest < farthest_end(world.tree, world) < 2.0 * farthest
-    assert farthest <= farthest_end(world.tree, world)
+    assert 0.8 * farthest < max_reach(world.tree, world) < 2.0 * farthest
+    assert farthest <= max_reach(world.tree, world)

@@ -157,11 +157,11 @@ def assert_many_graze(counts: list[int]) -> None:
     assert counts.count(0) > len(counts) / 10 and sum(0 < count <= 5 for count in counts) > len(counts) / 3, counts
 
 
-@pytest.mark.parametrize("undecided_rows", [exact_collision_checker.UNDECIDED_ROWS, 1])
+@pytest.mark.parametrize("undecided_rows", [exact_collision_checker.INITIAL_UNDECIDED_ROWS, 1])
 def test_no_touching_sample_of_an_arms_path_is_passed_over_and_no_free_path_is_refused(
     robot: object, monkeypatch: pytest.MonkeyPatch, undecided_rows: int
 ) -> None:
-    monkeypatch.setattr(exact_collision_checker, "UNDECIDED_ROWS", undecided_rows)
+    monkeypatch.setattr(exact_collision_checker, "INITIAL_UNDECIDED_ROWS", undecided_rows)
     rng = np.random.default_rng(31 + undecided_rows)
     assert_many_graze(
         [world.touching_samples(world.grazing_path(rng)) for world in arm_worlds(robot, rng) for _ in range(ARM_PATHS)]
@@ -187,7 +187,7 @@ def test_a_path_that_stays_close_to_contact_asks_the_exact_check_about_undecided
         return touching_pair(exact, positions, pairs)
 
     def questions(rows: int) -> list[int]:
-        monkeypatch.setattr(exact_collision_checker, "UNDECIDED_ROWS", rows)
+        monkeypatch.setattr(exact_collision_checker, "INITIAL_UNDECIDED_ROWS", rows)
         checker = ExactCollisionChecker(bars.scene, bars.indices)
         asked.clear()
         assert all(checker.path_is_free(path, FINE_STEP) for path in paths)

@@ -15,7 +15,7 @@ from test_distance_field import random_world
 from test_rrt_connect import COVER, GOAL, START, UPRIGHT, WALL, problem_in, scene_with, search
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
-from modular_framework_planning.collision_detection.kernels.compiled_collision import ASKED, TOUCHING_EXACTLY
+from modular_framework_planning.collision_detection.kernels.compiled_collision import EXACTLY_TOUCHING, REQUESTED
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.plan_statistics import CheckCounts, PlanStatistics, Refusals
@@ -87,7 +87,7 @@ def test_an_edge_that_the_bounds_leave_open_counts_as_undecided_and_once(small: 
     touching_plate = scene_with(small, (COVER[0], np.array([0.0, 0.0, top + 0.01 - 1.0e-9])))
     checker = ExactCollisionChecker(touching_plate, problem.group.indices)
     assert not checker.is_free(problem.motion.full_positions(UPRIGHT))
-    assert refused(checker.check_counts) == checker.check_counts[ASKED] == 1
+    assert refused(checker.check_counts) == checker.check_counts[REQUESTED] == 1
     assert np.array_equal(before, problem.checker.check_counts), "each checker counts for itself"
 
 
@@ -99,8 +99,8 @@ def test_searches_side_by_side_are_counted_together(small: RobotModel) -> None:
     ]
     both = ParallelSearch(problem, searches)
     assert both.run() is not None
-    assert problem.checker.check_counts[ASKED] == both.checks
-    assert problem.checker.check_counts[TOUCHING_EXACTLY] <= both.checks
+    assert problem.checker.check_counts[REQUESTED] == both.checks
+    assert problem.checker.check_counts[EXACTLY_TOUCHING] <= both.checks
 
 
 def test_a_part_inside_another_one_counts_for_itself(small: RobotModel) -> None:

@@ -15,9 +15,9 @@ from test_collision_checkers import SHAPES, SMALL_SRDF, SMALL_URDF
 
 from modular_framework_planning.collision_detection.exact_collision_checker import ExactCollisionChecker
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
-    ASKED,
     FOUND_FREE,
     FOUND_TOUCHING,
+    REQUESTED,
 )
 from modular_framework_planning.geometry.shapes import Box, Mesh, Plane, Shape
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
@@ -184,7 +184,7 @@ def test_of_searches_side_by_side_the_same_one_wins_whatever_edges_the_bounds_le
             ]
             paths.append(ParallelSearch(problem, searches).run())
             counts = problem.checker.check_counts
-            undecided.append(int(counts[ASKED] - counts[FOUND_FREE] - counts[FOUND_TOUCHING]))
+            undecided.append(int(counts[REQUESTED] - counts[FOUND_FREE] - counts[FOUND_TOUCHING]))
         assert undecided[0] > 10 * undecided[1], "the near wall leaves far more edges open"
         assert paths[0] is not None and np.array_equal(paths[0], paths[1]), seed
 

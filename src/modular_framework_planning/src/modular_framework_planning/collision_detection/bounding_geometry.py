@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the bounding geometries that compiled checks work on.
+"""Bounding geometries for the compiled collision checks.
 
-Whatever Coal geometry a body has, it gets a surface of triangles, a solid in closed form, or both. Either
-encloses the body; where it is larger than the body, a hit is not final and the exact check decides.
+Every Coal geometry is enclosed by a triangle surface, a closed-form solid, or both. A hit on an enclosure larger than
+the body is inconclusive; the exact check decides.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from modular_framework_planning.geometry.shapes import Box, Capsule, Cone, Cylin
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.octomap.octree import Octree
 
-LONGEST_EDGE, LONGEST_SHARE = 0.02, 0.05  # [m], and as a share of a surface's extent; longer triangles are cut
-SIDES = 64  # of the prism around a cylinder or cone: 1.2 mm too wide at 1 m radius
+MAX_EDGE_M, MAX_EDGE_FRACTION = 0.02, 0.05  # triangles with longer edges are cut; fraction of the surface's extent
+PRISM_SIDES = 64  # the prism around a cylinder of 1 m radius is 1.2 mm too wide
 _lock = threading.Lock()
 
 
@@ -49,16 +49,17 @@ class BoundingGeometry:
     """The bounding geometry of one body, in the frame of the body's geometry.
 
     Attributes:
-        corners: gives the corners of the surface's triangles, shape (m, 9) [m]; None for no surface.
-        inflation_radius: radius of a ball around every point of the surface that belongs to it [m].
-        surface_excess: how far the inflated surface lies outside of the geometry at most [m]; infinite if not known.
-        kind, size: closed form, SURFACE for none.
-        solid_excess: how far the closed form lies outside of the geometry at most [m].
-        offset: pose of both in the geometry's frame.
-        is_closed: whether the surface has an inside.
+        triangles: Function that returns the vertices of the surface triangles, shape (m, 9) [m]; None for no surface.
+        inflation_radius: Radius by which the surface is inflated [m].
+        surface_excess: Maximum distance of the inflated surface outside the geometry [m]; infinite if unknown.
+        kind: Type of the closed form; SURFACE for none.
+        size: Three parameters of the closed form, see solid_distance.
+        solid_excess: Maximum distance of the closed form outside the geometry [m].
+        offset: Pose of surface and closed form in the geometry's frame.
+        is_closed: Whether the surface has an inside.
     """
 
-    corners: Callable[[], Array] | None
+    triangles: Callable[[], Array] | None
     inflation_radius: float = 0.0
     surface_excess: float = 0.0
     kind: int = SURFACE
@@ -70,17 +71,17 @@ class BoundingGeometry:
     @cached_property
     def surface(self) -> Surfaces | None:
         """Sphere tree over the triangles; built on first use, because most solids are checked in closed form."""
-        return None if self.corners is None else _surface(self.corners())
+        return None if self.triangles is None else _surface(self.triangles())
 
     @cached_property
-    def numbers(self) -> tuple[float, ...]:
-        """Kind, three sizes, inflation, excess of surface and closed form, is closed, radius."""
+    def array_row(self) -> tuple[float, ...]:
+        """Kind, three size parameters, inflation radius, surface excess, solid excess, is_closed, bounding radius."""
         excess = self.surface_excess, self.solid_excess
         return (self.kind, *self.size, self.inflation_radius, *excess, self.is_closed, self.radius)
 
     @property
     def radius(self) -> float:
-        """Radius of a ball around the closed form's origin that holds it [m]; infinite without a closed form."""
+        """Radius of the bounding sphere around the closed form's origin [m]; infinite without a closed form."""
         x, y, z = self.size
         match self.kind:
             case _ if self.kind == BOX:
@@ -92,24 +93,24 @@ class BoundingGeometry:
         return np.inf
 
 
-_of_shapes: WeakKeyDictionary[Shape, BoundingGeometry] = WeakKeyDictionary()
+_cache: WeakKeyDictionary[Shape, BoundingGeometry] = WeakKeyDictionary()
 
 
 def bounding_geometry_of(part: PlacedGeometry) -> BoundingGeometry:
-    """Returns the bounding geometry of a body's geometry; that of a shape is made once."""
+    """Returns the bounding geometry of a body's geometry, cached per shape."""
     with _lock:
-        found = _of_shapes.get(part.source)
-        if found is None:
-            found = _of_shapes[part.source] = _make(part.source)
-        return found
+        cached = _cache.get(part.source)
+        if cached is None:
+            cached = _cache[part.source] = _build(part.source)
+        return cached
 
 
-def _make(source: Shape) -> BoundingGeometry:
+def _build(source: Shape) -> BoundingGeometry:
     match source:
         case Octree():
             points = np.tile(source.centers, 3)
-            around = source.resolution * np.sqrt(0.75)  # radius of the ball around a voxel
-            return BoundingGeometry(lambda: points, around, around - 0.5 * source.resolution)
+            voxel_radius = source.resolution * np.sqrt(0.75)
+            return BoundingGeometry(lambda: points, voxel_radius, voxel_radius - 0.5 * source.resolution)
         case Mesh():
             vertices = np.asarray(source.vertices, dtype=float)
             faces = np.asarray(source.triangles, dtype=np.int64)
@@ -172,21 +173,21 @@ def _bounding_box(geometry: Any) -> BoundingGeometry:
 
 def _surface(triangles: Array) -> Surfaces:
     triangles = np.ascontiguousarray(triangles, dtype=float)
-    corners = triangles.reshape(-1, 3)
-    extent = float(np.linalg.norm(np.ptp(corners, axis=0)))
-    triangles = cut_long_edges(triangles, max(LONGEST_EDGE, LONGEST_SHARE * extent))
-    spheres, boxes, links = build_sphere_tree(triangles)
-    return Surfaces(spheres, boxes, links, triangles)
+    vertices = triangles.reshape(-1, 3)
+    extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    triangles = cut_long_edges(triangles, max(MAX_EDGE_M, MAX_EDGE_FRACTION * extent))
+    spheres, boxes, children = build_sphere_tree(triangles)
+    return Surfaces(spheres, boxes, children, triangles)
 
 
 def _is_closed(vertices: Array, faces: Any) -> bool:
-    """Whether every edge is passed as often in one direction as in the other: then the surface has an inside."""
+    """Whether the surface has an inside: every edge then occurs equally often in both directions."""
     order = np.lexsort(np.round(vertices, 7).T)
     ranked = np.round(vertices[order], 7)
     ranks = np.concatenate([[0], np.cumsum((np.diff(ranked, axis=0) != 0.0).any(axis=1))])
-    corners = np.empty(len(vertices), dtype=np.int64)
-    corners[order] = ranks
-    faces = corners[faces]
+    vertex_ids = np.empty(len(vertices), dtype=np.int64)
+    vertex_ids[order] = ranks
+    faces = vertex_ids[faces]
     starts, ends = faces.ravel(), faces[:, [1, 2, 0]].ravel()
     size = int(faces.max()) + 1
     return bool(np.array_equal(np.sort(starts * size + ends), np.sort(ends * size + starts)))
@@ -196,44 +197,46 @@ def _box_triangles(x: float, y: float, z: float) -> Array:
     result = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
-            corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
-            face = np.insert(corners, axis, sign, axis=1) * (x, y, z)
+            square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+            face = np.insert(square, axis, sign, axis=1) * (x, y, z)
             result += [face[[0, 1, 2]], face[[0, 2, 3]]]
     return np.array(result).reshape(-1, 9)
 
 
-def _prism_triangles(below: float, above: float, half: float) -> Array:
-    """A prism (or pyramid) around a cylinder (or cone) along z with the given radii at both ends."""
-    angles = np.arange(SIDES + 1) * 2.0 * np.pi / SIDES
-    rim = np.column_stack([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / SIDES)
+def _prism_triangles(bottom_radius: float, top_radius: float, half: float) -> Array:
+    """Returns a prism (or pyramid) around a cylinder (or cone) along z, `half` [m] to either side of the origin."""
+    angles = np.arange(PRISM_SIDES + 1) * 2.0 * np.pi / PRISM_SIDES
+    rim = np.column_stack([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / PRISM_SIDES)
     result = []
-    for here, there in zip(rim[:-1], rim[1:], strict=True):
+    for start, end in zip(rim[:-1], rim[1:], strict=True):
         a, b, c, d = (
-            [*(point * radius), z] for z, radius in ((-half, below), (half, above)) for point in (here, there)
+            [*(point * radius), z]
+            for z, radius in ((-half, bottom_radius), (half, top_radius))
+            for point in (start, end)
         )
         result += [[a, b, [0, 0, -half]], [a, b, d], [a, d, c]]
-        if above > 0.0:
+        if top_radius > 0.0:
             result.append([c, d, [0, 0, half]])
     return np.array(result, dtype=float).reshape(-1, 9)
 
 
 def _prism_excess(radius: float) -> float:
-    """Returns how far the prism around a cylinder (or cone) lies outside of it at most [m]."""
-    return radius * (1.0 / float(np.cos(np.pi / SIDES)) - 1.0)
+    """Returns the maximum distance of the prism outside its cylinder (or cone) [m]."""
+    return radius * (1.0 / float(np.cos(np.pi / PRISM_SIDES)) - 1.0)
 
 
-def moved(triangles: Array, pose: Transform) -> Array:
-    """Returns triangles (m, 9) in the frame in which their own frame has the given pose."""
-    corners = triangles.reshape(-1, 3) @ pose.rotation.T + pose.translation
-    return np.ascontiguousarray(corners.reshape(-1, 9))
+def transform_triangles(triangles: Array, pose: Transform) -> Array:
+    """Returns triangles, shape (m, 9), moved by a pose."""
+    vertices = triangles.reshape(-1, 3) @ pose.rotation.T + pose.translation
+    return np.ascontiguousarray(vertices.reshape(-1, 9))
 
 
-def stacked(surfaces: Sequence[Surfaces]) -> tuple[Surfaces, list[int]]:
-    """Returns surfaces in one set of arrays and the root node of each."""
+def stack_surfaces(surfaces: Sequence[Surfaces]) -> tuple[Surfaces, list[int]]:
+    """Returns the surfaces in one set of arrays, and the root node of each."""
     nodes = np.cumsum([0, *(len(item.spheres) for item in surfaces)])
     faces = np.cumsum([0, *(len(item.triangles) for item in surfaces)])
-    links = [
-        np.where(item.links[:, :1] < 0, [[-1, 0]] + item.links * [[0, 1]] + [[0, face]], item.links + node)
+    children = [
+        np.where(item.children[:, :1] < 0, [[-1, 0]] + item.children * [[0, 1]] + [[0, face]], item.children + node)
         for item, node, face in zip(surfaces, nodes, faces, strict=False)
     ]
     if not surfaces:
@@ -241,6 +244,6 @@ def stacked(surfaces: Sequence[Surfaces]) -> tuple[Surfaces, list[int]]:
     return Surfaces(
         np.concatenate([item.spheres for item in surfaces]),
         np.concatenate([item.boxes for item in surfaces]),
-        np.ascontiguousarray(np.concatenate(links), dtype=np.int32),
+        np.ascontiguousarray(np.concatenate(children), dtype=np.int32),
         np.concatenate([item.triangles for item in surfaces]),
     ), nodes[:-1].tolist()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lists the bodies of a scene that can collide, and the pairs of them that are checked."""
+"""The bodies of a scene that can collide, and the pairs of bodies to check."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 Joints = Sequence[int] | NDArray[np.int64] | None
-KEPT_PAIRS = 16  # for how many robots or scenes what depends on pairs of bodies is kept
-UNNAMED = Body("", WORLD)  # stands for all bodies of the world that the allowed collision matrix does not name
+PAIR_CACHE_SIZE = 16  # robots or scenes whose pairs are cached
+UNNAMED = Body("", WORLD)  # represents all bodies of the world that the allowed collision matrix does not name
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,10 +27,11 @@ class PlacedGeometry:
     """A collision geometry of a body.
 
     Attributes:
-        joint_id: Pinocchio's number of the joint that moves it, 0 for the world.
-        placement: pose in that joint's frame.
-        source: the shape, which never changes.
-        margin: distance it keeps from bodies of the world [m].
+        body: Body that owns the geometry.
+        joint_id: Pinocchio id of the joint that moves the geometry, 0 for the world.
+        placement: Pose in the joint's frame.
+        source: Immutable shape.
+        margin: Minimum distance from bodies of the world [m].
     """
 
     body: Body
@@ -42,7 +43,7 @@ class PlacedGeometry:
 
 @dataclass(frozen=True, slots=True)
 class WatchedPair:
-    """Two geometries, by index, that may not come closer than `margin` [m]; `is_fixed` where no joint moves them."""
+    """Indices of two geometries that must keep `margin` [m]; `is_fixed` if no joint changes their relative pose."""
 
     first: int
     second: int
@@ -52,12 +53,12 @@ class WatchedPair:
 
 @dataclass(frozen=True, eq=False)
 class WatchedPairs:
-    """Pairs of geometries that may not come closer than a margin.
+    """Pairs of geometries that must keep a margin.
 
     Attributes:
-        parts: the two geometries of each by index, shape (n, 2).
-        margins: distance they must keep [m], shape (n,).
-        fixed: whether no joint moves them against each other, shape (n,).
+        parts: Indices of the two geometries, shape (n, 2).
+        margins: Minimum distances, shape (n,) [m].
+        fixed: Whether no joint changes the relative pose, shape (n,).
     """
 
     parts: NDArray[np.int64]
@@ -65,35 +66,35 @@ class WatchedPairs:
     fixed: NDArray[np.bool_]
 
     @cached_property
-    def moving_numbers(self) -> NDArray[np.int64]:
-        """Numbers of the pairs that joints move against each other."""
+    def moving_indices(self) -> NDArray[np.int64]:
+        """Indices of the pairs whose relative pose joints can change."""
         return np.flatnonzero(~self.fixed)
 
     @cached_property
     def moving(self) -> WatchedPairs:
-        """Pairs that joints move against each other."""
-        return self.chosen(self.moving_numbers)
+        """Pairs whose relative pose joints can change."""
+        return self.subset(self.moving_indices)
 
     def __len__(self) -> int:
         return len(self.parts)
 
-    def __getitem__(self, number: int) -> WatchedPair:
-        first, second = self.parts[number].tolist()
-        return WatchedPair(first, second, float(self.margins[number]), bool(self.fixed[number]))
+    def __getitem__(self, index: int) -> WatchedPair:
+        first, second = self.parts[index].tolist()
+        return WatchedPair(first, second, float(self.margins[index]), bool(self.fixed[index]))
 
-    def chosen(self, numbers: NDArray[np.int64]) -> WatchedPairs:
-        """Returns some of the pairs, by their numbers; the same ones again for the same numbers."""
-        return _chosen(self, numbers.tobytes())
+    def subset(self, indices: NDArray[np.int64]) -> WatchedPairs:
+        """Returns the pairs with these indices, cached per index array."""
+        return _subset(self, indices.tobytes())
 
 
-@lru_cache(maxsize=KEPT_PAIRS)
-def _chosen(pairs: WatchedPairs, numbers: bytes) -> WatchedPairs:
-    chosen = np.frombuffer(numbers, dtype=np.int64)
-    return WatchedPairs(pairs.parts[chosen], pairs.margins[chosen], pairs.fixed[chosen])
+@lru_cache(maxsize=PAIR_CACHE_SIZE)
+def _subset(pairs: WatchedPairs, index_bytes: bytes) -> WatchedPairs:
+    indices = np.frombuffer(index_bytes, dtype=np.int64)
+    return WatchedPairs(pairs.parts[indices], pairs.margins[indices], pairs.fixed[indices])
 
 
 def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
-    """Returns every collision geometry of a scene: links, held objects, then the world."""
+    """Returns the collision geometries of links, then of held objects, then of the world."""
     model = scene.model
     result = list(_placed_links(model, tuple(scene.link_margins().tolist())))
     for held in scene.attached.values():
@@ -102,13 +103,13 @@ def placed_geometries(scene: PlanningScene) -> list[PlacedGeometry]:
         for shape, pose in held.body.shapes:
             placement = frame.placement * held.body.pose * pose
             result.append(PlacedGeometry(body, frame.parentJoint, placement, shape, scene.attached_padding()))
-    for thing in scene.obstacles():
-        for shape, pose in thing.shapes:
-            result.append(PlacedGeometry(Body(thing.name, WORLD), 0, thing.pose * pose, shape, 0.0))
+    for obstacle in scene.obstacles():
+        for shape, pose in obstacle.shapes:
+            result.append(PlacedGeometry(Body(obstacle.name, WORLD), 0, obstacle.pose * pose, shape, 0.0))
     return result
 
 
-@lru_cache(maxsize=KEPT_PAIRS)
+@lru_cache(maxsize=PAIR_CACHE_SIZE)
 def _placed_links(model: RobotModel, margins: tuple[float, ...]) -> tuple[PlacedGeometry, ...]:
     return tuple(
         PlacedGeometry(Body(item.link, LINK, item.link), item.joint_id, item.placement, item.shape, margin)
@@ -117,23 +118,23 @@ def _placed_links(model: RobotModel, margins: tuple[float, ...]) -> tuple[Placed
 
 
 def watched_pairs(scene: PlanningScene, parts: Sequence[PlacedGeometry], moving: Joints) -> WatchedPairs:
-    """Returns the pairs that may not touch, the same ones again for scenes that differ only in poses and shapes.
+    """Returns the pairs that may not touch, cached across scenes that differ only in poses and shapes.
 
     Args:
-        scene: whose allowed collisions count.
-        parts: geometries of the scene.
-        moving: joints that will move, as indices in a position vector; all by default.
+        scene: Scene with the allowed collisions.
+        parts: Geometries of the scene.
+        moving: Indices of the joints that will move; None for all joints.
     """
-    chosen = None if moving is None else tuple(int(number) for number in moving)
+    moving_joints = None if moving is None else tuple(int(joint) for joint in moving)
     named, links = scene.acm.named, len(scene.model.link_geometries)
     others = tuple(
         part.body if part.body.kind != WORLD or part.body.name in named else UNNAMED for part in parts[links:]
     )
     joint_ids, margins = tuple([part.joint_id for part in parts]), tuple([part.margin for part in parts])
-    return _watched_pairs(scene.model, chosen, *scene.acm.verdicts, others, joint_ids, margins)
+    return _watched_pairs(scene.model, moving_joints, *scene.acm.verdicts, others, joint_ids, margins)
 
 
-@lru_cache(maxsize=KEPT_PAIRS)
+@lru_cache(maxsize=PAIR_CACHE_SIZE)
 def _watched_pairs(
     model: RobotModel,
     moving: tuple[int, ...] | None,
@@ -146,89 +147,89 @@ def _watched_pairs(
     """Returns the pairs that may not touch.
 
     Args:
-        model: the robot.
-        moving: as for watched_pairs.
-        entries: of the allowed collision matrix.
-        defaults: of the same.
-        others: bodies of the geometries that are not links, those of the world last.
-        joint_ids: of all geometries, see PlacedGeometry.
-        margins: of all geometries, see PlacedGeometry.
+        model: Robot model.
+        moving: Indices of the joints that will move; None for all joints.
+        entries: Entries of the allowed collision matrix.
+        defaults: Default entries of the matrix.
+        others: Bodies of the geometries that are not links, bodies of the world last.
+        joint_ids: PlacedGeometry.joint_id of all geometries.
+        margins: PlacedGeometry.margin of all geometries.
     """
-    own = _link_pairs(model, moving, entries, defaults)
+    self_pairs = _link_pairs(model, moving, entries, defaults)
     if not others:
-        return own
+        return self_pairs
     bodies = [*(part.body for part in _placed_links(model, margins[: len(model.link_geometries)])), *others]
     kinds, links, joints = np.array([body.kind for body in bodies]), len(model.link_geometries), np.array(joint_ids)
-    rows = int(np.count_nonzero(kinds != WORLD))
-    support, standing = _rigid_joints(model, moving)
+    robot_count = int(np.count_nonzero(kinds != WORLD))
+    support_ids, rigid_ids = _rigid_joints(model, moving)
     acm = AllowedCollisionMatrix(dict(entries), dict(defaults))
-    allowed = _allowed(acm, bodies[:rows], others)
-    numbers, held = np.arange(len(bodies)), kinds == ATTACHED
-    first, second = numbers[:rows, None], numbers[None, links:]  # bodies of the world do not move against each other
-    is_rigid = (standing[joints[first]] == standing[joints[second]]) & ~held[first] & ~held[second]
+    allowed = _allowed(acm, bodies[:robot_count], others)
+    indices, held = np.arange(len(bodies)), kinds == ATTACHED
+    first, second = indices[:robot_count, None], indices[None, links:]  # the world has no moving pairs of its own
+    is_rigid = (rigid_ids[joints[first]] == rigid_ids[joints[second]]) & ~held[first] & ~held[second]
     checked = np.nonzero((second > first) & ~is_rigid & ~allowed)
     first, second = checked[0], checked[1] + links
     return WatchedPairs(
-        np.concatenate([own.parts, np.column_stack([first, second])]),
-        np.concatenate([own.margins, np.where(second >= rows, np.array(margins)[first], 0.0)]),
-        np.concatenate([own.fixed, support[joints[first]] == support[joints[second]]]),
+        np.concatenate([self_pairs.parts, np.column_stack([first, second])]),
+        np.concatenate([self_pairs.margins, np.where(second >= robot_count, np.array(margins)[first], 0.0)]),
+        np.concatenate([self_pairs.fixed, support_ids[joints[first]] == support_ids[joints[second]]]),
     )
 
 
-def _allowed(acm: AllowedCollisionMatrix, ones: Sequence[Body], others: Sequence[Body]) -> NDArray[np.bool_]:
-    """Returns whether each of some bodies may touch each of others, as a matrix."""
-    rows, columns = ({body: number for number, body in enumerate(dict.fromkeys(items))} for items in (ones, others))
-    verdicts = np.array([[_may_touch(acm, one, other) for other in columns] for one in rows], dtype=bool)
+def _allowed(acm: AllowedCollisionMatrix, bodies: Sequence[Body], others: Sequence[Body]) -> NDArray[np.bool_]:
+    """Returns whether each body (rows) may touch each of the others (columns)."""
+    rows, columns = ({body: index for index, body in enumerate(dict.fromkeys(items))} for items in (bodies, others))
+    verdicts = np.array([[_may_touch(acm, body, other) for other in columns] for body in rows], dtype=bool)
     verdicts = verdicts.reshape(len(rows), len(columns))
-    return verdicts[np.ix_([rows[one] for one in ones], [columns[other] for other in others])]
+    return verdicts[np.ix_([rows[body] for body in bodies], [columns[other] for other in others])]
 
 
-@lru_cache(maxsize=KEPT_PAIRS)
+@lru_cache(maxsize=PAIR_CACHE_SIZE)
 def _rigid_joints(model: RobotModel, moving: tuple[int, ...] | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Returns, for each of Pinocchio's joints, a number of the moving joints it depends on, and of what it is rigid to.
+    """Returns two ids per Pinocchio joint, for the set of moving joints it depends on and for its rigid part.
 
-    Two joints have the same number where these are the same.
+    Joints that depend on the same moving joints share the first id; joints rigidly connected share the second.
     """
-    supports, standing = _supports(model, moving), _standing(model, moving)
-    numbers: dict[frozenset[int], int] = {}
-    support = [numbers.setdefault(item, len(numbers)) for item in supports]
-    return np.array(support), np.array([standing.get(joint, joint) for joint in range(len(supports))])
+    supports, grounded = _supports(model, moving), _grounded_base(model, moving)
+    ids: dict[frozenset[int], int] = {}
+    support_ids = [ids.setdefault(item, len(ids)) for item in supports]
+    return np.array(support_ids), np.array([grounded.get(joint, joint) for joint in range(len(supports))])
 
 
-@lru_cache(maxsize=KEPT_PAIRS)
+@lru_cache(maxsize=PAIR_CACHE_SIZE)
 def _link_pairs(
     model: RobotModel,
     moving: tuple[int, ...] | None,
     entries: frozenset[tuple[frozenset[str], bool]],
     defaults: frozenset[tuple[str, bool]],
 ) -> WatchedPairs:
-    """Returns the pairs of the robot's own links that may not touch; they are the same in most scenes.
+    """Returns the pairs of the robot's links that may not touch; most scenes share them.
 
     Args:
-        model: the robot.
-        moving: as for watched_pairs.
-        entries: of the allowed collision matrix.
-        defaults: of the same.
+        model: Robot model.
+        moving: Indices of the joints that will move; None for all joints.
+        entries: Entries of the allowed collision matrix.
+        defaults: Default entries of the matrix.
     """
     acm = AllowedCollisionMatrix(dict(entries), dict(defaults))
-    support, standing = _rigid_joints(model, moving)
+    support_ids, rigid_ids = _rigid_joints(model, moving)
     pairs = [
         (first, second)
-        for first, one in enumerate(model.link_geometries)
+        for first, geometry in enumerate(model.link_geometries)
         for second, other in enumerate(model.link_geometries[first + 1 :], first + 1)
-        if standing[one.joint_id] != standing[other.joint_id]
-        and one.link != other.link
-        and not acm.allows(one.link, other.link)
+        if rigid_ids[geometry.joint_id] != rigid_ids[other.joint_id]
+        and geometry.link != other.link
+        and not acm.allows(geometry.link, other.link)
     ]
     parts = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     joints = np.array([item.joint_id for item in model.link_geometries], dtype=np.int64)[parts]
-    return WatchedPairs(parts, np.zeros(len(parts)), support[joints[:, 0]] == support[joints[:, 1]])
+    return WatchedPairs(parts, np.zeros(len(parts)), support_ids[joints[:, 0]] == support_ids[joints[:, 1]])
 
 
-def _standing(model: RobotModel, moving: Joints) -> dict[int, int]:
-    """Returns {joint of the base: 0, the world's} where a planar or floating base stands still, else nothing.
+def _grounded_base(model: RobotModel, moving: Joints) -> dict[int, int]:
+    """Maps the joint of a planar or floating base that does not move to joint 0, the world; else empty.
 
-    What only the base moves is then as rigid to the world as the foot of a robot that is screwed to it.
+    Links that only the base moves are then rigidly connected to the world, as on a fixed-base robot.
     """
     if moving is None or not len(model.base_indices) or set(model.base_indices.tolist()) & set(moving):
         return {}
@@ -247,7 +248,7 @@ def _may_touch(acm: AllowedCollisionMatrix, first: Body, second: Body) -> bool:
 
 
 def _supports(model: RobotModel, moving: Joints) -> list[frozenset[int]]:
-    """Returns, for each joint of the tree, which of the moving joints it depends on (mimics included)."""
-    chosen = set(range(len(model.joint_names))) if moving is None else {int(number) for number in moving}
-    chosen |= {follower for follower, leader, _, _ in model.mimics if leader in chosen}
-    return [frozenset(int(joint) - 1 for joint in joints if joint > 0) & chosen for joints in model.pin_model.supports]
+    """Returns the moving joints, mimic joints included, that each joint of the tree depends on."""
+    movable = set(range(len(model.joint_names))) if moving is None else {int(joint) for joint in moving}
+    movable |= {follower for follower, leader, _, _ in model.mimics if leader in movable}
+    return [frozenset(int(joint) - 1 for joint in joints if joint > 0) & movable for joints in model.pin_model.supports]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts the bodies of a scene and the pairs to check into the arrays that compiled collision checks work on."""
+"""Arrays of a scene's bodies and watched pairs for the compiled collision checks."""
 
 from __future__ import annotations
 
@@ -19,15 +19,18 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
     World,
     arguments,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_distance_field import KEPT, DistanceField
-from modular_framework_planning.collision_detection.pair_arrays import Represented, pair_arrays
-from modular_framework_planning.collision_detection.reaches import farthest_end
+from modular_framework_planning.collision_detection.kernels.compiled_distance_field import (
+    NEAREST_SOLIDS,
+    DistanceField,
+)
+from modular_framework_planning.collision_detection.pair_arrays import PairMembers, pair_arrays
+from modular_framework_planning.collision_detection.reaches import max_reach
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import whole_tree
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-FIELD_CELLS = 64  # of the field along each axis
-FIELD_REACH_M = 2.5  # from the origin of the planning frame to the sides of the field at most
+FIELD_CELLS = 64  # cells along each axis of the distance field
+MAX_FIELD_REACH_M = 2.5  # from the origin of the planning frame to the sides of the field
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,14 +38,15 @@ class CompiledWorld:
     """The arrays of a scene.
 
     Attributes:
-        arguments: the world as compiled functions take it.
-        members: for every pair of the arrays, the watched pairs (by number) that it represents.
-        uncompiled: watched pairs that have no bounding geometry and need the exact check at every state.
+        world: Bodies and pairs.
+        arguments: Arrays of the world, as arguments for compiled functions.
+        members: Indices of the watched pairs that each pair of the arrays represents.
+        uncompiled: Indices of watched pairs without bounding geometry, which need the exact check at every state.
     """
 
     world: World
     arguments: tuple[NDArray[Any], ...]
-    members: Represented
+    members: PairMembers
     uncompiled: tuple[int, ...]
 
 
@@ -56,17 +60,17 @@ def compile_world(
     pairs: WatchedPairs,
     check_interrupt: Callable[[], None] = _never_interrupt,
 ) -> CompiledWorld:
-    """Builds the arrays; what is built for a shape is cached as long as the shape exists.
+    """Builds the arrays of a scene; results are cached per shape for the shape's lifetime.
 
     Args:
-        model: the robot.
-        parts: geometries of the scene, the model's links first.
-        pairs: the pairs to watch; those that no joint moves should not be among them.
-        check_interrupt: called between shapes; raises an exception to stop.
+        model: Robot model.
+        parts: Geometries of the scene, the model's links first.
+        pairs: Watched pairs, without fixed pairs.
+        check_interrupt: Function called between shapes; raises an exception to stop.
     """
     bodies = scene_bodies(model, parts, pairs, check_interrupt)
     tree, arrays, joined = whole_tree(model), bodies.arrays, pair_arrays(model, bodies, pairs)
-    reach = min(farthest_end(tree, arrays), FIELD_REACH_M)
+    reach = min(max_reach(tree, arrays), MAX_FIELD_REACH_M)
     field = _field(arrays.kinds[joined.solids], arrays.sizes[joined.solids], arrays.poses[joined.solids], reach)
     world = World(
         tree=tree,
@@ -90,22 +94,29 @@ def compile_world(
         represented=joined.represented,
         counts=np.zeros(CHECK_COUNTS, dtype=np.int64),
         refusals=np.zeros(len(joined.pairs), dtype=np.int64),
-        meets=joined.meets,
+        common_joints=joined.common_joints,
         field=field,
     )
     return CompiledWorld(world, arguments(world), joined.members, joined.uncompiled)
 
 
 def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:
-    """Returns an empty field, `reach` [m] to every side of the origin of the planning frame."""
+    """Returns an empty distance field.
+
+    Args:
+        kinds: Closed form of each solid, shape (n,).
+        sizes: Three parameters of each closed form, shape (n, 3).
+        poses: Poses of the solids in the planning frame, shape (n, 3, 4).
+        reach: Distance from the planning frame's origin to the sides of the field [m].
+    """
     cells = (FIELD_CELLS if len(kinds) else 0,) * 3
-    kept = min(len(kinds), KEPT)
+    per_cell = min(len(kinds), NEAREST_SOLIDS)
     return DistanceField(
         kinds,
         sizes,
         poses,
         np.array([-reach, -reach, -reach, 2.0 * reach / FIELD_CELLS]),
         np.zeros(cells, dtype=bool),
-        np.empty((*cells, kept), dtype=np.int32),
-        np.empty((*cells, kept)),
+        np.empty((*cells, per_cell), dtype=np.int32),
+        np.empty((*cells, per_cell)),
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks single pairs of bodies with Coal, on their exact geometry: whether they touch, and how deep."""
+"""Collision checks and contacts of single pairs of bodies on exact geometry, by Coal."""
 
 from __future__ import annotations
 
@@ -16,85 +16,92 @@ from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
 ROUNDING = 1.0e-9  # [m]
-MAX_CONTACTS = 20  # of a pair, of which the deepest is reported
+MAX_CONTACTS = 20  # computed per pair; the deepest contact is reported
 
 
 class ExactCollision:
-    """Coal's results for the watched pairs; not thread-safe, because it holds the poses of one state."""
+    """Checks watched pairs with Coal; not thread-safe, because the poses of the last state are cached."""
 
     def __init__(self, model: RobotModel, parts: Sequence[PlacedGeometry], pairs: WatchedPairs) -> None:
-        """Stores what to check.
+        """Stores robot, geometries and pairs.
 
         Args:
-            model: the robot.
-            parts: geometries of a scene.
-            pairs: of those geometries; the methods below take their indices.
+            model: Robot model.
+            parts: Geometries of a scene.
+            pairs: Watched pairs of these geometries; the methods take indices of pairs.
         """
         self._model, self._parts, self._pairs = model, parts, pairs
         self._data = model.pin_model.createData()
         self._poses: dict[int, Any] = {}
-        self._balls: dict[int, tuple[Array, float]] = {}
-        self._at: Array | None = None
+        self._bounding_spheres: dict[int, tuple[Array, float]] = {}
+        self._last_positions: Array | None = None
 
     def _update_poses(self, positions: Array) -> None:
-        if self._at is None or not np.array_equal(positions, self._at):
+        if self._last_positions is None or not np.array_equal(positions, self._last_positions):
             pin.forwardKinematics(self._model.pin_model, self._data, positions)
             self._poses.clear()
-            self._balls.clear()
-            self._at = np.array(positions)
+            self._bounding_spheres.clear()
+            self._last_positions = np.array(positions)
 
-    def _pose(self, number: int) -> Any:
-        if number not in self._poses:
-            part = self._parts[number]
-            self._poses[number] = _coal_transform(self._data.oMi[part.joint_id] * part.placement)
-        return self._poses[number]
+    def _pose(self, part_index: int) -> Any:
+        if part_index not in self._poses:
+            part = self._parts[part_index]
+            self._poses[part_index] = _coal_transform(self._data.oMi[part.joint_id] * part.placement)
+        return self._poses[part_index]
 
-    def _placed(self, number: int) -> tuple[Any, Any]:
-        """Returns a part's Coal geometry, built when it is first used, and its pose."""
-        return self._parts[number].source.geometry, self._pose(number)
+    def _placed(self, part_index: int) -> tuple[Any, Any]:
+        """Returns a part's Coal geometry, built on first use, and its pose."""
+        return self._parts[part_index].source.geometry, self._pose(part_index)
 
-    def _is_far(self, number: int) -> bool:
-        """Whether the bounding spheres are apart: then Coal need not build its tree of a mesh."""
-        pair = self._pairs[number]
-        (one, radius), (other, reach) = (self._ball(which) for which in (pair.first, pair.second))
-        return float(np.linalg.norm(one - other)) > radius + reach + pair.margin + ROUNDING
+    def _is_far(self, pair_index: int) -> bool:
+        """Returns whether the bounding spheres are apart; Coal then need not build a tree over a mesh."""
+        pair = self._pairs[pair_index]
+        (centre, radius), (other_centre, other_radius) = (
+            self._bounding_sphere(part_index) for part_index in (pair.first, pair.second)
+        )
+        return float(np.linalg.norm(centre - other_centre)) > radius + other_radius + pair.margin + ROUNDING
 
-    def _ball(self, which: int) -> tuple[Array, float]:
-        if which not in self._balls:
-            part = self._parts[which]
+    def _bounding_sphere(self, part_index: int) -> tuple[Array, float]:
+        if part_index not in self._bounding_spheres:
+            part = self._parts[part_index]
             centre, radius = part.source.bounding_sphere
-            self._balls[which] = (self._data.oMi[part.joint_id] * part.placement).act(centre), radius
-        return self._balls[which]
+            self._bounding_spheres[part_index] = (self._data.oMi[part.joint_id] * part.placement).act(centre), radius
+        return self._bounding_spheres[part_index]
 
-    def _collide(self, number: int, request: Any) -> Any:
-        pair = self._pairs[number]
+    def _collide(self, pair_index: int, request: Any) -> Any:
+        pair = self._pairs[pair_index]
         request.security_margin = pair.margin
         result = coal.CollisionResult()
         coal.collide(*self._placed(pair.first), *self._placed(pair.second), request, result)
         return result
 
-    def touching_pair(self, positions: Array, numbers: Iterable[int]) -> int:
-        """Returns the first of the pairs that touches at these positions (of the whole robot), or -1."""
+    def touching_pair(self, positions: Array, pair_indices: Iterable[int]) -> int:
+        """Returns the index of the first touching pair, or -1.
+
+        Args:
+            positions: Joint positions of the whole robot [rad or m].
+            pair_indices: Pairs to check.
+        """
         self._update_poses(positions)
-        return next((number for number in numbers if self._touches(number)), -1)
+        return next((pair_index for pair_index in pair_indices if self._is_touching(pair_index)), -1)
 
-    def _touches(self, number: int) -> bool:
-        return not self._is_far(number) and self._collide(number, coal.CollisionRequest()).isCollision()
+    def _is_touching(self, pair_index: int) -> bool:
+        return not self._is_far(pair_index) and self._collide(pair_index, coal.CollisionRequest()).isCollision()
 
-    def contacts(self, positions: Array, numbers: Iterable[int]) -> list[tuple[int, Contact]]:
-        """Returns those of the pairs that touch, each with its deepest contact."""
+    def contacts(self, positions: Array, pair_indices: Iterable[int]) -> list[tuple[int, Contact]]:
+        """Returns the touching pairs among those given, each with its deepest contact."""
         self._update_poses(positions)
         found = []
-        for number in numbers:
-            if self._is_far(number):
+        for pair_index in pair_indices:
+            if self._is_far(pair_index):
                 continue
-            if self._collide(number, coal.CollisionRequest()).isCollision():  # without contacts: much faster
-                result = self._collide(number, coal.CollisionRequest(coal.CONTACT, MAX_CONTACTS))
-                found.append((number, self._contact(number, result)))
+            if self._collide(pair_index, coal.CollisionRequest()).isCollision():  # much faster without contacts
+                result = self._collide(pair_index, coal.CollisionRequest(coal.CONTACT, MAX_CONTACTS))
+                found.append((pair_index, self._contact(pair_index, result)))
         return found
 
-    def _contact(self, number: int, result: Any) -> Contact:
-        pair = self._pairs[number]
+    def _contact(self, pair_index: int, result: Any) -> Contact:
+        pair = self._pairs[pair_index]
         deepest = max(
             (result.getContact(i) for i in range(result.numContacts())), key=lambda item: self._depth(pair, item)
         )
@@ -108,16 +115,16 @@ class ExactCollision:
 
     @staticmethod
     def _depth(pair: WatchedPair, contact: Any) -> float:
-        distance = float(contact.penetration_depth)  # below 0 where the bodies overlap
+        distance = float(contact.penetration_depth)  # negative if the bodies overlap
         return pair.margin - distance if pair.margin > 0.0 else abs(distance)
 
-    def position(self, positions: Array, number: int) -> Array:
-        """Returns where a geometry's own frame has its origin in the planning frame [m]."""
+    def position(self, positions: Array, part_index: int) -> Array:
+        """Returns the origin of a part's frame in the planning frame [m]."""
         self._update_poses(positions)
-        return np.array(self._pose(number).getTranslation())
+        return np.array(self._pose(part_index).getTranslation())
 
-    def distance(self, positions: Array, numbers: Iterable[int]) -> float:
-        """Returns the smallest distance [m] of the pairs, 0 or less where they touch."""
+    def distance(self, positions: Array, pair_indices: Iterable[int]) -> float:
+        """Returns the minimum distance over the pairs [m], at most 0 if a pair touches."""
         self._update_poses(positions)
         return min(
             (
@@ -127,7 +134,7 @@ class ExactCollision:
                     coal.DistanceRequest(),
                     coal.DistanceResult(),
                 )
-                for pair in (self._pairs[number] for number in numbers)
+                for pair in (self._pairs[pair_index] for pair_index in pair_indices)
             ),
             default=np.inf,
         )

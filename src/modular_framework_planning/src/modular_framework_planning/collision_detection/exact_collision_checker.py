@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks states and motions for collisions: compiled bounds first, then Coal's exact check of undecided pairs.
+"""The default collision checker: compiled distance bounds first, then Coal's exact check of undecided pairs.
 
-A state counts as free only if the bounds prove every pair of bodies apart, or Coal does.
+A state is free only if the bounds or Coal prove that every pair of bodies is apart.
 """
 
 from __future__ import annotations
@@ -22,34 +22,38 @@ from modular_framework_planning.collision_detection.collision_bodies import (
 from modular_framework_planning.collision_detection.collision_world import CompiledWorld, compile_world
 from modular_framework_planning.collision_detection.exact_collision import ExactCollision
 from modular_framework_planning.collision_detection.kernels.compiled_collision import (
-    ASKED,
+    EXACTLY_TOUCHING,
     FOUND_FREE,
-    TOUCHING_EXACTLY,
+    REQUESTED,
     World,
     surrounded_pair_at,
 )
 from modular_framework_planning.collision_detection.kernels.compiled_distance import TOO_CLOSE, TOUCHING
 from modular_framework_planning.collision_detection.kernels.compiled_paths import (
-    UNDECIDED_ROWS,
+    INITIAL_UNDECIDED_ROWS,
     check_polyline,
     sample_at,
 )
-from modular_framework_planning.collision_detection.kernels.compiled_penetration import Cover, cover_of, penetrations
+from modular_framework_planning.collision_detection.kernels.compiled_penetration import (
+    BoundingSpheres,
+    bounding_spheres_of,
+    penetrations,
+)
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.plan_statistics import Refusals
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-DEPTH_SLACK = 2.0e-4  # [m]; how much deeper a tolerated contact may seem through numerical noise
-EXACT_STEP = 4.0e-3  # [rad or m]; between samples of pairs that only the exact check can decide
+DEPTH_TOLERANCE_M = 2.0e-4  # numerical noise in the depth of a tolerated contact
+EXACT_STEP = 4.0e-3  # [rad or m]; sample spacing for pairs that only the exact check can decide
 
 
 class ExactCollisionChecker:
     """Checks states and paths of the robot in one snapshot of the scene.
 
-    Not for use from two threads at a time: it holds the working memory of the check. Pairs whose relative pose the
-    given joints cannot change are checked once, in `fixed_contacts`.
+    Not thread-safe, because the checker holds working memory. Path and state checks skip pairs whose relative pose the
+    moving joints cannot change; `fixed_contacts` checks these pairs.
     """
 
     def __init__(
@@ -61,24 +65,24 @@ class ExactCollisionChecker:
         """Builds the checker.
 
         Args:
-            scene: the snapshot to check in.
-            moving: joints that will move, as indices in a position vector; all by default.
-            tolerated: contacts of held bodies that may stay but not deepen.
+            scene: Snapshot of the planning scene.
+            moving: Indices of the joints that will move; None for all joints.
+            tolerated: Contacts of held bodies that may remain but not deepen.
         """
         self.model: RobotModel = scene.model
         self._parts: list[PlacedGeometry] = placed_geometries(scene)
         self._pairs: WatchedPairs = watched_pairs(scene, self._parts, moving)
         depths = {frozenset((item.first.name, item.second.name)): item.depth for item in tolerated}
         self._tolerated: dict[int, float] = {}
-        for number in self._pairs.moving_numbers.tolist() if depths else ():
-            depth = depths.get(frozenset(self._names(number)))
+        for index in self._pairs.moving_indices.tolist() if depths else ():
+            depth = depths.get(frozenset(self._names(index)))
             if depth is not None:
-                self._tolerated[number] = depth
-        self._moving, self._moving_pairs = self._pairs.moving_numbers, self._pairs.moving
+                self._tolerated[index] = depth
+        self._moving, self._moving_pairs = self._pairs.moving_indices, self._pairs.moving
         if self._tolerated:
             self._moving = np.setdiff1d(self._moving, list(self._tolerated))
-            self._moving_pairs = self._pairs.chosen(self._moving)
-        self._undecided = np.empty((UNDECIDED_ROWS, 2), dtype=np.int64)
+            self._moving_pairs = self._pairs.subset(self._moving)
+        self._undecided = np.empty((INITIAL_UNDECIDED_ROWS, 2), dtype=np.int64)
 
     @cached_property
     def _exact(self) -> ExactCollision:
@@ -90,144 +94,150 @@ class ExactCollisionChecker:
 
     @property
     def compiled_world(self) -> World | None:
-        """The world as `compiled_paths.check_path` takes it.
+        """The world for `compiled_paths.check_path`.
 
-        None where pairs need the exact check at every state, and for a subclass with a `path_is_free` of its own.
+        None if a pair needs the exact check at every state, or if a subclass overrides `path_is_free`.
         """
-        is_own = type(self).path_is_free is not ExactCollisionChecker.path_is_free
-        return None if is_own or self._tolerated or self._compiled.uncompiled else self._compiled.world
+        is_overridden = type(self).path_is_free is not ExactCollisionChecker.path_is_free
+        return None if is_overridden or self._tolerated or self._compiled.uncompiled else self._compiled.world
 
     @property
     def check_counts(self) -> NDArray[np.int64]:
-        """See the protocol CountsChecks."""
+        """Counters of checks, see the protocol CountsChecks."""
         return self._compiled.world.counts
 
     def most_refusals(self) -> Refusals | None:
-        """Returns the two bodies that touched in the most checks; None where none did."""
+        """Returns the two bodies that touched in the most checks, or None if no bodies touched."""
         refusals = self._compiled.world.refusals
         pair = int(refusals.argmax()) if len(refusals) else -1
         if pair < 0 or not refusals[pair]:
             return None
         return Refusals(*self._names(self._moving[self._compiled.members[pair][0]]), int(refusals[pair]))
 
-    def _names(self, number: int) -> tuple[str, str]:
-        pair = self._pairs[number]
+    def _names(self, pair_index: int) -> tuple[str, str]:
+        pair = self._pairs[pair_index]
         return self._parts[pair.first].body.name, self._parts[pair.second].body.name
 
     def build(self, check_interrupt: Callable[[], None]) -> None:
-        """Builds now what the first check would build: it takes seconds for 100,000 triangles.
+        """Builds the arrays and sphere trees, which takes seconds for 100,000 triangles.
 
         Args:
-            check_interrupt: called between shapes; raises an exception to stop. What was built is kept.
+            check_interrupt: Function called between shapes; raises an exception to stop. Finished shapes stay cached.
         """
         self._compiled = compile_world(self.model, self._parts, self._moving_pairs, check_interrupt)
 
     def is_free(self, positions: Array) -> bool:
-        """Whether no pair that can move touches at these positions (of the whole robot)."""
+        """Returns whether no moving pair touches at these joint positions of the whole robot."""
         return self.path_is_free(np.asarray(positions, dtype=float)[None, :], 1.0)
 
     def path_is_free(self, vertices: Array, step: float, first: int = 0) -> bool:
-        """Whether the straight pieces between states are free at samples at most `step` apart in every joint.
+        """Returns whether all samples of a polyline are free.
 
         Args:
-            vertices: positions of the whole robot, shape (n, joints) [rad or m].
-            step: distance of the samples [rad or m].
-            first: number of the first sample that has to be free: 1 leaves the first vertex out.
+            vertices: Joint positions of the whole robot, shape (n, joints) [rad or m].
+            step: Maximum joint distance between samples [rad or m].
+            first: Index of the first checked sample; 1 skips the first vertex.
         """
         return self._colliding_sample(np.ascontiguousarray(vertices, dtype=float), step, first)[0] < 0
 
     def colliding_state(self, vertices: Array, step: float) -> Array | None:
-        """Returns a colliding sample along straight pieces, at the samples of path_is_free, or None."""
+        """Returns a colliding state among the samples of `path_is_free`, or None."""
         path = np.ascontiguousarray(vertices, dtype=float)
-        number, numbers = self._colliding_sample(path, step, 0)
-        return sample_at(path, numbers, number) if number >= 0 else None
+        index, at_vertices = self._colliding_sample(path, step, 0)
+        return sample_at(path, at_vertices, index) if index >= 0 else None
 
     def _colliding_sample(self, path: Array, step: float, first: int) -> tuple[int, NDArray[np.int64]]:
-        """Returns the number of a colliding sample or -1, and the numbers of the samples at the vertices."""
-        status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
+        """Returns the index of a colliding sample or -1, and the sample index of each vertex; see `path_is_free`."""
+        status, count, at_vertices = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         decided = 0
         while status == TOO_CLOSE:
             written = min(count, len(self._undecided))
-            number = self._decide(path, numbers, self._undecided[decided:written])
-            if number >= 0:
-                return number, numbers
+            index = self._decide(path, at_vertices, self._undecided[decided:written])
+            if index >= 0:
+                return index, at_vertices
             if written == count:
                 break
             decided, self._undecided = written, np.empty((4 * written, 2), dtype=np.int64)
-            self.check_counts[ASKED] -= 1  # the same check again
-            status, count, numbers = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
+            self.check_counts[REQUESTED] -= 1  # the repeated check counts once
+            status, count, at_vertices = check_polyline(path, step, first, self._undecided, *self._compiled.arguments)
         if status == TOUCHING:
-            return count, numbers
-        end = int(numbers[-1])
+            return count, at_vertices
+        end = int(at_vertices[-1])
         if self._tolerated or self._compiled.uncompiled:
-            self.check_counts[FOUND_FREE] -= status != TOO_CLOSE  # the bounds of the other pairs alone do not decide
-            for number in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
-                if not self._rest_is_free(sample_at(path, numbers, number)):
-                    self.check_counts[TOUCHING_EXACTLY] += 1
-                    return number, numbers
-        return -1, numbers
+            self.check_counts[FOUND_FREE] -= status != TOO_CLOSE  # pairs without bounds are still unchecked
+            for index in (*range(end, first, -max(1, int(EXACT_STEP / step))), min(first, end)):
+                if not self._unbounded_pairs_are_free(sample_at(path, at_vertices, index)):
+                    self.check_counts[EXACTLY_TOUCHING] += 1
+                    return index, at_vertices
+        return -1, at_vertices
 
-    def _decide(self, path: Array, numbers: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
-        """Asks the exact check about (sample, pair) rows; returns the number of a sample that touches, or -1."""
-        for number, pair in undecided.tolist():
+    def _decide(self, path: Array, at_vertices: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
+        """Runs the exact check on undecided pairs and returns the index of a touching sample, or -1.
+
+        Args:
+            path: Vertices of the path, shape (n, joints).
+            at_vertices: Sample index of each vertex, shape (n,).
+            undecided: Rows of sample and pair, shape (m, 2).
+        """
+        for index, pair in undecided.tolist():
             members = {int(self._moving[member]): member for member in self._compiled.members[pair]}
-            touching = self._exact.touching_pair(sample_at(path, numbers, number), members)
+            touching = self._exact.touching_pair(sample_at(path, at_vertices, index), members)
             if touching >= 0:
-                self.check_counts[TOUCHING_EXACTLY] += 1
+                self.check_counts[EXACTLY_TOUCHING] += 1
                 self._compiled.world.refusals[self._compiled.members.row_of(members[touching])] += 1
-                return number
+                return index
         return -1
 
-    def _rest_is_free(self, positions: Array) -> bool:
-        """Whether tolerated contacts stay shallow and pairs without bounds apart."""
-        if self._exact.touching_pair(positions, (self._moving[number] for number in self._compiled.uncompiled)) >= 0:
+    def _unbounded_pairs_are_free(self, positions: Array) -> bool:
+        """Returns whether tolerated contacts have not deepened and pairs without bounds are apart."""
+        if self._exact.touching_pair(positions, (self._moving[index] for index in self._compiled.uncompiled)) >= 0:
             return False
         return all(
-            contact.depth <= self._tolerated[number] + DEPTH_SLACK
-            for number, contact in self._exact.contacts(positions, self._tolerated)
+            contact.depth <= self._tolerated[index] + DEPTH_TOLERANCE_M
+            for index, contact in self._exact.contacts(positions, self._tolerated)
         )
 
     def contacts(self, positions: Array, include_fixed: bool = True) -> list[Contact]:
-        """Returns every pair that touches, the deepest contact of each, deepest pair first.
+        """Returns the deepest contact of every touching pair, deepest first.
 
-        A body wholly inside another one, touching none of its surface, is reported only where no other pair touches.
+        A body inside another body without touching its surface is reported only if no other pair touches.
         """
-        numbers = np.flatnonzero(~self._pairs.fixed | include_fixed).tolist()
+        pair_indices = np.flatnonzero(~self._pairs.fixed | include_fixed).tolist()
         found = [
             contact
-            for number, contact in self._exact.contacts(positions, numbers)
-            if number not in self._tolerated or contact.depth > self._tolerated[number] + DEPTH_SLACK
+            for index, contact in self._exact.contacts(positions, pair_indices)
+            if index not in self._tolerated or contact.depth > self._tolerated[index] + DEPTH_TOLERANCE_M
         ]
         return sorted(found or self._surrounded(positions), key=lambda item: -item.depth)
 
     def _surrounded(self, positions: Array) -> list[Contact]:
-        number = surrounded_pair_at(np.asarray(positions, dtype=float), *self._compiled.arguments)
-        if number < 0:
+        row = surrounded_pair_at(np.asarray(positions, dtype=float), *self._compiled.arguments)
+        if row < 0:
             return []
-        inner = self._moving[self._compiled.members[number][0]]
-        pair = self._pairs[inner]
+        index = self._moving[self._compiled.members[row][0]]
+        pair = self._pairs[index]
         first, second = self._parts[pair.first], self._parts[pair.second]
-        depth = self._exact.distance(positions, [inner])
+        depth = self._exact.distance(positions, [index])
         position = self._exact.position(positions, pair.second)
         return [Contact(first.body, second.body, depth, position, np.zeros(3))]
 
     def fixed_contacts(self, positions: Array) -> list[Contact]:
-        """Returns contacts of watched pairs the moving joints cannot change."""
-        numbers = np.flatnonzero(self._pairs.fixed).tolist()
-        return [contact for _, contact in self._exact.contacts(positions, numbers)] if numbers else []
+        """Returns the contacts of watched pairs whose relative pose the moving joints cannot change."""
+        pair_indices = np.flatnonzero(self._pairs.fixed).tolist()
+        return [contact for _, contact in self._exact.contacts(positions, pair_indices)] if pair_indices else []
 
     def distance(self, positions: Array) -> float:
-        """Returns the smallest distance [m] between bodies that may not touch; 0 or less when they do."""
+        """Returns the minimum distance between bodies that may not touch [m], at most 0 in a collision."""
         return self._exact.distance(positions, range(len(self._pairs)))
 
     @cached_property
-    def _cover(self) -> Cover:
-        return cover_of(self._compiled.world)
+    def _bounding_spheres(self) -> BoundingSpheres:
+        return bounding_spheres_of(self._compiled.world)
 
     def collision_costs(self, states: Array) -> Array:
-        """Returns the sum of depth and TOUCH_COST_M over the pairs that touch [m], from spheres around the bodies.
+        """Returns the sum of depth and TOUCH_COST_M over the touching pairs, shape (n,) [m], from bounding spheres.
 
         Args:
-            states: positions of the whole robot, shape (n, joints); costs have shape (n,).
+            states: Joint positions of the whole robot, shape (n, joints) [rad or m].
         """
-        return np.asarray(penetrations(self._compiled.world, self._cover, states))
+        return np.asarray(penetrations(self._compiled.world, self._bounding_spheres, states))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts the pairs of bodies to check into arrays; scenes that differ only in poses and sizes share them."""
+"""Arrays of the pairs of bodies to check, shared by scenes that differ only in poses and sizes."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_planning.collision_detection.body_arrays import (
-    KEPT_GROUPINGS,
+    GROUPING_CACHE_SIZE,
     SMALL_EXCESS,
     BodyArrays,
     Grouping,
     SceneBodies,
     link_groups,
 )
-from modular_framework_planning.collision_detection.collision_bodies import KEPT_PAIRS, WatchedPairs
-from modular_framework_planning.collision_detection.kernels.compiled_collision import CELLS, FIELD, UNKNOWN
+from modular_framework_planning.collision_detection.collision_bodies import PAIR_CACHE_SIZE, WatchedPairs
+from modular_framework_planning.collision_detection.kernels.compiled_collision import FIELD, TABLE_CELLS, UNKNOWN
 from modular_framework_planning.collision_detection.kernels.compiled_distance import SURFACE
-from modular_framework_planning.collision_detection.kernels.compiled_reaches import meeting_joints
+from modular_framework_planning.collision_detection.kernels.compiled_reaches import common_joints
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.chain_model import whole_tree
 from modular_framework_planning.kinematics.compiled_kinematics import Tree
@@ -31,12 +31,12 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairArrays:
-    """Pairs of bodies; what has the same name in World is explained there.
+    """Pairs of bodies; World documents the fields that both classes have.
 
     Attributes:
-        solids: bodies of the world that the distance field holds.
-        members: for every pair, the watched pairs (by number) that it represents.
-        uncompiled: watched pairs that have no bounding geometry and need the exact check at every state.
+        solids: Bodies of the world in the distance field.
+        members: Indices of the watched pairs that each pair represents.
+        uncompiled: Indices of watched pairs without bounding geometry, which need the exact check at every state.
     """
 
     pairs: NDArray[np.int64]
@@ -47,38 +47,38 @@ class PairArrays:
     table_of: NDArray[np.int64]
     watched: NDArray[np.int64]
     represented: NDArray[np.int64]
-    meets: NDArray[np.int64]
+    common_joints: NDArray[np.int64]
     solids: NDArray[np.int64]
-    members: Represented
+    members: PairMembers
     uncompiled: tuple[int, ...]
 
 
-class Represented:
-    """The watched pairs that each pair of the arrays represents, by number."""
+class PairMembers:
+    """Indices of the watched pairs that each pair of the arrays represents."""
 
-    def __init__(self, rows: NDArray[np.int64], numbers: NDArray[np.int64], joined: NDArray[np.int64]) -> None:
-        """Stores which they are.
+    def __init__(self, rows: NDArray[np.int64], indices: NDArray[np.int64], joined: NDArray[np.int64]) -> None:
+        """Stores the relation between pairs of the arrays and watched pairs.
 
         Args:
-            rows: pair of the arrays for each watched pair, -1 for none.
-            numbers: of the watched pairs by their rows, those without a row left out.
-            joined: the rows that each row at the end stands for, shape (f, n).
+            rows: Pair of the arrays for each watched pair, -1 for none.
+            indices: Watched pairs sorted by row, without those that have no row.
+            joined: Rows that each row at the end represents, shape (f, n).
         """
-        self._rows, self._numbers, self._joined = rows, numbers, joined
-        self._ends = np.cumsum(np.bincount(rows[numbers])) if len(numbers) else np.zeros(0, np.int64)
+        self._rows, self._indices, self._joined = rows, indices, joined
+        self._ends = np.cumsum(np.bincount(rows[indices])) if len(indices) else np.zeros(0, np.int64)
 
-    def row_of(self, number: int) -> int:
-        """Returns the single pair of the arrays that represents a watched pair."""
-        return int(self._rows[number])
+    def row_of(self, index: int) -> int:
+        """Returns the pair of the arrays, never a field pair, that represents a watched pair."""
+        return int(self._rows[index])
 
     def __getitem__(self, row: int) -> tuple[int, ...]:
         if row >= len(self._ends):
-            return tuple(number for single in self._joined[row - len(self._ends)].tolist() for number in self[single])
-        return tuple(self._numbers[self._ends[row - 1] if row else 0 : self._ends[row]].tolist())
+            return tuple(index for single in self._joined[row - len(self._ends)].tolist() for index in self[single])
+        return tuple(self._indices[self._ends[row - 1] if row else 0 : self._ends[row]].tolist())
 
 
 class _Bodies(NamedTuple):
-    """What of the bodies the pairs depend on, see BodyArrays: all numbers, shape (b,) each."""
+    """The fields of BodyArrays that the pairs depend on, as floats of shape (b,)."""
 
     joints: Array
     has_surface: Array
@@ -89,16 +89,16 @@ class _Bodies(NamedTuple):
 
 
 def pair_arrays(model: RobotModel, bodies: SceneBodies, pairs: WatchedPairs) -> PairArrays:
-    """Returns the pairs; none of the arrays may be changed, but the tables are filled while checking.
+    """Returns the arrays of the pairs; checks fill the tables, all other arrays are constant.
 
     Args:
-        model: the robot.
-        bodies: that are in the pairs.
-        pairs: the pairs to watch.
+        model: Robot model.
+        bodies: Bodies that occur in the pairs.
+        pairs: Watched pairs.
     """
     arrays = bodies.arrays
     has_surface = arrays.roots >= 0
-    rows = [  # of _Bodies
+    rows = [  # in the order of _Bodies
         arrays.joints,
         has_surface,
         arrays.kinds != SURFACE,
@@ -106,13 +106,17 @@ def pair_arrays(model: RobotModel, bodies: SceneBodies, pairs: WatchedPairs) -> 
         np.where(has_surface, arrays.surface_excess, 0.0),
         arrays.solid_excess,
     ]
-    return _pair_arrays(model, bodies.groups, pairs, bodies.of_part.tobytes(), np.array(rows, dtype=float).tobytes())
+    return _pair_arrays(
+        model, bodies.groups, pairs, bodies.body_of_part.tobytes(), np.array(rows, dtype=float).tobytes()
+    )
 
 
-@lru_cache(maxsize=KEPT_PAIRS)
-def _pair_arrays(model: RobotModel, groups: Grouping, pairs: WatchedPairs, of_part: bytes, rows: bytes) -> PairArrays:
+@lru_cache(maxsize=PAIR_CACHE_SIZE)
+def _pair_arrays(
+    model: RobotModel, groups: Grouping, pairs: WatchedPairs, body_of_part: bytes, rows: bytes
+) -> PairArrays:
     bodies = _Bodies(*np.frombuffer(rows).reshape(len(_Bodies._fields), -1))
-    ordered, is_compiled = _ordered(bodies, np.frombuffer(of_part, dtype=np.int64)[pairs.parts])
+    ordered, is_compiled = _ordered(bodies, np.frombuffer(body_of_part, dtype=np.int64)[pairs.parts])
     firsts, kinds = _distinct(ordered, pairs.margins, is_compiled)
     both = ordered[firsts]
     first, second = both.T
@@ -128,7 +132,7 @@ def _pair_arrays(model: RobotModel, groups: Grouping, pairs: WatchedPairs, of_pa
     both = np.concatenate([both, with_field])
     is_watched = np.ones(len(both), dtype=bool)
     is_watched[represented] = False
-    numbers = np.argsort(kinds, kind="stable")[np.count_nonzero(~is_compiled) :]
+    indices = np.argsort(kinds, kind="stable")[np.count_nonzero(~is_compiled) :]
     return PairArrays(
         pairs=both,
         margins=np.concatenate([margins, margins[represented[:, 0]]]),
@@ -138,22 +142,22 @@ def _pair_arrays(model: RobotModel, groups: Grouping, pairs: WatchedPairs, of_pa
         table_of=np.concatenate([table_of, np.full(len(represented), -1)]),
         watched=np.flatnonzero(is_watched),
         represented=represented,
-        meets=meeting_joints(both, bodies.joints.astype(np.int64), whole_tree(model).parents),
+        common_joints=common_joints(both, bodies.joints.astype(np.int64), whole_tree(model).parents),
         solids=solids,
-        members=Represented(kinds, numbers, represented),
+        members=PairMembers(kinds, indices, represented),
         uncompiled=tuple(np.flatnonzero(~is_compiled).tolist()),
     )
 
 
 def _ordered(bodies: _Bodies, both: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Orders the two bodies of pairs such that the first one has a surface, the second a closed form if possible.
+    """Orders each pair so that the first body has a surface and the second, if possible, a closed form.
 
     Args:
-        bodies: of the scene.
-        both: two of them by number for each pair, shape (n, 2).
+        bodies: Bodies of the scene.
+        both: Indices of the two bodies of each pair, shape (n, 2).
 
     Returns:
-        The ordered pairs, and whether there is such an order.
+        The ordered pairs, and whether each pair has a valid order.
     """
     has_surface, is_solid = bodies.has_surface > 0.0, bodies.is_solid > 0.0
     excess = _excess(bodies, both), _excess(bodies, both[:, ::-1])
@@ -162,12 +166,12 @@ def _ordered(bodies: _Bodies, both: NDArray[np.int64]) -> tuple[NDArray[np.int64
         valid.append(has_surface[first] & (has_surface[second] | is_solid[second]))
         rank.append(2 * (outside <= SMALL_EXCESS) + is_solid[second])
     is_better = (rank[1] > rank[0]) | ((rank[1] == rank[0]) & (excess[1] < excess[0]))
-    turned = valid[1] & (is_better | ~valid[0])
-    return np.where(turned[:, None], both[:, ::-1], both), valid[0] | valid[1]
+    is_swapped = valid[1] & (is_better | ~valid[0])
+    return np.where(is_swapped[:, None], both[:, ::-1], both), valid[0] | valid[1]
 
 
 def _excess(bodies: _Bodies, both: NDArray[np.int64]) -> Array:
-    """Returns how far the surface of the first and the closed form or surface of the second body lie outside [m]."""
+    """Returns the excess of each pair [m]: the first body's surface plus the second's closed form, else surface."""
     other = np.where(bodies.is_solid > 0.0, bodies.solid_excess, bodies.surface_excess)
     return np.asarray(bodies.surface_excess[both[:, 0]] + other[both[:, 1]])
 
@@ -175,15 +179,15 @@ def _excess(bodies: _Bodies, both: NDArray[np.int64]) -> Array:
 def _distinct(
     ordered: NDArray[np.int64], margins: Array, is_compiled: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Joins pairs of the same bodies at the same distance.
+    """Joins pairs of the same bodies with the same margin into one kind.
 
     Args:
-        ordered: the two bodies of each pair, shape (n, 2).
-        margins: distance they must keep [m], shape (n,).
-        is_compiled: whether a pair counts, shape (n,).
+        ordered: Indices of the two bodies of each pair, shape (n, 2).
+        margins: Minimum distances, shape (n,) [m].
+        is_compiled: Whether each pair takes part, shape (n,).
 
     Returns:
-        The first pair of each kind, in their order, and the number of each pair's kind, -1 where it does not count.
+        The first pair of each kind, in ascending order, and the kind of each pair, -1 for pairs left out.
     """
     chosen, rows = np.flatnonzero(is_compiled), np.full(len(ordered), -1)
     _, distance = np.unique(margins, return_inverse=True)
@@ -199,55 +203,67 @@ def _distinct(
 def _table_keys(
     model: RobotModel, groups: Grouping, both: NDArray[np.int64], margins: Array
 ) -> dict[int, tuple[int, ...]]:
-    """Returns the keys of the tables of pairs of groups of links, by the numbers of those pairs that have one."""
+    """Returns the table keys of pairs of link groups, by pair index; pairs without a table are left out.
+
+    Args:
+        model: Robot model.
+        groups: Groups of links.
+        both: Indices of the two bodies of each pair, shape (n, 2).
+        margins: Minimum distances, shape (n,) [m].
+    """
     _, bodies, _ = link_groups(model, groups)
     keys = {}
-    for number in np.flatnonzero((both < len(groups)).all(axis=1) & (margins == 0.0)).tolist():
-        key = _table_key(whole_tree(model), bodies, *both[number].tolist())
+    for index in np.flatnonzero((both < len(groups)).all(axis=1) & (margins == 0.0)).tolist():
+        key = _table_key(whole_tree(model), bodies, *both[index].tolist())
         if key is not None:
-            keys[number] = key
+            keys[index] = key
     return keys
 
 
 def _table_key(tree: Tree, bodies: BodyArrays, first: int, second: int) -> tuple[int, ...] | None:
-    """Returns roots and joints (one or two) of two bodies of which one moves the other, or None."""
+    """Returns the two root nodes and the one or two revolute joints between two bodies, or None without a table."""
     if bodies.joints[first] > bodies.joints[second]:
         first, second = second, first
-    between: list[int] = []
+    joints_between: list[int] = []
     base, joint = int(bodies.joints[first]), int(bodies.joints[second])
-    while joint > base and len(between) < 3:
-        between.append(joint)
+    while joint > base and len(joints_between) < 3:
+        joints_between.append(joint)
         joint = int(tree.parents[joint])
-    if joint != base or not 1 <= len(between) <= 2 or tree.prismatic[between].any():
+    if joint != base or not 1 <= len(joints_between) <= 2 or tree.prismatic[joints_between].any():
         return None
-    return int(bodies.roots[first]), int(bodies.roots[second]), *between[::-1]
+    return int(bodies.roots[first]), int(bodies.roots[second]), *joints_between[::-1]
 
 
-@lru_cache(maxsize=KEPT_GROUPINGS)
+@lru_cache(maxsize=GROUPING_CACHE_SIZE)
 def _tables(
     model: RobotModel, groups: Grouping, keys: tuple[tuple[int, ...], ...]
 ) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
-    """Tables (all unknown at first) of pairs of links.
+    """Returns new tables, all cells unknown, and the joints of each table.
 
-    They hold in every scene: `model` and `groups` only say for which robot and bodies they are kept.
+    Tables are valid in every scene.
+
+    Args:
+        model: Robot model, part of the cache key.
+        groups: Groups of links, part of the cache key.
+        keys: Table keys, see _table_key.
     """
     joints = np.array([(*key[2:], -1)[:2] for key in keys], dtype=np.int64).reshape(-1, 2)
-    return np.full((len(keys), CELLS, CELLS), UNKNOWN, dtype=np.int8), joints
+    return np.full((len(keys), TABLE_CELLS, TABLE_CELLS), UNKNOWN, dtype=np.int8), joints
 
 
 def _field_pairs(
     bodies: _Bodies, both: NDArray[np.int64], margins: Array, excess: Array
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Chooses solids of the world for the distance field, against which most moving bodies are checked.
+    """Chooses the solids of the world for the distance field that most moving bodies are checked against.
 
     Args:
-        bodies: of the scene.
-        both: the two bodies of each pair, shape (n, 2).
-        margins: distance they must keep [m], shape (n,).
-        excess: see World, shape (n,).
+        bodies: Bodies of the scene.
+        both: Indices of the two bodies of each pair, shape (n, 2).
+        margins: Minimum distances, shape (n,) [m].
+        excess: Maximum distances of bounding geometries outside the bodies, see World; shape (n,) [m].
 
     Returns:
-        The bodies in the field, and the pairs with all of them for each body that is checked against it, one row each.
+        The bodies in the field, and for each body checked against the field a row with its pairs.
     """
     is_plain = (bodies.joints < 0.0) & (bodies.is_solid > 0.0)
     chosen_pairs = np.flatnonzero(is_plain[both[:, 1]] & np.isfinite(excess))
@@ -255,11 +271,11 @@ def _field_pairs(
     pair_of = np.full((len(is_plain), len(is_plain)), -1)
     pair_of[moving_of, solid_of] = chosen_pairs
     solids, moving = np.flatnonzero(is_plain), np.array(list(dict.fromkeys(moving_of.tolist())), dtype=np.int64)
-    counts = Counter(row.tobytes() for row in pair_of[np.ix_(moving, solids)] >= 0)  # of the same solids
-    most = max(counts, key=lambda row: (counts[row] * sum(row), row), default=bytes(len(solids)))
-    solids = solids[np.frombuffer(most, dtype=bool)]
-    numbers = pair_of[np.ix_(moving, solids)]
-    is_joined = (numbers >= 0).all(axis=1) & (margins[numbers] == margins[numbers[:, :1]]).all(axis=1)
+    counts = Counter(row.tobytes() for row in pair_of[np.ix_(moving, solids)] >= 0)  # bodies per set of solids
+    best_set = max(counts, key=lambda row: (counts[row] * sum(row), row), default=bytes(len(solids)))
+    solids = solids[np.frombuffer(best_set, dtype=bool)]
+    rows = pair_of[np.ix_(moving, solids)]
+    is_joined = (rows >= 0).all(axis=1) & (margins[rows] == margins[rows[:, :1]]).all(axis=1)
     if len(solids) < 2 or not is_joined.any():
         return solids[:0], np.zeros((0, 1), dtype=np.int64)
-    return solids, numbers[is_joined]
+    return solids, rows[is_joined]

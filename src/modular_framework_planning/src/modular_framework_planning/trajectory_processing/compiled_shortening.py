@@ -278,7 +278,7 @@ def shorten_in(shortening, edges, memory, verdict, *world):  # type: ignore[no-u
         borrowed(shortening), borrowed(edges), edge_memory, verdict, bodies, borrowed(edge), borrowed(workspace)
     )
     release(workspace)
-    edge.numbers[0] = 0
+    edge.at_vertices[0] = 0
     return status
 
 

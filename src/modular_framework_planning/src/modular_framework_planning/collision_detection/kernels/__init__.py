@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled loops of the collision checks."""
+"""Compiled kernels of the collision checks."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The bodies of a robot and its environment in arrays for compiled loops: their poses and distances."""
+"""Body poses and pair distances of a robot and its environment, compiled."""
 
 from __future__ import annotations
 
@@ -27,40 +27,45 @@ from modular_framework_planning.collision_detection.kernels.compiled_triangles i
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import Tree, joint_placements
 
-CELLS = 128  # of a table along each joint, over a whole turn
-# checks asked for, found free, found touching; states looked at; checks that Coal found touching
+TABLE_CELLS = 128  # table cells along each joint, over one revolution
+# requested checks, checks found free, found touching; evaluated states; checks that Coal found touching
 CHECK_COUNTS = 5
-ASKED, FOUND_FREE, FOUND_TOUCHING, LOOKED_AT, TOUCHING_EXACTLY = range(CHECK_COUNTS)
-FIELD = -1  # in place of a pair's second body: all solids of the field
+REQUESTED, FOUND_FREE, FOUND_TOUCHING, EVALUATED_STATES, EXACTLY_TOUCHING = range(CHECK_COUNTS)
+FIELD = -1  # second body of a pair with all solids of the distance field
 UNKNOWN, APART, NEAR = range(3)
 
 
 class World(NamedTuple):
-    """Bodies on the joints of a robot and around it, and the pairs of them to watch.
+    """Bodies of a robot and its environment, and the pairs to watch.
+
+    A field pair has FIELD as its second body. Field pairs come last and each represents the pairs of one body with all
+    solids of the distance field.
 
     Attributes:
-        tree: joints of the robot.
-        joints: joint that moves each body, -1 for the world; shape (b,).
-        poses: of each body in its joint's frame; shape (b, 3, 4).
-        roots: node of each body's surface; is_environment: whether that is in `scene` and not in `robot`.
-        kinds, sizes: closed form of each body (SURFACE for none) and its three numbers.
-        spheres: centre (in the body's frame) and radius around each body; shape (b, 4).
-        closed: whether each body's surface has an inside.
-        robot, scene: the surfaces of links, and those of the world and of held objects.
-        pairs: two bodies each, the first one has a surface, shape (p, 2); margins: distance they must keep [m].
-            Pairs with FIELD come last; they stand for other pairs.
-        excess: how far the bounding geometries of a pair's bodies may lie outside of these [m], infinite where that is
-            not known; shape (p,).
-        tables: what is known about cells of pairs of links that two joints move against each other: UNKNOWN, APART
-            (all through the cell) or NEAR; filled while checking, shape (t, CELLS, CELLS).
-        table_joints: the two joints of each table, the one nearer to the base first, -1 for none; shape (t, 2).
-        table_of: table of each pair, -1 for none; shape (p,).
-        watched: the pairs to check, those left out for which one with FIELD stands.
-        represented: the pairs for which each pair with FIELD stands, in the order of the field's solids; shape (f, n).
-        counts: of checks, see CHECK_COUNTS; those of undecided checks that are asked again elsewhere are left out.
-        refusals: in how many checks each pair touched, 0 for pairs with FIELD: those they stand for count; shape (p,).
-        meets: last joint that moves both bodies of each pair, -1 for none; shape (p,).
-        field: the solids of the world that all bodies with such a pair are checked against.
+        tree: Joints of the robot.
+        joints: Joint that moves each body, -1 for the world; shape (b,).
+        poses: Pose of each body in its joint's frame, shape (b, 3, 4).
+        roots: Root node of each body's surface, -1 for none; shape (b,).
+        is_environment: Whether the body's surface belongs to `scene` instead of `robot`, shape (b,).
+        kinds: Closed form of each body, SURFACE for none; shape (b,).
+        sizes: Three parameters of each closed form, shape (b, 3).
+        spheres: Bounding sphere of each body, centre (in the body's frame) and radius; shape (b, 4).
+        closed: Whether each body's surface has an inside, shape (b,).
+        robot: Surfaces of the links.
+        scene: Surfaces of the world, of held objects and of links in closed form.
+        pairs: Two bodies per pair, the first with a surface; shape (p, 2).
+        margins: Minimum distance of each pair, shape (p,) [m].
+        excess: Maximum distance of a pair's bounding geometries outside the bodies, inf if unknown; shape (p,) [m].
+        tables: Verdicts UNKNOWN, APART (in the whole cell) or NEAR for pairs of links separated by one or two joints;
+            filled on first use, shape (t, TABLE_CELLS, TABLE_CELLS).
+        table_joints: Joints of each table, the joint nearer to the base first, -1 for none; shape (t, 2).
+        table_of: Table of each pair, -1 for none; shape (p,).
+        watched: Pairs to check; pairs that a field pair represents are left out.
+        represented: Pairs that each field pair represents, in the order of the field's solids; shape (f, n).
+        counts: Counters, see CHECK_COUNTS; undecided checks that are repeated elsewhere are left out.
+        refusals: Number of checks in which each pair touched; field pairs count for the represented pair; shape (p,).
+        common_joints: Last joint that moves both bodies of each pair, -1 for none; shape (p,).
+        field: Distance field over solids of the world.
     """
 
     tree: Tree
@@ -84,29 +89,36 @@ class World(NamedTuple):
     represented: NDArray[np.int64]
     counts: NDArray[np.int64]
     refusals: NDArray[np.int64]
-    meets: NDArray[np.int64]
+    common_joints: NDArray[np.int64]
     field: DistanceField
 
 
 @njit(cache=True, nogil=True)
-def place_bodies(world, placements, out, centres, still=True):  # type: ignore[no-untyped-def]
-    """Writes the pose (b, 3, 4) of every body and the centre (b, 3) of its sphere in the planning frame.
+def place_bodies(world, placements, out, centres, with_world=True):  # type: ignore[no-untyped-def]
+    """Writes body poses and sphere centres in the planning frame.
 
-    Bodies of the world are left out without `still`.
+    Args:
+        world: Bodies to place.
+        placements: Pose of each joint, shape (joints, 3, 4).
+        out: Written pose of each body, shape (b, 3, 4).
+        centres: Written centre of each body's bounding sphere, shape (b, 3) [m].
+        with_world: Whether bodies of the world are written.
     """
-    at, spheres = world.poses, world.spheres
+    local, spheres = world.poses, world.spheres
     for body in range(len(world.joints)):
         joint = world.joints[body]
-        if joint < 0 and not still:
+        if joint < 0 and not with_world:
             continue
         for row in range(3):
             if joint < 0:
                 for column in range(4):
-                    out[body, row, column] = at[body, row, column]
+                    out[body, row, column] = local[body, row, column]
             else:
                 a, b, c = placements[joint, row, 0], placements[joint, row, 1], placements[joint, row, 2]
                 for column in range(4):
-                    out[body, row, column] = a * at[body, 0, column] + b * at[body, 1, column] + c * at[body, 2, column]
+                    out[body, row, column] = (
+                        a * local[body, 0, column] + b * local[body, 1, column] + c * local[body, 2, column]
+                    )
                 out[body, row, 3] += placements[joint, row, 3]
             centres[body, row] = (
                 out[body, row, 0] * spheres[body, 0]
@@ -118,7 +130,7 @@ def place_bodies(world, placements, out, centres, still=True):  # type: ignore[n
 
 @njit(cache=True, nogil=True)
 def relative_pose(one, two, relative):  # type: ignore[no-untyped-def]
-    """Writes the first pose in the frame of the second; all of shape (3, 4)."""
+    """Writes the first pose in the frame of the second; all poses have shape (3, 4)."""
     for row in range(3):
         for column in range(4):
             value = 0.0
@@ -130,13 +142,13 @@ def relative_pose(one, two, relative):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def solid_of(kinds, sizes, body):  # type: ignore[no-untyped-def]
-    """Returns the closed form of a body, see World."""
+    """Returns the closed form of a body; `kinds` and `sizes` as in World."""
     return Solid(kinds[body], sizes[body, 0], sizes[body, 1], sizes[body, 2])
 
 
 @njit(cache=True, nogil=True)
-def centre_gap(centres, first, second):  # type: ignore[no-untyped-def]
-    """Returns the distance of the centres (b, 3) of two bodies' spheres."""
+def centre_distance(centres, first, second):  # type: ignore[no-untyped-def]
+    """Returns the distance between two rows of `centres`, shape (b, 3) [m]."""
     x, y, z = (
         centres[first, 0] - centres[second, 0],
         centres[first, 1] - centres[second, 1],
@@ -147,16 +159,25 @@ def centre_gap(centres, first, second):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def pair_bound(world, pair, poses, centres, limit, memory):  # type: ignore[no-untyped-def]
-    """Returns (status, lower bound of the pair's distance less its margin, at most `limit`).
+    """Bounds the distance of a pair minus the pair's margin.
 
-    Where a pair with FIELD touches, the number of a solid that is touched instead of the bound.
+    Args:
+        world: Bodies and pairs.
+        pair: Index of the pair.
+        poses: Pose of each body, shape (b, 3, 4).
+        centres: Centre of each bounding sphere, shape (b, 3) [m].
+        limit: Maximum of the bound [m].
+        memory: Working memory.
+
+    Returns:
+        The status and the lower bound [m]. For a touching field pair, the index of a touched solid replaces the bound.
     """
     first, second = world.pairs[pair, 0], world.pairs[pair, 1]
     margin, excess = world.margins[pair], world.excess[pair]
     if second == FIELD:
         surface = world.scene if world.is_environment[first] else world.robot
         return surface_to_field(surface, world.roots[first], poses[first], world.field, margin, excess, limit, memory)
-    if centre_gap(centres, first, second) - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
+    if centre_distance(centres, first, second) - world.spheres[first, 3] - world.spheres[second, 3] - margin >= limit:
         return CLEAR, limit
     relative = memory.relative
     relative_pose(poses[first], poses[second], relative)
@@ -170,25 +191,25 @@ def pair_bound(world, pair, poses, centres, limit, memory):  # type: ignore[no-u
 
 @njit(cache=True, nogil=True)
 def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
-    """Whether a body without touching it surrounds a point of another body."""
+    """Returns whether the outer body surrounds a point of the inner body; valid if their surfaces do not touch."""
     if not np.isfinite(world.spheres[inner, 3]) or (world.kinds[outer] == SURFACE and not world.closed[outer]):
         return False
-    corner = np.zeros(3)  # of a body in closed form: its centre, since its surface may be larger than the body
+    point = np.zeros(3)  # centre of a closed form, because a surface may be larger than the body
     if world.kinds[inner] == SURFACE:
         surface = world.scene if world.is_environment[inner] else world.robot
         node = world.roots[inner]
-        while surface.links[node, 0] >= 0:
-            node = surface.links[node, 0]
-        corner = surface.triangles[surface.links[node, 1]][:3]
+        while surface.children[node, 0] >= 0:
+            node = surface.children[node, 0]
+        point = surface.triangles[surface.children[node, 1]][:3]
     one, two = poses[inner], poses[outer]
     local = np.empty(3)
     for row in range(3):
         local[row] = 0.0
         for axis in range(3):
             value = (
-                one[axis, 0] * corner[0]
-                + one[axis, 1] * corner[1]
-                + one[axis, 2] * corner[2]
+                one[axis, 0] * point[0]
+                + one[axis, 1] * point[1]
+                + one[axis, 2] * point[2]
                 + one[axis, 3]
                 - two[axis, 3]
             )
@@ -205,14 +226,14 @@ def _contains(world, outer, inner, poses):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
-    """Returns the first pair of which one body lies wholly inside the other, or -1; they must not touch."""
+    """Returns the first pair with one body inside the other, or -1; valid if no pair touches."""
     pairs, excess, spheres = world.pairs, world.excess, world.spheres
     for pair in range(len(pairs)):
         first, second = pairs[pair, 0], pairs[pair, 1]
         if (
             second != FIELD
             and np.isfinite(excess[pair])
-            and centre_gap(centres, first, second) < spheres[first, 3] + spheres[second, 3]
+            and centre_distance(centres, first, second) < spheres[first, 3] + spheres[second, 3]
             and (_contains(world, first, second, poses) or _contains(world, second, first, poses))
         ):
             return pair
@@ -220,17 +241,15 @@ def surrounded_pair(world, poses, centres):  # type: ignore[no-untyped-def]
 
 
 def arguments(world: World) -> tuple[NDArray[Any], ...]:
-    """Returns the arrays of a world one by one: numba takes 70 microseconds to recognise a tuple, 4 for these."""
+    """Returns the arrays of a world as separate arguments; numba dispatches them in 4 us, a World in 70 us."""
     return (*world.tree, *world[1:9], *world.robot, *world.scene, *world[11:-1], *world.field)
 
 
 @njit(cache=True, nogil=True)
 def world_of(arrays):  # type: ignore[no-untyped-def]
-    """Puts the arrays that `arguments` gives together again, without owners.
-
-    Numba calls no class with more than one starred tuple.
-    """
+    """Rebuilds a World, without array owners, from the result of `arguments`."""
     a = borrowed(arrays)
+    # numba supports only one starred argument per call
     tree, robot, scene = Tree(a[0], a[1], a[2], a[3]), Surfaces(*a[12:16]), Surfaces(*a[16:20])
     bodies = (tree, a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], robot, scene)
     pairs = (a[20], a[21], a[22], a[23], a[24], a[25], a[26], a[27], a[28], a[29], a[30])
@@ -239,7 +258,7 @@ def world_of(arrays):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def surrounded_pair_at(positions, *world):  # type: ignore[no-untyped-def]
-    """Returns the first pair of which one body lies wholly inside the other at these positions, or -1."""
+    """Returns the first pair with one body inside the other at these joint positions, or -1."""
     return _surrounded_at(world_of(world), positions)
 
 

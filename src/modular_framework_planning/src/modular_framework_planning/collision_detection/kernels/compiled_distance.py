@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounds the distance between two bodies, compiled: fast where they are far apart, exact to 0.1 mm where they are not.
+"""Lower bounds of the distance between two bodies, compiled: coarse for distant bodies, within 0.1 mm for close bodies.
 
-A body is a tree of spheres over its triangles, or a solid whose distance to a point is known in closed form. Every
-answer is a lower bound of the true distance; with an answer of 0 comes whether a common point was found or the bodies
-are too close to decide.
+A body is a sphere tree over triangles, or a solid with a closed-form distance to a point. Every result is a lower
+bound of the true distance; for a bound of 0, the status tells whether the bodies touch or are too close to decide.
 """
 
 from __future__ import annotations
@@ -20,20 +19,20 @@ from modular_framework_planning.collision_detection.kernels.compiled_triangles i
 )
 from modular_framework_planning.geometry.spatial import Array
 
-SURFACE, SPHERE, BOX, CYLINDER, CONE, CAPSULE, PLANE, HALF_SPACE = range(8)  # what a body's closed form is
+SURFACE, SPHERE, BOX, CYLINDER, CONE, CAPSULE, PLANE, HALF_SPACE = range(8)  # types of closed forms; SURFACE is none
 CLEAR, TOUCHING, TOO_CLOSE = range(3)
 
-SMALLEST_PIECE = 1.0e-4  # [m]; triangles are cut down to this radius before a pair is called too close to decide
-ROUNDING = 1.0e-6  # [m]; what the exact checker and floating point may differ by
-HOPELESS_SHARE = 0.3
-ACCEPTED_SHARE = 0.5  # a sphere of at most this share of its distance is not looked into
-MOST_PIECES = 4000
-MOST_PAIRS = 50_000  # of nodes looked at for one cell of a table
-STACK = 512
+MIN_PIECE_RADIUS_M = 1.0e-4  # radius down to which triangles are cut before a pair counts as too close to decide
+ROUNDING = 1.0e-6  # [m]; tolerance for the exact checker and for floating point
+MIN_USEFUL_FRACTION = 0.3  # a bound below this fraction of the required distance certifies too little to refine
+MAX_RADIUS_FRACTION = 0.5  # a sphere is not subdivided if its radius is at most this fraction of its distance
+MAX_PIECES = 4000
+MAX_NODE_PAIRS = 50_000  # node pairs visited per table cell
+STACK_SIZE = 512
 
 
 class Solid(NamedTuple):
-    """A closed form and the three numbers that describe it, see solid_distance."""
+    """A closed form and its three parameters, see solid_distance."""
 
     kind: int
     p0: float
@@ -41,47 +40,58 @@ class Solid(NamedTuple):
     p2: float
 
 
-class Turns(NamedTuple):
-    """Axes that a surface turns about.
+class Rotations(NamedTuple):
+    """Successive rotations of a surface.
 
     Attributes:
-        origins: a point on each axis, the axis nearest to the surface first; shape (k, 3) [m].
-        axes: unit vectors along them, shape (k, 3).
-        change: by how much it turns about each to either side at most, shape (k,) [rad].
+        origins: A point on each axis, the axis nearest to the surface first; shape (k, 3) [m].
+        axes: Unit vectors along the axes, shape (k, 3).
+        max_angles: Maximum rotation to either side, shape (k,) [rad].
     """
 
     origins: Array
     axes: Array
-    change: Array
+    max_angles: Array
 
 
 class Memory(NamedTuple):
     """Working memory of a check.
 
     Attributes:
-        relative: a pose, shape (3, 4).
-        stack, bounds: nodes of two trees still to look at, and their bounds; shapes (STACK, 2) and (STACK,).
-        pieces: of a triangle, shape (64, 9).
-        corners: of a triangle, shape (9,).
+        relative: A pose, shape (3, 4).
+        stack: Node pairs to visit, shape (STACK_SIZE, 2).
+        bounds: Distance bound of each node pair, shape (STACK_SIZE,) [m].
+        pieces: Pieces of a triangle, shape (64, 9) [m].
+        vertices: Vertices of a triangle, shape (9,) [m].
     """
 
     relative: Array
     stack: NDArray[np.int32]
     bounds: Array
     pieces: Array
-    corners: Array
+    vertices: Array
 
 
 @njit(cache=True, nogil=True)
 def new_memory():  # type: ignore[no-untyped-def]
     """Returns working memory."""
-    stack = np.empty((STACK, 2), np.int32)
-    return Memory(np.empty((3, 4)), stack, np.empty(STACK), np.empty((64, 9)), np.empty(9))
+    stack = np.empty((STACK_SIZE, 2), np.int32)
+    return Memory(np.empty((3, 4)), stack, np.empty(STACK_SIZE), np.empty((64, 9)), np.empty(9))
 
 
 @njit(cache=True, nogil=True)
 def solid_distance(solid, x, y, z):  # type: ignore[no-untyped-def]
-    """Returns the distance [m] of a point from a solid in the solid's frame, below 0 inside it (never too large)."""
+    """Returns the distance of a point from a solid, or a lower bound [m]; negative inside the solid.
+
+    The solid's parameters p0, p1, p2 are the half extents of a box, the radius and half height of a cylinder, cone or
+    capsule, the radius of a sphere, or the unit normal of a plane or half space.
+
+    Args:
+        solid: Closed form.
+        x: Coordinate of the point in the solid's frame [m].
+        y: Coordinate of the point in the solid's frame [m].
+        z: Coordinate of the point in the solid's frame [m].
+    """
     kind, p0, p1, p2 = solid
     if kind == BOX:
         dx, dy, dz = abs(x) - p0, abs(y) - p1, abs(z) - p2
@@ -106,7 +116,16 @@ def solid_distance(solid, x, y, z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def placed_solid_distance(solid, poses, body, x, y, z):  # type: ignore[no-untyped-def]
-    """Returns what solid_distance does, of a point in the frame in which the solid's body has a pose (b, 3, 4)."""
+    """Returns the solid_distance of a point in the planning frame.
+
+    Args:
+        solid: Closed form.
+        poses: Pose of each body in the planning frame, shape (b, 3, 4).
+        body: Body of the solid.
+        x: Coordinate of the point in the planning frame [m].
+        y: Coordinate of the point in the planning frame [m].
+        z: Coordinate of the point in the planning frame [m].
+    """
     x, y, z = x - poses[body, 0, 3], y - poses[body, 1, 3], z - poses[body, 2, 3]
     return solid_distance(
         solid,
@@ -118,15 +137,15 @@ def placed_solid_distance(solid, poses, body, x, y, z):  # type: ignore[no-untyp
 
 @njit(cache=True, nogil=True)
 def _cone_distance(radius, half, r, z):  # type: ignore[no-untyped-def]
-    """Distance in the half plane (r, z) from the triangle (0, -half), (radius, -half), (0, half)."""
+    """Returns the distance of (r, z) from the triangle (0, -half), (radius, -half), (0, half) in the half plane."""
     slant = np.sqrt(radius * radius + 4.0 * half * half)
     above_side = (2.0 * half * r + radius * (z - half)) / slant
     below_base = -half - z
     if above_side <= 0.0 and below_base <= 0.0:
         return max(above_side, below_base)
-    share = (radius * (radius - r) + 2.0 * half * (z + half)) / (slant * slant)
-    share = min(max(share, 0.0), 1.0)
-    side_r, side_z = radius * (1.0 - share), -half + 2.0 * half * share
+    fraction = (radius * (radius - r) + 2.0 * half * (z + half)) / (slant * slant)
+    fraction = min(max(fraction, 0.0), 1.0)
+    side_r, side_z = radius * (1.0 - fraction), -half + 2.0 * half * fraction
     side = np.sqrt((r - side_r) ** 2 + (z - side_z) ** 2)
     base_r = max(r - radius, 0.0)
     base = np.sqrt(base_r * base_r + below_base * below_base)
@@ -140,7 +159,7 @@ def _gap(low, high, half):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _span_bound(solid, pieces, n):  # type: ignore[no-untyped-def]
-    """Lower bound of the distance of a triangle, pieces[n], from a box or cylinder by its extent along the axes."""
+    """Bounds the distance of the triangle pieces[n] from a box or cylinder by the triangle's axis-aligned extent."""
     kind, p0, p1, p2 = solid
     x, y, z = (
         (pieces[n, 0], pieces[n, 3], pieces[n, 6]),
@@ -150,30 +169,30 @@ def _span_bound(solid, pieces, n):  # type: ignore[no-untyped-def]
     gx = _gap(min(x), max(x), p0)
     gy = _gap(min(y), max(y), p1 if kind == BOX else p0)
     gz = _gap(min(z), max(z), p2 if kind == BOX else p1)
-    if kind == CYLINDER:  # its round side lies within the box of its extent, of which only one axis may count
+    if kind == CYLINDER:  # x and y together would overestimate the distance from the round side
         return np.sqrt(max(gx, gy) ** 2 + gz * gz)
     return np.sqrt(gx * gx + gy * gy + gz * gz)
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_solid(triangles, number, pose, solid, margin, excess, limit, pieces):  # type: ignore[no-untyped-def]
-    """Returns (status, lower bound capped at `limit`) of one triangle against a solid, cutting the triangle up."""
-    for corner in range(0, 9, 3):
-        x, y, z = triangles[number, corner], triangles[number, corner + 1], triangles[number, corner + 2]
+def _triangle_to_solid(triangles, index, pose, solid, margin, excess, limit, pieces):  # type: ignore[no-untyped-def]
+    """Returns status and lower bound (at most `limit`) of a triangle's distance from a solid, by subdivision."""
+    for vertex in range(0, 9, 3):
+        x, y, z = triangles[index, vertex], triangles[index, vertex + 1], triangles[index, vertex + 2]
         for row in range(3):
-            pieces[0, corner + row] = pose[row, 0] * x + pose[row, 1] * y + pose[row, 2] * z + pose[row, 3]
-    depth, work, status = 1, 0, CLEAR
+            pieces[0, vertex + row] = pose[row, 0] * x + pose[row, 1] * y + pose[row, 2] * z + pose[row, 3]
+    depth, visited, status = 1, 0, CLEAR
     while depth > 0:
         depth -= 1
-        work += 1
+        visited += 1
         if limit > 0.0 and solid.kind in (BOX, CYLINDER) and _span_bound(solid, pieces, depth) - margin >= limit:
             continue
         cx = (pieces[depth, 0] + pieces[depth, 3] + pieces[depth, 6]) / 3.0
         cy = (pieces[depth, 1] + pieces[depth, 4] + pieces[depth, 7]) / 3.0
         cz = (pieces[depth, 2] + pieces[depth, 5] + pieces[depth, 8]) / 3.0
         radius = 0.0
-        for corner in range(0, 9, 3):
-            x, y, z = pieces[depth, corner] - cx, pieces[depth, corner + 1] - cy, pieces[depth, corner + 2] - cz
+        for vertex in range(0, 9, 3):
+            x, y, z = pieces[depth, vertex] - cx, pieces[depth, vertex + 1] - cy, pieces[depth, vertex + 2] - cz
             radius = max(radius, x * x + y * y + z * z)
         radius = np.sqrt(radius)
         centre = solid_distance(solid, cx, cy, cz) - margin
@@ -181,12 +200,12 @@ def _triangle_to_solid(triangles, number, pose, solid, margin, excess, limit, pi
             continue
         if centre < -ROUNDING - excess:
             return TOUCHING, 0.0
-        if centre < -ROUNDING and centre - radius >= -ROUNDING - excess:  # no piece of it is deep enough
+        if centre < -ROUNDING and centre - radius >= -ROUNDING - excess:  # no part of the piece is deep enough
             return TOO_CLOSE, 0.0
-        if radius <= ACCEPTED_SHARE * centre or radius <= SMALLEST_PIECE < centre - ROUNDING:
+        if radius <= MAX_RADIUS_FRACTION * centre or radius <= MIN_PIECE_RADIUS_M < centre - ROUNDING:
             limit = centre - radius
             continue
-        if radius <= SMALLEST_PIECE or work > MOST_PIECES or depth > 60:
+        if radius <= MIN_PIECE_RADIUS_M or visited > MAX_PIECES or depth > 60:
             return TOO_CLOSE, 0.0
         halve_longest_edge(pieces, depth, 0.0)
         depth += 2
@@ -195,7 +214,7 @@ def _triangle_to_solid(triangles, number, pose, solid, margin, excess, limit, pi
 
 @njit(cache=True, nogil=True)
 def _box_to_solid(boxes, node, pose, solid):  # type: ignore[no-untyped-def]
-    """Lower bound of the distance of a tree's box from a solid, along the faces' normals of the boxes around both."""
+    """Bounds the distance of a tree's box from a solid along the face normals of the box and of the solid's box."""
     kind, p0, p1, p2 = solid
     if kind in (PLANE, HALF_SPACE):
         return -np.inf
@@ -220,7 +239,7 @@ def _box_to_solid(boxes, node, pose, solid):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _box_to_box(boxes, node, other_boxes, other, pose):  # type: ignore[no-untyped-def]
-    """Lower bound of the distance of two trees' boxes along their faces' normals."""
+    """Bounds the distance of two trees' boxes along their face normals."""
     x, y, z = boxes[node, 0], boxes[node, 1], boxes[node, 2]
     dx = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3] - other_boxes[other, 0]
     dy = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3] - other_boxes[other, 1]
@@ -256,19 +275,19 @@ def surface_to_solid(surface, root, pose, solid, margin, excess, limit, memory):
     """Bounds the distance of a surface from a solid.
 
     Args:
-        surface: the trees that hold it.
-        root: node to start from.
-        pose: (3, 4) of the surface in the solid's frame.
-        solid: the closed form.
-        margin: what is taken off every distance [m].
-        excess: how far the surface may lie outside of its body [m]: only a deeper point says that both touch.
-        limit: a distance [m] beyond which nothing needs to be known.
-        memory: working memory.
+        surface: Trees with the surface.
+        root: Root node of the surface.
+        pose: Pose of the surface in the solid's frame, shape (3, 4).
+        solid: Closed form.
+        margin: Distance subtracted from every distance [m].
+        excess: Maximum distance of the surface outside its body [m]; only a deeper point proves contact.
+        limit: Maximum of the bound [m].
+        memory: Working memory.
 
     Returns:
-        (status, lower bound of the distance, at most `limit`).
+        The status, and the lower bound of the distance minus the margin [m].
     """
-    spheres, boxes, links, triangles = surface
+    spheres, boxes, children, triangles = surface
     stack, bounds, pieces = memory.stack, memory.bounds, memory.pieces
     stack[0, 0], bounds[0] = root, -np.inf
     depth, result = 1, CLEAR
@@ -277,26 +296,26 @@ def surface_to_solid(surface, root, pose, solid, margin, excess, limit, memory):
         node = stack[depth, 0]
         if bounds[depth] >= limit:
             continue
-        if links[node, 0] < 0:
-            number = links[node, 1]
-            status, bound = _triangle_to_solid(triangles, number, pose, solid, margin, excess, limit, pieces)
+        if children[node, 0] < 0:
+            index = children[node, 1]
+            status, bound = _triangle_to_solid(triangles, index, pose, solid, margin, excess, limit, pieces)
             if status == TOUCHING:
                 return TOUCHING, 0.0
-            if status == TOO_CLOSE:  # what is left to find out is whether it touches elsewhere
+            if status == TOO_CLOSE:  # from here on, search for a touching triangle only
                 result, limit = TOO_CLOSE, -ROUNDING - excess
                 continue
             limit = min(limit, bound)
             continue
-        far, near = links[node, 0], links[node, 1]
+        far, near = children[node, 0], children[node, 1]
         far_gap = _centre_distance(spheres, far, pose, solid) - margin
         near_gap = _centre_distance(spheres, near, pose, solid) - margin
         if far_gap - spheres[far, 3] < near_gap - spheres[near, 3]:
             far, near, far_gap, near_gap = near, far, near_gap, far_gap
-        for child, gap in ((far, far_gap), (near, near_gap)):  # the nearer one comes to lie on top of the stack
+        for child, gap in ((far, far_gap), (near, near_gap)):  # the nearer child ends on top of the stack
             radius = spheres[child, 3]
             if gap - radius >= limit:
                 continue
-            if radius <= ACCEPTED_SHARE * gap:
+            if radius <= MAX_RADIUS_FRACTION * gap:
                 limit = gap - radius
             elif limit <= 0.0 or _box_to_solid(boxes, child, pose, solid) - margin < limit:
                 stack[depth, 0], bounds[depth] = child, gap - radius
@@ -329,35 +348,50 @@ def _sphere_gap(spheres, node, other_spheres, other, pose):  # type: ignore[no-u
 def surface_to_surface(  # type: ignore[no-untyped-def]
     surface, root, other_surface, other_root, pose, margin, excess, limit, memory
 ):
-    """Bounds the distance of two surfaces; `pose` (3, 4) is the first one's in the frame of the other."""
-    spheres, boxes, links, triangles = surface
-    other_spheres, other_boxes, other_links, other_triangles = other_surface
-    stack, bounds, corners = memory.stack, memory.bounds, memory.corners
+    """Bounds the distance between two surfaces.
+
+    Args:
+        surface: Trees with the first surface.
+        root: Root node of the first surface.
+        other_surface: Trees with the other surface.
+        other_root: Root node of the other surface.
+        pose: Pose of the first surface in the frame of the other, shape (3, 4).
+        margin: Distance subtracted from every distance [m].
+        excess: Maximum distance of the surfaces outside their bodies [m]; only a deeper point proves contact.
+        limit: Maximum of the bound [m].
+        memory: Working memory.
+
+    Returns:
+        The status, and the lower bound of the distance minus the margin [m].
+    """
+    spheres, boxes, children, triangles = surface
+    other_spheres, other_boxes, other_children, other_triangles = other_surface
+    stack, bounds, vertices = memory.stack, memory.bounds, memory.vertices
     stack[0, 0], stack[0, 1], bounds[0] = root, other_root, -np.inf
-    depth, hopeless, result = 1, HOPELESS_SHARE * limit, CLEAR
+    depth, min_useful, result = 1, MIN_USEFUL_FRACTION * limit, CLEAR
     while depth > 0:
         depth -= 1
         node, other = stack[depth, 0], stack[depth, 1]
         if bounds[depth] >= limit:
             continue
-        if links[node, 0] < 0 and other_links[other, 0] < 0:
-            one, two = links[node, 1], other_links[other, 1]
-            distance = _triangle_to_triangle(triangles, one, pose, other_triangles, two, corners) - margin
+        if children[node, 0] < 0 and other_children[other, 0] < 0:
+            face, other_face = children[node, 1], other_children[other, 1]
+            distance = _triangle_to_triangle(triangles, face, pose, other_triangles, other_face, vertices) - margin
             if distance <= -excess:
                 return TOUCHING, 0.0
-            if distance <= ROUNDING:  # what is left to find out is whether they touch elsewhere
+            if distance <= ROUNDING:  # from here on, search for touching triangles only
                 result, limit = TOO_CLOSE, -excess
                 continue
             limit = min(limit, distance)
-            if limit < hopeless:  # of little use: all that is still asked is whether they touch
+            if limit < min_useful:  # from here on, decide only whether the surfaces touch
                 limit = min(limit, 2.0 * ROUNDING)
             continue
-        if depth > STACK - 3:
+        if depth > STACK_SIZE - 3:
             return TOO_CLOSE, 0.0
-        if other_links[other, 0] < 0 or (links[node, 0] >= 0 and spheres[node, 3] >= other_spheres[other, 3]):
-            a, b, other_a, other_b = links[node, 0], links[node, 1], other, other
+        if other_children[other, 0] < 0 or (children[node, 0] >= 0 and spheres[node, 3] >= other_spheres[other, 3]):
+            a, b, other_a, other_b = children[node, 0], children[node, 1], other, other
         else:
-            a, b, other_a, other_b = node, node, other_links[other, 0], other_links[other, 1]
+            a, b, other_a, other_b = node, node, other_children[other, 0], other_children[other, 1]
         gap_a = _sphere_gap(spheres, a, other_spheres, other_a, pose) - margin
         gap_b = _sphere_gap(spheres, b, other_spheres, other_b, pose) - margin
         both_a, both_b = spheres[a, 3] + other_spheres[other_a, 3], spheres[b, 3] + other_spheres[other_b, 3]
@@ -367,7 +401,7 @@ def surface_to_surface(  # type: ignore[no-untyped-def]
         for child, partner, gap, both in ((a, other_a, gap_a, both_a), (b, other_b, gap_b, both_b)):
             if gap - both >= limit:
                 continue
-            if both <= ACCEPTED_SHARE * gap:
+            if both <= MAX_RADIUS_FRACTION * gap:
                 limit = gap - both
             elif limit <= 0.0 or _box_to_box(boxes, child, other_boxes, partner, pose) - margin < limit:
                 stack[depth, 0], stack[depth, 1], bounds[depth] = child, partner, gap - both
@@ -376,70 +410,70 @@ def surface_to_surface(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _triangle_to_triangle(triangles, number, pose, others, other, corners):  # type: ignore[no-untyped-def]
-    for corner in range(0, 9, 3):
-        x, y, z = triangles[number, corner], triangles[number, corner + 1], triangles[number, corner + 2]
+def _triangle_to_triangle(triangles, index, pose, others, other, vertices):  # type: ignore[no-untyped-def]
+    for vertex in range(0, 9, 3):
+        x, y, z = triangles[index, vertex], triangles[index, vertex + 1], triangles[index, vertex + 2]
         for row in range(3):
-            corners[corner + row] = pose[row, 0] * x + pose[row, 1] * y + pose[row, 2] * z + pose[row, 3]
-    return triangle_distance(corners, others[other])
+            vertices[vertex + row] = pose[row, 0] * x + pose[row, 1] * y + pose[row, 2] * z + pose[row, 3]
+    return triangle_distance(vertices, others[other])
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _motion_in_turns(spheres, node, pose, origins, axes, change):  # type: ignore[no-untyped-def]
-    """Bounds how far a point of a node's sphere moves [m], ROUNDING included; the others as in surfaces_stay_apart."""
+def _motion_in_rotations(spheres, node, pose, origins, axes, max_angles):  # type: ignore[no-untyped-def]
+    """Bounds the motion of any point of a node's sphere under Rotations [m], plus ROUNDING."""
     x, y, z, radius = spheres[node, 0], spheres[node, 1], spheres[node, 2], spheres[node, 3]
     px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
     py = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3]
     pz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
     motion = ROUNDING
-    for turn in range(len(change)):
-        wx, wy, wz = px - origins[turn, 0], py - origins[turn, 1], pz - origins[turn, 2]
-        ax, ay, az = axes[turn, 0], axes[turn, 1], axes[turn, 2]
+    for axis in range(len(max_angles)):
+        wx, wy, wz = px - origins[axis, 0], py - origins[axis, 1], pz - origins[axis, 2]
+        ax, ay, az = axes[axis, 0], axes[axis, 1], axes[axis, 2]
         reach = np.sqrt((ay * wz - az * wy) ** 2 + (az * wx - ax * wz) ** 2 + (ax * wy - ay * wx) ** 2)
-        motion += change[turn] * (reach + radius + motion)
+        motion += max_angles[axis] * (reach + radius + motion)
     return motion
 
 
 @njit(cache=True, nogil=True)
-def surfaces_stay_apart(surface, root, other_surface, other_root, pose, turns):  # type: ignore[no-untyped-def]
-    """Whether two surfaces stay apart while the first one turns about some axes; False also where it is too near.
+def surfaces_stay_apart(surface, root, other_surface, other_root, pose, rotations):  # type: ignore[no-untyped-def]
+    """Returns whether two surfaces provably stay apart while the first surface rotates.
 
     Args:
-        surface: the trees that hold the first surface.
-        root: node of the first surface to start from.
-        other_surface: the trees that hold the other one.
-        other_root: node of the other surface to start from.
-        pose: of the first surface in the frame of the other, in the middle of the turn; shape (3, 4).
-        turns: about which axes, in the same frame.
+        surface: Trees with the first surface.
+        root: Root node of the first surface.
+        other_surface: Trees with the other surface.
+        other_root: Root node of the other surface.
+        pose: Pose of the first surface in the frame of the other, at the middle of the rotation; shape (3, 4).
+        rotations: Rotations of the first surface, in the frame of the other.
     """
-    spheres, boxes, links, triangles = surface
-    other_spheres, other_boxes, other_links, other_triangles = other_surface
-    origins, axes, change = turns
-    stack, corners = np.empty((STACK, 2), np.int32), np.empty(9)
+    spheres, boxes, children, triangles = surface
+    other_spheres, other_boxes, other_children, other_triangles = other_surface
+    origins, axes, max_angles = rotations
+    stack, vertices = np.empty((STACK_SIZE, 2), np.int32), np.empty(9)
     stack[0, 0], stack[0, 1] = root, other_root
-    depth, work = 1, 0
+    depth, visited = 1, 0
     while depth > 0:
         depth -= 1
-        work += 1
+        visited += 1
         node, other = stack[depth, 0], stack[depth, 1]
-        needed = _motion_in_turns(spheres, node, pose, origins, axes, change)
+        needed = _motion_in_rotations(spheres, node, pose, origins, axes, max_angles)
         gap = _sphere_gap(spheres, node, other_spheres, other, pose)
         if (
             gap - spheres[node, 3] - other_spheres[other, 3] >= needed
             or _box_to_box(boxes, node, other_boxes, other, pose) >= needed
         ):
             continue
-        if links[node, 0] < 0 and other_links[other, 0] < 0:
-            one, two = links[node, 1], other_links[other, 1]
-            if _triangle_to_triangle(triangles, one, pose, other_triangles, two, corners) < needed:
+        if children[node, 0] < 0 and other_children[other, 0] < 0:
+            face, other_face = children[node, 1], other_children[other, 1]
+            if _triangle_to_triangle(triangles, face, pose, other_triangles, other_face, vertices) < needed:
                 return False
             continue
-        if depth > STACK - 3 or work > MOST_PAIRS:
+        if depth > STACK_SIZE - 3 or visited > MAX_NODE_PAIRS:
             return False
-        if other_links[other, 0] < 0 or (links[node, 0] >= 0 and spheres[node, 3] >= other_spheres[other, 3]):
-            a, b, other_a, other_b = links[node, 0], links[node, 1], other, other
+        if other_children[other, 0] < 0 or (children[node, 0] >= 0 and spheres[node, 3] >= other_spheres[other, 3]):
+            a, b, other_a, other_b = children[node, 0], children[node, 1], other, other
         else:
-            a, b, other_a, other_b = node, node, other_links[other, 0], other_links[other, 1]
+            a, b, other_a, other_b = node, node, other_children[other, 0], other_children[other, 1]
         stack[depth, 0], stack[depth, 1], stack[depth + 1, 0], stack[depth + 1, 1] = a, other_a, b, other_b
         depth += 2
     return True

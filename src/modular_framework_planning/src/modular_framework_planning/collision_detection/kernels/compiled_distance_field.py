@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The distance of points from the nearest of many solids, compiled: a grid keeps which solids are nearest to a cell.
+"""Distance field over many solids, compiled: each grid cell stores the solids nearest to its centre.
 
-A link is checked against all solids of the world at once. Where the link is far from all of them, the distance at the
-centre of a cell says so; where it is near, only the few solids nearest to the cell are asked. Cells are filled on
-first use and never change.
+The field checks a link against all solids of the world at once. The stored distance at the cell centre rules out
+distant solids; near solids are checked exactly. Cells are filled on first use.
 """
 
 from __future__ import annotations
@@ -25,127 +24,152 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 )
 from modular_framework_planning.geometry.spatial import Array
 
-KEPT = 6  # nearest solids of a cell
+NEAREST_SOLIDS = 6  # stored per cell
 
 
 class DistanceField(NamedTuple):
-    """Solids that stand still in the planning frame, and the grid over them.
+    """Static solids in the planning frame, and the grid over them.
 
     Attributes:
-        kinds, sizes: closed form of each solid and its three numbers, shapes (n,) and (n, 3).
-        poses: of the solids in the planning frame, shape (n, 3, 4).
-        corner: of the grid, and the edge of its cells [m]; shape (4,).
-        known: whether a cell is filled; shape (x, y, z).
-        nearest: the solids nearest to a cell's centre, the nearest first; shape (x, y, z, min(n, KEPT)).
-        distances: of these solids from the centre [m], below 0 inside; same shape.
+        kinds: Closed form of each solid, shape (n,).
+        sizes: Three parameters of each closed form, shape (n, 3).
+        poses: Poses of the solids in the planning frame, shape (n, 3, 4).
+        grid: Minimum corner of the grid and edge length of a cell, shape (4,) [m].
+        is_filled: Whether each cell is filled, shape (x, y, z).
+        nearest: Solids nearest to each cell's centre, in ascending order; shape (x, y, z, min(n, NEAREST_SOLIDS)).
+        distances: Distances of these solids from the centre, negative inside; same shape [m].
     """
 
     kinds: NDArray[np.int64]
     sizes: Array
     poses: Array
-    corner: Array
-    known: NDArray[np.bool_]
+    grid: Array
+    is_filled: NDArray[np.bool_]
     nearest: NDArray[np.int32]
     distances: Array
 
 
 @njit(cache=True, nogil=True)
-def _solid_gap(kinds, sizes, poses, number, x, y, z):  # type: ignore[no-untyped-def]
-    solid = Solid(kinds[number], sizes[number, 0], sizes[number, 1], sizes[number, 2])
-    return placed_solid_distance(solid, poses, number, x, y, z)
+def _solid_gap(kinds, sizes, poses, solid_index, x, y, z):  # type: ignore[no-untyped-def]
+    solid = Solid(kinds[solid_index], sizes[solid_index, 0], sizes[solid_index, 1], sizes[solid_index, 2])
+    return placed_solid_distance(solid, poses, solid_index, x, y, z)
 
 
 @njit(cache=True, nogil=True)
 def _fill_cell(kinds, sizes, poses, nearest, distances, x, y, z):  # type: ignore[no-untyped-def]
-    """Writes the solids nearest to a point, and their distances; both of shape (k,)."""
-    kept, used = len(nearest), 0
-    for number in range(len(kinds)):
-        gap = _solid_gap(kinds, sizes, poses, number, x, y, z)
-        if used == kept and gap >= distances[used - 1]:
+    """Writes the solids nearest to the point (x, y, z), and their distances; both have shape (k,)."""
+    stored, filled = len(nearest), 0
+    for solid_index in range(len(kinds)):
+        gap = _solid_gap(kinds, sizes, poses, solid_index, x, y, z)
+        if filled == stored and gap >= distances[filled - 1]:
             continue
-        at = min(used, kept - 1)
-        while at > 0 and distances[at - 1] > gap:
-            distances[at], nearest[at] = distances[at - 1], nearest[at - 1]
-            at -= 1
-        distances[at], nearest[at] = gap, number
-        used = min(used + 1, kept)
+        slot = min(filled, stored - 1)
+        while slot > 0 and distances[slot - 1] > gap:
+            distances[slot], nearest[slot] = distances[slot - 1], nearest[slot - 1]
+            slot -= 1
+        distances[slot], nearest[slot] = gap, solid_index
+        filled = min(filled + 1, stored)
 
 
 @njit(cache=True, nogil=True)
 def field_cell(field, x, y, z):  # type: ignore[no-untyped-def]
-    """Returns the cell of a point, filled (three numbers, -1 outside of the grid), and how far its centre is [m]."""
-    corner, known = field.corner, field.known
-    edge = corner[3]
-    u, v, w = (x - corner[0]) / edge, (y - corner[1]) / edge, (z - corner[2]) / edge
-    if not (0.0 <= u < known.shape[0] and 0.0 <= v < known.shape[1] and 0.0 <= w < known.shape[2]):  # or not a number
+    """Fills the cell of the point (x, y, z).
+
+    Returns:
+        The three indices of the cell, -1 outside the grid, and the distance of the point from the cell centre [m].
+    """
+    grid, is_filled = field.grid, field.is_filled
+    edge = grid[3]
+    u, v, w = (x - grid[0]) / edge, (y - grid[1]) / edge, (z - grid[2]) / edge
+    if not (
+        0.0 <= u < is_filled.shape[0] and 0.0 <= v < is_filled.shape[1] and 0.0 <= w < is_filled.shape[2]
+    ):  # also for NaN
         return -1, 0, 0, 0.0
     i, j, k = int(u), int(v), int(w)
-    u, v, w = corner[0] + (i + 0.5) * edge, corner[1] + (j + 0.5) * edge, corner[2] + (k + 0.5) * edge
-    if not known[i, j, k]:
+    u, v, w = grid[0] + (i + 0.5) * edge, grid[1] + (j + 0.5) * edge, grid[2] + (k + 0.5) * edge
+    if not is_filled[i, j, k]:
         _fill_cell(field.kinds, field.sizes, field.poses, field.nearest[i, j, k], field.distances[i, j, k], u, v, w)
-        known[i, j, k] = True
+        is_filled[i, j, k] = True
     return i, j, k, np.sqrt((x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2)
 
 
 @njit(cache=True, nogil=True)
-def field_distance(field, x, y, z, enough):  # type: ignore[no-untyped-def]
-    """Returns a lower bound of a point's distance [m] from the nearest solid, exact where it is less than `enough`."""
+def field_distance(field, x, y, z, sufficient):  # type: ignore[no-untyped-def]
+    """Returns a lower bound of a point's distance from the nearest solid, exact if less than `sufficient` [m].
+
+    Args:
+        field: Distance field.
+        x: Coordinate of the point in the planning frame [m].
+        y: Coordinate of the point in the planning frame [m].
+        z: Coordinate of the point in the planning frame [m].
+        sufficient: Distance from which a lower bound is good enough [m].
+    """
     kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
-    i, j, k, away = field_cell(field, x, y, z)
+    i, j, k, offset = field_cell(field, x, y, z)
     best = np.inf
     if i >= 0:
-        kept = nearest.shape[3]
-        lower = distances[i, j, k, 0] - away
-        if lower >= enough:
+        stored = nearest.shape[3]
+        lower = distances[i, j, k, 0] - offset
+        if lower >= sufficient:
             return lower
-        for order in range(kept):
-            if distances[i, j, k, order] - away >= best:
+        for order in range(stored):
+            if distances[i, j, k, order] - offset >= best:
                 return best
             best = min(best, _solid_gap(kinds, sizes, poses, nearest[i, j, k, order], x, y, z))
-        if kept == len(kinds) or distances[i, j, k, kept - 1] - away >= best:
+        if stored == len(kinds) or distances[i, j, k, stored - 1] - offset >= best:
             return best
-    for number in range(len(kinds)):
-        best = min(best, _solid_gap(kinds, sizes, poses, number, x, y, z))
+    for solid_index in range(len(kinds)):
+        best = min(best, _solid_gap(kinds, sizes, poses, solid_index, x, y, z))
     return best
 
 
 @njit(cache=True, nogil=True)
-def _pose_in_solid(pose, poses, number, out):  # type: ignore[no-untyped-def]
-    """Writes a pose (3, 4) in the frame of a solid."""
+def _pose_in_solid(pose, poses, solid_index, out):  # type: ignore[no-untyped-def]
+    """Writes a pose, shape (3, 4), in the frame of a solid."""
     for row in range(3):
         for column in range(4):
             value = 0.0
             for inner in range(3):
-                part = pose[inner, column] - (poses[number, inner, 3] if column == 3 else 0.0)
-                value += poses[number, inner, row] * part
+                part = pose[inner, column] - (poses[solid_index, inner, 3] if column == 3 else 0.0)
+                value += poses[solid_index, inner, row] * part
             out[row, column] = value
 
 
 @njit(cache=True, nogil=True)
 def surface_to_field(surface, root, pose, field, margin, excess, limit, memory):  # type: ignore[no-untyped-def]
-    """Bounds the distance of a surface from all solids; arguments and result are those of surface_to_solid.
+    """Bounds the distance of a surface from all solids of a field.
 
-    Where it touches, the number of the solid instead of the bound.
-    `pose` (3, 4) is the surface's in the planning frame.
+    Args:
+        surface: Trees with the surface.
+        root: Root node of the surface.
+        pose: Pose of the surface in the planning frame, shape (3, 4).
+        field: Distance field.
+        margin: Distance subtracted from every distance [m].
+        excess: Maximum distance of the surface outside its body [m]; only a deeper point proves contact.
+        limit: Maximum of the bound [m].
+        memory: Working memory.
+
+    Returns:
+        The status and the lower bound [m], or TOUCHING and the index of a touched solid.
     """
     kinds, sizes, poses, nearest, distances = field.kinds, field.sizes, field.poses, field.nearest, field.distances
     relative, result, reach = memory.relative, CLEAR, surface.spheres[root, 3] + margin
     x, y, z = _placed_centre(surface.spheres, root, pose)
-    i, j, k, away = field_cell(field, x, y, z)
-    kept, count = nearest.shape[3], 0
-    while i >= 0 and count < kept and distances[i, j, k, count] - away - reach < limit:
+    i, j, k, offset = field_cell(field, x, y, z)
+    stored, count = nearest.shape[3], 0
+    while i >= 0 and count < stored and distances[i, j, k, count] - offset - reach < limit:
         count += 1
-    asks_all = i < 0 or (count == kept and kept < len(kinds))
-    for order in range(len(kinds) if asks_all else count):
-        number = order if asks_all else nearest[i, j, k, order]
-        if _solid_gap(kinds, sizes, poses, number, x, y, z) - reach >= limit:
+    use_all = i < 0 or (count == stored and stored < len(kinds))
+    for order in range(len(kinds) if use_all else count):
+        solid_index = order if use_all else nearest[i, j, k, order]
+        if _solid_gap(kinds, sizes, poses, solid_index, x, y, z) - reach >= limit:
             continue
-        _pose_in_solid(pose, poses, number, relative)
-        solid = Solid(kinds[number], sizes[number, 0], sizes[number, 1], sizes[number, 2])
+        _pose_in_solid(pose, poses, solid_index, relative)
+        solid = Solid(kinds[solid_index], sizes[solid_index, 0], sizes[solid_index, 1], sizes[solid_index, 2])
         status, bound = surface_to_solid(surface, root, relative, solid, margin, excess, limit, memory)
         if status == TOUCHING:
-            return TOUCHING, float(number)
-        if status == TOO_CLOSE:  # what is left to find out is whether it touches elsewhere
+            return TOUCHING, float(solid_index)
+        if status == TOO_CLOSE:  # from here on, search for a touching solid only
             result, limit = TOO_CLOSE, -ROUNDING - excess
         limit = min(limit, bound)
     return result, max(limit, 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks straight motions of a group of joints from within other compiled loops, and remembers the verdicts."""
+"""Collision checks of straight joint motions for compiled planners, with a memory of verdicts."""
 
 from __future__ import annotations
 
@@ -16,39 +16,38 @@ from modular_framework_planning.collision_detection.kernels.compiled_paths impor
     Samples,
     check_samples,
     count_verdict,
+    index_samples,
     new_workspace,
-    number_samples,
     release,
 )
 from modular_framework_planning.geometry.spatial import Array
 
-# What is known of an edge
-UNKNOWN, FREE, BLOCKED = 0, 1, 2
-REMEMBERED = 256  # edges; looking through them takes less than a hundredth of a check
+UNKNOWN, FREE, BLOCKED = 0, 1, 2  # verdicts on an edge
+MEMORY_CAPACITY = 256  # edges; searching them takes less than 1 % of a check
 
 
 class GroupEdges(NamedTuple):
-    """How the straight motions of a group are checked.
+    """Relation of a group's joint vectors to the whole robot, and the step of edge checks.
 
     Attributes:
-        rest: positions of the whole robot where the group's are 0; shape (all,).
-        map: change of the robot's positions by the group's, mimic joints included; shape (all, joints).
-        step: distance of the checks along an edge, of any joint [rad or m].
+        rest: Joint positions of the whole robot with the group's joints at 0, shape (all,) [rad or m].
+        joint_map: Derivative of the robot's joint positions by the group's, mimic joints included; shape (all, joints).
+        step: Maximum joint distance between samples of an edge [rad or m].
     """
 
     rest: Array
-    map: Array
+    joint_map: Array
     step: float
 
 
 class EdgeMemory(NamedTuple):
-    """The edges that were checked last.
+    """Ring buffer of the edges checked last.
 
     Attributes:
-        ends: joint vectors at the start and the end of each; shape (room, 2, joints).
-        steps: at which each was checked [rad or m]; shape (room,).
-        verdicts: FREE or BLOCKED; shape (room,).
-        total: of all edges that were ever remembered; the latest take the places of the oldest; shape (1,).
+        ends: Start and end joint vector of each edge, shape (capacity, 2, joints) [rad or m].
+        steps: Step of each check, shape (capacity,) [rad or m].
+        verdicts: FREE or BLOCKED, shape (capacity,).
+        total: Number of edges ever stored, shape (1,).
     """
 
     ends: Array
@@ -58,89 +57,113 @@ class EdgeMemory(NamedTuple):
 
 
 def new_memory(joints: int) -> EdgeMemory:
-    """Returns an empty memory of the edges of a group."""
+    """Returns an empty memory for a group with this number of joints."""
     return EdgeMemory(
-        np.empty((REMEMBERED, 2, joints)), np.empty(REMEMBERED), np.zeros(REMEMBERED, np.int64), np.zeros(1, np.int64)
+        np.empty((MEMORY_CAPACITY, 2, joints)),
+        np.empty(MEMORY_CAPACITY),
+        np.zeros(MEMORY_CAPACITY, np.int64),
+        np.zeros(1, np.int64),
     )
 
 
 @njit(cache=True, nogil=True)
 def recall(memory, start, end, step):  # type: ignore[no-untyped-def]
-    """Returns the verdict about an edge at a step: FREE, BLOCKED, or UNKNOWN."""
+    """Returns the remembered verdict on an edge: FREE, BLOCKED, or UNKNOWN.
+
+    Args:
+        memory: Edge memory.
+        start: Joint vector at the start, shape (joints,) [rad or m].
+        end: Joint vector at the end, shape (joints,) [rad or m].
+        step: Step of the check [rad or m].
+    """
     ends, steps, verdicts, total = memory
-    for number in range(min(total[0], len(verdicts))):
-        is_same = steps[number] == step
+    for index in range(min(total[0], len(verdicts))):
+        is_same = steps[index] == step
         for joint in range(len(start)):
-            is_same = is_same and ends[number, 0, joint] == start[joint] and ends[number, 1, joint] == end[joint]
+            is_same = is_same and ends[index, 0, joint] == start[joint] and ends[index, 1, joint] == end[joint]
             if not is_same:
                 break
         if is_same:
-            return verdicts[number]
+            return verdicts[index]
     return UNKNOWN
 
 
 @njit(cache=True, nogil=True)
 def remember(memory, start, end, step, verdict):  # type: ignore[no-untyped-def]
-    """Remembers the verdict about an edge at a step."""
+    """Stores the verdict on an edge.
+
+    Args:
+        memory: Edge memory.
+        start: Joint vector at the start, shape (joints,) [rad or m].
+        end: Joint vector at the end, shape (joints,) [rad or m].
+        step: Step of the check [rad or m].
+        verdict: FREE or BLOCKED.
+    """
     ends, steps, verdicts, total = memory
-    number = total[0] % len(verdicts)
-    ends[number, 0], ends[number, 1], steps[number], verdicts[number] = start, end, step, verdict
+    index = total[0] % len(verdicts)
+    ends[index, 0], ends[index, 1], steps[index], verdicts[index] = start, end, step, verdict
     total[0] += 1
 
 
 @njit(cache=True, nogil=True)
 def new_edge(edges):  # type: ignore[no-untyped-def]
-    """Returns working memory for one edge."""
+    """Returns working memory for the samples of an edge."""
     joints = len(edges.rest)
     return Samples(np.empty((2, joints)), np.empty(2, np.int64), np.empty((2, joints)))
 
 
 @njit(cache=True, nogil=True)
 def _write_positions(edges, state, out):  # type: ignore[no-untyped-def]
-    """Writes the positions (all,) of the whole robot for a joint vector of the group."""
+    """Writes the whole robot's joint positions, shape (all,), for a joint vector of the group."""
     for row in range(len(out)):
         out[row] = edges.rest[row]
         for joint in range(len(state)):
-            out[row] += edges.map[row, joint] * state[joint]
+            out[row] += edges.joint_map[row, joint] * state[joint]
 
 
 @njit(cache=True, nogil=True)
 def check_edge(edges, world, start, end, samples, undecided, workspace):  # type: ignore[no-untyped-def]
-    """Returns FREE, BLOCKED, or UNKNOWN where the bounds do not decide; the start of the edge is not checked.
+    """Returns FREE, BLOCKED, or UNKNOWN if the bounds do not decide; the start of the edge is not checked.
 
     Args:
-        edges: how they are checked.
-        world: what is checked.
-        start: joint vector of the group.
-        end: the same.
-        samples: working memory, see `new_edge`.
-        undecided: rows (n, 2) for what `check_samples` does not decide.
-        workspace: working memory of `check_samples`.
+        edges: Relation of the group to the whole robot, and the step.
+        world: Bodies and pairs.
+        start: Joint vector of the group at the start [rad or m].
+        end: Joint vector of the group at the end [rad or m].
+        samples: Working memory, see `new_edge`.
+        undecided: Filled by `check_samples`, shape (n, 2).
+        workspace: Working memory of `check_samples`.
     """
     _write_positions(edges, start, samples.vertices[0])
     _write_positions(edges, end, samples.vertices[1])
-    number_samples(samples, edges.step)
+    index_samples(samples, edges.step)
     status, _ = check_samples(world, samples, 1, undecided, workspace)
-    if status != TOO_CLOSE:  # else it is asked again elsewhere
+    if status != TOO_CLOSE:  # the exact check counts undecided edges
         count_verdict(world.counts, status)
     return FREE if status == CLEAR else BLOCKED if status == TOUCHING else UNKNOWN
 
 
 @njit(cache=True, nogil=True)
 def check_edges(edges, motions, *world):  # type: ignore[no-untyped-def]
-    """Returns what `check_edge` does for motions (n, 2, joints) in a world, which is what `arguments` returns."""
+    """Returns the verdict of `check_edge` for each motion.
+
+    Args:
+        edges: Relation of the group to the whole robot, and the step.
+        motions: Start and end joint vector of each motion, shape (n, 2, joints) [rad or m].
+        *world: Arrays from `compiled_collision.arguments`.
+    """
     bodies = world_of(world)
     workspace, samples = new_workspace(bodies), new_edge(edges)
     verdicts = np.empty(len(motions), np.int64)
     _check_all(borrowed(edges), bodies, motions, borrowed(samples), borrowed(workspace), verdicts)
     release(workspace)
-    samples.numbers[0] = 0
+    samples.at_vertices[0] = 0
     return verdicts
 
 
 @njit(cache=True, nogil=True)
 def _check_all(edges, world, motions, samples, workspace, verdicts):  # type: ignore[no-untyped-def]
     no_rows = np.empty((0, 2), np.int64)
-    for number in range(len(motions)):
-        start, end = motions[number, 0], motions[number, 1]
-        verdicts[number] = check_edge(edges, world, start, end, samples, no_rows, workspace)
+    for index in range(len(motions)):
+        start, end = motions[index, 0], motions[index, 1]
+        verdicts[index] = check_edge(edges, world, start, end, samples, no_rows, workspace)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How deep a robot is in its surroundings, compiled: a smooth guide for optimisers, not a verdict on collisions.
+"""Penetration depths of a robot in its environment, compiled: a smooth cost for optimisers, not a collision check.
 
-Each body is covered by spheres taken from its sphere tree. Where the bounds of the collision check say that a pair of
-bodies may touch, its penetration is that of the deepest sphere.
+Each body is approximated by bounding spheres from its sphere tree. If the distance bounds cannot exclude contact of a
+pair, the depth of its deepest sphere is the pair's penetration.
 """
 
 from __future__ import annotations
@@ -29,23 +29,25 @@ from modular_framework_planning.collision_detection.kernels.compiled_distance im
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.compiled_kinematics import joint_placements
 
-TOUCH_COST_M = 0.03  # added to the depth of a contact where contacts are costs: they begin with a step
-WIDEST_SPHERE = 0.07  # [m]; of those that cover the bodies
-NEAR = 1.0e-5  # [m]; bodies less apart count as touching
+TOUCH_COST_M = 0.03  # added to the depth of every contact, so that the cost of contact starts with a step
+MAX_SPHERE_RADIUS_M = 0.07
+CONTACT_DISTANCE_M = 1.0e-5  # closer bodies count as touching
 
 
-class Cover(NamedTuple):
-    """Spheres of all bodies (centre in the body's frame, radius), shape (m, 4), and each body's first, shape (b + 1,).
+class BoundingSpheres(NamedTuple):
+    """Bounding spheres of all bodies; a body with only a closed form has no spheres.
 
-    Bodies that have only a closed form have no spheres.
+    Attributes:
+        spheres: Centre (in the body's frame) and radius, shape (m, 4) [m].
+        starts: Index of each body's first sphere, and the total; shape (b + 1,).
     """
 
     spheres: Array
     starts: NDArray[np.int64]
 
 
-def cover_of(world: World) -> Cover:
-    """Covers every body by the largest spheres of its tree that are at most WIDEST_SPHERE in radius."""
+def bounding_spheres_of(world: World) -> BoundingSpheres:
+    """Returns for every body the largest spheres of its tree with radii up to MAX_SPHERE_RADIUS_M."""
     rows: list[Array] = []
     starts = [0]
     for body, root in enumerate(world.roots.tolist()):
@@ -53,13 +55,13 @@ def cover_of(world: World) -> Cover:
         open_nodes = [root] if root >= 0 else []
         while open_nodes:
             node = open_nodes.pop()
-            left, right = surface.links[node].tolist()
-            if left < 0 or surface.spheres[node, 3] <= WIDEST_SPHERE:
+            left, right = surface.children[node].tolist()
+            if left < 0 or surface.spheres[node, 3] <= MAX_SPHERE_RADIUS_M:
                 rows.append(surface.spheres[node])
             else:
                 open_nodes += [left, right]
         starts.append(len(rows))
-    return Cover(np.array(rows).reshape(-1, 4), np.array(starts, dtype=np.int64))
+    return BoundingSpheres(np.array(rows).reshape(-1, 4), np.array(starts, dtype=np.int64))
 
 
 @njit(cache=True, nogil=True)
@@ -69,59 +71,59 @@ def _place(pose, local, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _pair_depth(world, cover, placed, poses, middle, first, second, reach):  # type: ignore[no-untyped-def]
-    """Depth [m] of the deepest sphere of one body in the other body, `reach` away from it counting as 0."""
+def _pair_depth(world, bounding, placed, poses, centre, first, second, margin):  # type: ignore[no-untyped-def]
+    """Returns the depth of the first body's deepest sphere in the second body inflated by `margin` [m]."""
     deepest = 0.0
-    around = world.spheres[second, 3]
+    second_radius = world.spheres[second, 3]
     solid = solid_of(world.kinds, world.sizes, second)
-    for i in range(cover.starts[first], cover.starts[first + 1]):
-        x, y, z, radius = placed[i, 0], placed[i, 1], placed[i, 2], cover.spheres[i, 3]
-        wide = reach + radius + around - deepest
-        if (x - middle[0]) ** 2 + (y - middle[1]) ** 2 + (z - middle[2]) ** 2 >= wide * wide:
+    for i in range(bounding.starts[first], bounding.starts[first + 1]):
+        x, y, z, radius = placed[i, 0], placed[i, 1], placed[i, 2], bounding.spheres[i, 3]
+        max_distance = margin + radius + second_radius - deepest
+        if (x - centre[0]) ** 2 + (y - centre[1]) ** 2 + (z - centre[2]) ** 2 >= max_distance * max_distance:
             continue
         if world.kinds[second] != SURFACE:
             distance = placed_solid_distance(solid, poses, second, x, y, z)
-            deepest = max(deepest, reach + radius - distance)
+            deepest = max(deepest, margin + radius - distance)
             continue
-        for j in range(cover.starts[second], cover.starts[second + 1]):
+        for j in range(bounding.starts[second], bounding.starts[second + 1]):
             dx, dy, dz = x - placed[j, 0], y - placed[j, 1], z - placed[j, 2]
-            wide = reach + radius + cover.spheres[j, 3] - deepest
+            max_distance = margin + radius + bounding.spheres[j, 3] - deepest
             square = dx * dx + dy * dy + dz * dz
-            if wide > 0.0 and square < wide * wide:
-                deepest += wide - np.sqrt(square)
+            if max_distance > 0.0 and square < max_distance * max_distance:
+                deepest += max_distance - np.sqrt(square)
     return deepest
 
 
 @njit(cache=True, nogil=True)
-def penetrations(world, cover, states):  # type: ignore[no-untyped-def]
-    """Returns how deep some states are in collision, summed over the pairs [m]; 0 where no pair touches.
+def penetrations(world, bounding, states):  # type: ignore[no-untyped-def]
+    """Returns the penetration cost of states, summed over the touching pairs; shape (n,) [m].
 
     Args:
-        world: the bodies.
-        cover: spheres of the bodies, see cover_of.
-        states: positions of the whole robot, shape (n, joints).
+        world: Bodies and pairs.
+        bounding: Bounding spheres of the bodies.
+        states: Joint positions of the whole robot, shape (n, joints) [rad or m].
     """
     bodies = len(world.joints)
     result = np.zeros(len(states))
     placements, poses = np.empty((states.shape[1], 3, 4)), np.empty((bodies, 3, 4))
-    placed, middles, memory = np.empty((len(cover.spheres), 3)), np.empty((bodies, 3)), new_memory()
-    for number in range(len(states)):
-        joint_placements(world.tree, states[number], placements)
-        place_bodies(world, placements, poses, middles)
+    placed, centres, memory = np.empty((len(bounding.spheres), 3)), np.empty((bodies, 3)), new_memory()
+    for state in range(len(states)):
+        joint_placements(world.tree, states[state], placements)
+        place_bodies(world, placements, poses, centres)
         has_spheres = False
         for pair in range(len(world.pairs)):
             if world.pairs[pair, 1] == FIELD:
-                break  # what follows stands for pairs that were looked at
-            status, _ = pair_bound(world, pair, poses, middles, NEAR, memory)
+                break  # field pairs only represent pairs already checked
+            status, _ = pair_bound(world, pair, poses, centres, CONTACT_DISTANCE_M, memory)
             if status == CLEAR:
                 continue
             if not has_spheres:
                 has_spheres = True
                 for body in range(bodies):
-                    for i in range(cover.starts[body], cover.starts[body + 1]):
-                        _place(poses[body], cover.spheres[i], placed[i])
+                    for i in range(bounding.starts[body], bounding.starts[body + 1]):
+                        _place(poses[body], bounding.spheres[i], placed[i])
             first, second = world.pairs[pair, 0], world.pairs[pair, 1]
-            result[number] += TOUCH_COST_M + _pair_depth(
-                world, cover, placed, poses, middles[second], first, second, world.margins[pair]
+            result[state] += TOUCH_COST_M + _pair_depth(
+                world, bounding, placed, poses, centres[second], first, second, world.margins[pair]
             )
     return result

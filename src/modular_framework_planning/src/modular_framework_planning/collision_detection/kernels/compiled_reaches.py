@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Measures a kinematic tree: distances from joints to what they carry, and joints that two bodies share, compiled."""
+"""Reaches of joints, and common joints of pairs of bodies, compiled."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from modular_framework_planning.collision_detection.kernels.compiled_collision i
 
 @njit(cache=True, nogil=True)
 def joint_lengths(placements):  # type: ignore[no-untyped-def]
-    """Returns how far each joint at zero is from the one it hangs on [m], shape (joints,)."""
+    """Returns the distance of each joint, at position zero, from its parent joint; shape (joints,) [m]."""
     return np.sqrt((placements[:, :, 3] ** 2).sum(axis=1))
 
 
 @njit(cache=True, nogil=True)
-def ways_to_ends(parents, placements, joints, poses, spheres):  # type: ignore[no-untyped-def]
-    """Returns the way from each joint to the far end of the bodies it carries, shape (joints,) [m].
+def body_reaches(parents, placements, joints, poses, spheres):  # type: ignore[no-untyped-def]
+    """Returns the distance along the kinematic chain from each joint to the farthest point of its bodies [m].
 
-    Sliding joints stand at zero. Bodies without an end, as a plane, do not count.
+    Prismatic joints are at zero. Unbounded bodies, such as planes, are left out.
 
     Args:
-        parents: of the joints, see Tree.
-        placements: of the joints, see Tree.
-        joints: of the bodies, see World.
-        poses: of the bodies, see World.
-        spheres: of the bodies, see World.
+        parents: Parent of each joint, see Tree.
+        placements: Pose of each joint in its parent's frame, see Tree.
+        joints: Joint that moves each body, -1 for the world; shape (b,).
+        poses: Pose of each body in its joint's frame, shape (b, 3, 4).
+        spheres: Bounding sphere of each body, shape (b, 4) [m].
     """
     result, lengths = np.zeros(len(parents)), joint_lengths(placements)
     for body in range(len(joints)):
@@ -46,7 +46,7 @@ def ways_to_ends(parents, placements, joints, poses, spheres):  # type: ignore[n
 
 @njit(cache=True, nogil=True)
 def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
-    """Returns the last joint that both joints depend on, -1 for none."""
+    """Returns the last joint that moves both joints, -1 for none."""
     while first != second:  # parents come before children
         if first > second:
             first = parents[first]
@@ -56,16 +56,16 @@ def _common_joint(parents, first, second):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def meeting_joints(pairs, joints, parents):  # type: ignore[no-untyped-def]
-    """Returns the last joint that moves both bodies of each pair, see World.meets.
+def common_joints(pairs, joints, parents):  # type: ignore[no-untyped-def]
+    """Returns the last joint that moves both bodies of each pair, -1 for none and for field pairs; shape (p,).
 
     Args:
-        pairs: Body numbers, shape (p, 2); the second one is FIELD for solids of the world.
+        pairs: Body indices, shape (p, 2); the second index is FIELD for a field pair.
         joints: Joint that moves each body, -1 for the world; shape (b,).
         parents: Parent of each joint, see Tree.
     """
-    meets = np.full(len(pairs), -1)
+    result = np.full(len(pairs), -1)
     for pair in range(len(pairs)):
         if pairs[pair, 1] != FIELD:
-            meets[pair] = _common_joint(parents, joints[pairs[pair, 0]], joints[pairs[pair, 1]])
-    return meets
+            result[pair] = _common_joint(parents, joints[pairs[pair, 0]], joints[pairs[pair, 1]])
+    return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled work on triangle meshes: trees of bounding spheres, and the exact distance of two triangles."""
+"""Bounding-sphere trees over triangle meshes, and exact triangle distances, compiled."""
 
 from __future__ import annotations
 
@@ -12,124 +12,131 @@ from numpy.typing import NDArray
 from modular_framework_planning.geometry.spatial import Array
 
 CENTRING_STEPS = 12
-RAY = (0.4613, 0.5417, 0.7027)  # a direction no mesh is likely to have edges along; of length 1 within 1e-4
+RAY = (0.4613, 0.5417, 0.7027)  # unit vector (within 1e-4) that hardly any mesh has edges along
 
 
 class Surfaces(NamedTuple):
-    """Trees of spheres and boxes over triangles, see build_sphere_tree; the bodies hold the roots."""
+    """Trees of spheres and boxes over triangles, see build_sphere_tree; World.roots has the root of each body."""
 
     spheres: Array
     boxes: Array
-    links: NDArray[np.int32]
+    children: NDArray[np.int32]
     triangles: Array
 
 
 @njit(cache=True, nogil=True)
-def cut_long_edges(triangles, longest):  # type: ignore[no-untyped-def]
-    """Halves triangles (m, 9) until no edge is longer than `longest` [m]: a sphere fits badly around a long one."""
-    kept = np.empty((2 * len(triangles) + 16, 9))
-    waiting = np.empty((64, 9))
+def cut_long_edges(triangles, max_edge):  # type: ignore[no-untyped-def]
+    """Halves triangles (m, 9) until no edge exceeds `max_edge` [m]; spheres fit long triangles badly."""
+    result = np.empty((2 * len(triangles) + 16, 9))
+    stack = np.empty((64, 9))
     used = 0
     for triangle in triangles:
-        waiting[0] = triangle
+        stack[0] = triangle
         depth = 1
         while depth > 0:
             depth -= 1
-            if depth > 60 or halve_longest_edge(waiting, depth, longest * longest):
-                if used == len(kept):
+            if depth > 60 or halve_longest_edge(stack, depth, max_edge * max_edge):
+                if used == len(result):
                     larger = np.empty((2 * used, 9))
-                    larger[:used] = kept
-                    kept = larger
-                kept[used] = waiting[depth]
+                    larger[:used] = result
+                    result = larger
+                result[used] = stack[depth]
                 used += 1
             else:
                 depth += 2
-    return kept[:used].copy()
+    return result[:used].copy()
 
 
 @njit(cache=True, nogil=True)
-def halve_longest_edge(pieces, at, enough):  # type: ignore[no-untyped-def]
-    """Puts the halves that its longest edge gives in the place of a triangle and behind it.
+def halve_longest_edge(pieces, index, max_squared):  # type: ignore[no-untyped-def]
+    """Splits a triangle at the middle of its longest edge.
+
+    Args:
+        pieces: Triangles, shape (n, 9) [m]; the halves are written to rows `index` and `index + 1`.
+        index: Row of the triangle.
+        max_squared: Square of the edge length up to which the triangle stays whole [m^2].
 
     Returns:
-        True, and changes nothing, where the square of that edge is at most `enough`.
+        True if the triangle stays whole.
     """
     a, b, c = 0.0, 0.0, 0.0
     for row in range(3):
-        a += (pieces[at, row] - pieces[at, 3 + row]) ** 2
-        b += (pieces[at, 3 + row] - pieces[at, 6 + row]) ** 2
-        c += (pieces[at, 6 + row] - pieces[at, row]) ** 2
-    if max(a, max(b, c)) <= enough:
+        a += (pieces[index, row] - pieces[index, 3 + row]) ** 2
+        b += (pieces[index, 3 + row] - pieces[index, 6 + row]) ** 2
+        c += (pieces[index, 6 + row] - pieces[index, row]) ** 2
+    if max(a, max(b, c)) <= max_squared:
         return True
     first, second = (0, 3) if a >= b and a >= c else ((3, 6) if b >= c else (6, 0))
     for row in range(9):
-        pieces[at + 1, row] = pieces[at, row]
+        pieces[index + 1, row] = pieces[index, row]
     for row in range(3):
-        middle = 0.5 * (pieces[at, first + row] + pieces[at, second + row])
-        pieces[at + 1, first + row] = middle
-        pieces[at, second + row] = middle
+        middle = 0.5 * (pieces[index, first + row] + pieces[index, second + row])
+        pieces[index + 1, first + row] = middle
+        pieces[index, second + row] = middle
     return False
 
 
 @njit(cache=True, nogil=True)
 def build_sphere_tree(triangles):  # type: ignore[no-untyped-def]
-    """Builds a binary tree of spheres and boxes, each around all corners of the triangles below it.
+    """Builds a binary tree whose nodes enclose triangles by a sphere and by a box.
 
     Args:
-        triangles: corners, shape (m, 9) [m]; at least one.
+        triangles: Vertices, shape (m, 9) with m > 0 [m].
 
     Returns:
-        spheres (2 m - 1, 4): centre and radius; boxes (2 m - 1, 15): centre, three axes, half lengths;
-        links (2 m - 1, 2): children, or (-1, triangle) for a leaf. Node 0 is the root.
+        Three arrays with a row per node, node 0 being the root.
+        Spheres, shape (2 m - 1, 4): centre and radius.
+        Boxes, shape (2 m - 1, 15): centre, three axes, half extents.
+        Children, shape (2 m - 1, 2): child nodes, or (-1, triangle index) for a leaf.
     """
     count = len(triangles)
     spheres, boxes = np.empty((2 * count - 1, 4)), np.empty((2 * count - 1, 15))
-    links = np.empty((2 * count - 1, 2), np.int32)
+    children = np.empty((2 * count - 1, 2), np.int32)
     order = np.arange(count)
-    waiting = np.empty((count + 1, 3), np.int64)
-    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 0, count
+    stack = np.empty((count + 1, 3), np.int64)
+    stack[0, 0], stack[0, 1], stack[0, 2] = 0, 0, count
     depth, used = 1, 1
     while depth > 0:
         depth -= 1
-        node, low, high = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
+        node, low, high = stack[depth, 0], stack[depth, 1], stack[depth, 2]
         members = order[low:high]
-        _enclose(triangles, members, spheres[node])
-        _enbox(triangles, members, boxes[node])
+        _fit_sphere(triangles, members, spheres[node])
+        _fit_box(triangles, members, boxes[node])
         if high - low == 1:
-            links[node, 0], links[node, 1] = -1, members[0]
+            children[node, 0], children[node, 1] = -1, members[0]
             continue
         middle = low + _split(triangles, members)
-        links[node, 0], links[node, 1] = used, used + 1
-        waiting[depth, 0], waiting[depth, 1], waiting[depth, 2] = used, low, middle
-        waiting[depth + 1, 0], waiting[depth + 1, 1], waiting[depth + 1, 2] = used + 1, middle, high
+        children[node, 0], children[node, 1] = used, used + 1
+        stack[depth, 0], stack[depth, 1], stack[depth, 2] = used, low, middle
+        stack[depth + 1, 0], stack[depth + 1, 1], stack[depth + 1, 2] = used + 1, middle, high
         depth += 2
         used += 2
-    return spheres, boxes, links
+    return spheres, boxes, children
 
 
 @njit(cache=True, nogil=True)
 def _split(triangles, members):  # type: ignore[no-untyped-def]
-    """Sorts the members into those before and behind the middle of their widest axis; returns how many are before."""
-    widest, extent, value = 0, -1.0, 0.0
+    """Partitions the members at the middle of their widest axis and returns the size of the first part."""
+    widest, extent, middle = 0, -1.0, 0.0
     for axis in range(3):
-        least, most = np.inf, -np.inf
+        low, high = np.inf, -np.inf
         for member in members:
             centre = triangles[member, axis] + triangles[member, axis + 3] + triangles[member, axis + 6]
-            least, most = min(least, centre), max(most, centre)
-        if most - least > extent:
-            widest, extent, value = axis, most - least, 0.5 * (least + most)
-    before = 0
+            low, high = min(low, centre), max(high, centre)
+        if high - low > extent:
+            widest, extent, middle = axis, high - low, 0.5 * (low + high)
+    count = 0
     for index in range(len(members)):
         member = members[index]
-        if triangles[member, widest] + triangles[member, widest + 3] + triangles[member, widest + 6] < value:
-            members[index], members[before] = members[before], member
-            before += 1
-    return before if 0 < before < len(members) else len(members) // 2
+        if triangles[member, widest] + triangles[member, widest + 3] + triangles[member, widest + 6] < middle:
+            members[index], members[count] = members[count], member
+            count += 1
+    return count if 0 < count < len(members) else len(members) // 2
 
 
 @njit(cache=True, nogil=True)
-def _enclose(triangles, members, sphere):  # type: ignore[no-untyped-def]
-    """Writes a small sphere around the members' corners (Badoiu and Clarkson's steps towards the farthest corner)."""
+def _fit_sphere(triangles, members, sphere):  # type: ignore[no-untyped-def]
+    """Writes a small bounding sphere of the members (Badoiu and Clarkson: steps towards the farthest vertex)."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for member in members:
         for index in range(9):
@@ -138,7 +145,7 @@ def _enclose(triangles, members, sphere):  # type: ignore[no-untyped-def]
     x, y, z = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
     best = np.inf
     for step in range(CENTRING_STEPS):
-        squared, far, corner = -1.0, 0, 0
+        squared, far, vertex = -1.0, 0, 0
         for member in members:
             for index in range(0, 9, 3):
                 distance = (
@@ -147,19 +154,19 @@ def _enclose(triangles, members, sphere):  # type: ignore[no-untyped-def]
                     + (triangles[member, index + 2] - z) ** 2
                 )
                 if distance > squared:
-                    squared, far, corner = distance, member, index
+                    squared, far, vertex = distance, member, index
         if squared < best:
             best = squared
             sphere[0], sphere[1], sphere[2] = x, y, z
-        x += (triangles[far, corner] - x) / (step + 3.0)
-        y += (triangles[far, corner + 1] - y) / (step + 3.0)
-        z += (triangles[far, corner + 2] - z) / (step + 3.0)
+        x += (triangles[far, vertex] - x) / (step + 3.0)
+        y += (triangles[far, vertex + 1] - y) / (step + 3.0)
+        z += (triangles[far, vertex + 2] - z) / (step + 3.0)
     sphere[3] = np.sqrt(best) * (1.0 + 1.0e-12) + 1.0e-12
 
 
 @njit(cache=True, nogil=True)
-def _enbox(triangles, members, box):  # type: ignore[no-untyped-def]
-    """Writes a box around the members, thin along their mean normal: a patch of a surface is nearly flat."""
+def _fit_box(triangles, members, box):  # type: ignore[no-untyped-def]
+    """Writes a bounding box of the members with an axis along their mean normal, since surface patches are flat."""
     nx, ny, nz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for member in members:
         t = triangles[member]
@@ -213,7 +220,7 @@ def _enbox(triangles, members, box):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def triangle_distance(first, second):  # type: ignore[no-untyped-def]
-    """Returns the distance [m] of two triangles of 9 corner coordinates each; 0 where they cross."""
+    """Returns the distance of two triangles [m], 0 if they intersect; each has 9 coordinates."""
     best = min(_faces_distance(first, second), _faces_distance(second, first))
     if best <= 0.0:
         return 0.0
@@ -225,7 +232,7 @@ def triangle_distance(first, second):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _faces_distance(face, other):  # type: ignore[no-untyped-def]
-    """Squared distance of the corners of `other` that lie above the inside of `face`; 0 if an edge goes through it."""
+    """Returns the squared distance of the vertices of `other` that project into `face`, 0 if an edge crosses `face`."""
     ux, uy, uz = face[3] - face[0], face[4] - face[1], face[5] - face[2]
     vx, vy, vz = face[6] - face[0], face[7] - face[1], face[8] - face[2]
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -238,35 +245,35 @@ def _faces_distance(face, other):  # type: ignore[no-untyped-def]
         (other[3] - face[0]) * nx + (other[4] - face[1]) * ny + (other[5] - face[2]) * nz,
         (other[6] - face[0]) * nx + (other[7] - face[1]) * ny + (other[8] - face[2]) * nz,
     )
-    for corner in range(3):
-        following = (corner + 1) % 3
-        span = heights[corner] - heights[following]
-        if heights[corner] * heights[following] > 0.0:
+    for vertex in range(3):
+        next_vertex = (vertex + 1) % 3
+        span = heights[vertex] - heights[next_vertex]
+        if heights[vertex] * heights[next_vertex] > 0.0:
             continue
-        share = heights[corner] / span if span != 0.0 else 0.0
-        p, q = 3 * corner, 3 * following
-        if _above(
+        fraction = heights[vertex] / span if span != 0.0 else 0.0
+        p, q = 3 * vertex, 3 * next_vertex
+        if _projects_inside(
             face,
             nx,
             ny,
             nz,
-            other[p] + share * (other[q] - other[p]),
-            other[p + 1] + share * (other[q + 1] - other[p + 1]),
-            other[p + 2] + share * (other[q + 2] - other[p + 2]),
+            other[p] + fraction * (other[q] - other[p]),
+            other[p + 1] + fraction * (other[q + 1] - other[p + 1]),
+            other[p + 2] + fraction * (other[q + 2] - other[p + 2]),
         ):
             return 0.0
-    for corner in range(3):
-        p = 3 * corner
-        if _above(face, nx, ny, nz, other[p], other[p + 1], other[p + 2]):
-            best = min(best, heights[corner] * heights[corner] / size)
+    for vertex in range(3):
+        p = 3 * vertex
+        if _projects_inside(face, nx, ny, nz, other[p], other[p + 1], other[p + 2]):
+            best = min(best, heights[vertex] * heights[vertex] / size)
     return best
 
 
 @njit(cache=True, nogil=True)
-def _above(face, nx, ny, nz, x, y, z):  # type: ignore[no-untyped-def]
-    """Whether a point's projection lies inside the face of that normal."""
-    for corner in range(3):
-        p, q = 3 * corner, 3 * ((corner + 1) % 3)
+def _projects_inside(face, nx, ny, nz, x, y, z):  # type: ignore[no-untyped-def]
+    """Returns whether the point (x, y, z) projects into the face with normal (nx, ny, nz)."""
+    for vertex in range(3):
+        p, q = 3 * vertex, 3 * ((vertex + 1) % 3)
         ex, ey, ez = face[q] - face[p], face[q + 1] - face[p + 1], face[q + 2] - face[p + 2]
         dx, dy, dz = x - face[p], y - face[p + 1], z - face[p + 2]
         if (ey * dz - ez * dy) * nx + (ez * dx - ex * dz) * ny + (ex * dy - ey * dx) * nz < 0.0:
@@ -276,7 +283,7 @@ def _above(face, nx, ny, nz, x, y, z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
-    """Squared distance of one edge of each triangle."""
+    """Returns the squared distance between an edge of the first triangle and an edge of the second."""
     p, q, r, s = 3 * edge, 3 * ((edge + 1) % 3), 3 * other, 3 * ((other + 1) % 3)
     ax, ay, az = first[q] - first[p], first[q + 1] - first[p + 1], first[q + 2] - first[p + 2]
     bx, by, bz = second[s] - second[r], second[s + 1] - second[r + 1], second[s + 2] - second[r + 2]
@@ -298,8 +305,8 @@ def _edge_distance(first, edge, second, other):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def encloses(surface, root, x, y, z):  # type: ignore[no-untyped-def]
-    """Whether a closed surface contains a point: a ray from the point leaves the surface more often than it enters."""
-    spheres, links, triangles = surface.spheres, surface.links, surface.triangles
+    """Returns whether a closed surface contains the point (x, y, z): a ray then exits more often than it enters."""
+    spheres, children, triangles = surface.spheres, surface.children, surface.triangles
     dx, dy, dz = RAY
     stack = np.empty(512, np.int32)
     stack[0] = root
@@ -313,17 +320,17 @@ def encloses(surface, root, x, y, z):  # type: ignore[no-untyped-def]
         reach = spheres[node, 3] * spheres[node, 3]
         if squared - along * along > reach or (along < 0.0 and squared > reach):
             continue
-        if links[node, 0] >= 0:
-            stack[depth], stack[depth + 1] = links[node, 0], links[node, 1]
+        if children[node, 0] >= 0:
+            stack[depth], stack[depth + 1] = children[node, 0], children[node, 1]
             depth += 2
             continue
-        crossings += _crossing(triangles[links[node, 1]], x, y, z)
+        crossings += _crossing(triangles[children[node, 1]], x, y, z)
     return crossings > 0
 
 
 @njit(cache=True, nogil=True)
 def _crossing(t, x, y, z):  # type: ignore[no-untyped-def]
-    """1 where the ray from a point leaves through the front of a triangle, -1 where it enters, else 0."""
+    """Returns 1 if the ray from (x, y, z) exits through the triangle's front, -1 if it enters, else 0."""
     dx, dy, dz = RAY
     ux, uy, uz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
     vx, vy, vz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
@@ -332,6 +339,6 @@ def _crossing(t, x, y, z):  # type: ignore[no-untyped-def]
     if slope == 0.0:
         return 0
     distance = ((t[0] - x) * nx + (t[1] - y) * ny + (t[2] - z) * nz) / slope
-    if distance < 0.0 or not _above(t, nx, ny, nz, x + distance * dx, y + distance * dy, z + distance * dz):
+    if distance < 0.0 or not _projects_inside(t, nx, ny, nz, x + distance * dx, y + distance * dy, z + distance * dz):
         return 0
     return 1 if slope > 0.0 else -1

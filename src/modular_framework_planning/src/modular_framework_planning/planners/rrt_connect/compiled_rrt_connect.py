@@ -179,7 +179,7 @@ def grow(trees, space, samples, verdict, *world):  # type: ignore[no-untyped-def
     workspace, edge = new_workspace(bodies), new_edge(space.edges)
     status = _grow(borrowed(trees), borrowed(space), samples, verdict, bodies, borrowed(edge), borrowed(workspace))
     release(workspace)
-    edge.numbers[0] = 0
+    edge.at_vertices[0] = 0
     return status
 
 

@@ -85,7 +85,9 @@ def _trees(start: Array, goals: Array, extension_limit: int) -> Trees:
 def empty_field(field: DistanceField) -> DistanceField:
     """Returns a distance field of the same solids with all cells unfilled."""
     return field._replace(
-        known=np.zeros_like(field.known), nearest=np.empty_like(field.nearest), distances=np.empty_like(field.distances)
+        is_filled=np.zeros_like(field.is_filled),
+        nearest=np.empty_like(field.nearest),
+        distances=np.empty_like(field.distances),
     )
 
 
@@ -201,7 +203,7 @@ class RrtConnect:
         count = len(self._low)
         edges, weights = problem.motion.edges(step), np.ones(count)
         if is_weighted:
-            weights = np.sqrt((np.abs(edges.map) * reaches(world)[:, None]).max(axis=0))
+            weights = np.sqrt((np.abs(edges.joint_map) * reaches(world)[:, None]).max(axis=0))
             weights = np.maximum(weights / (weights.max() or 1.0), MIN_WEIGHT)
         squares = (weights * (self._local_bounds[1] - self._local_bounds[0])) ** 2
         # Mean and variance of the squared distance of two uniform states: squares / 6 and 7 / 180 squares^2 per joint
