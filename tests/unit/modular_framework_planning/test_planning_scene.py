@@ -165,7 +165,7 @@ def test_a_link_without_default_collisions_touches_nothing_but_what_is_enabled()
 
 
 def test_a_matrix_that_is_not_square_is_refused() -> None:
-    with pytest.raises(ValueError, match="one row per name"):
+    with pytest.raises(ValueError, match="square matrix with one row"):
         matrix_from_rows(["a", "b"], [[True]], {})
 
 

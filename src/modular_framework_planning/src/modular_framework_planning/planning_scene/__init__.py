@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The world around the robot: objects, what it holds, and which bodies may touch."""
+"""The planning scene: objects, attached objects, padding and allowed collisions."""

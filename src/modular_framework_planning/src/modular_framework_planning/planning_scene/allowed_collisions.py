@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The allowed collision matrix: explicit entries for pairs of bodies first, then defaults of single bodies."""
+"""The allowed collision matrix: explicit entries for pairs of bodies, and defaults of single bodies."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from modular_framework_urdf.srdf_reader import SemanticDescription
 
 @dataclass(frozen=True)
 class AllowedCollisionMatrix:
-    """Pairs of body names to "may touch"; a pair without an entry falls back to the defaults of its two bodies.
+    """Verdicts whether two bodies may touch; a pair without an entry falls back to the defaults of its bodies.
 
     Attributes:
-        entries: explicit verdicts, order of names does not matter.
-        defaults: verdict for every pair of a body without an explicit entry.
-        names: bodies listed, in the order of the message (kept for the answer on the wire).
+        entries: Verdict for each pair of body names, in either order.
+        defaults: Verdict for each body name, for pairs without an entry.
+        names: Names of the listed bodies, in the order of the message.
     """
 
     entries: Mapping[frozenset[str], bool] = field(default_factory=dict)
@@ -27,37 +27,43 @@ class AllowedCollisionMatrix:
 
     @cached_property
     def verdicts(self) -> tuple[frozenset[tuple[frozenset[str], bool]], frozenset[tuple[str, bool]]]:
-        """Entries and defaults, hashable."""
+        """Entries and defaults as hashable sets."""
         return frozenset(self.entries.items()), frozenset(self.defaults.items())
 
     @cached_property
     def named(self) -> frozenset[str]:
-        """Bodies with an entry or a default; all others may touch the same ones, see allows_others."""
+        """Names of bodies with an entry or a default; the verdict for all other bodies is `allows_others`."""
         return frozenset(chain(chain.from_iterable(self.entries), self.defaults))
 
     def allows(self, first: str, second: str) -> bool:
-        """Whether the two bodies may touch; when both have a default, both must allow it."""
+        """Returns whether two bodies may touch; if both have defaults, both defaults must allow contact."""
         entry = self.entries.get(frozenset((first, second)))
         return _default(self.defaults, first, second) if entry is None else entry
 
     def allows_others(self, name: str) -> bool:
-        """Whether a body may touch those that the matrix does not name."""
+        """Returns whether a body may touch bodies that the matrix does not name."""
         return self.defaults.get(name, False)
 
     def with_entry(self, first: str, second: str, allowed: bool) -> AllowedCollisionMatrix:
-        """Returns a matrix in which one pair has the given verdict."""
+        """Returns a copy of the matrix with one entry set.
+
+        Args:
+            first: Name of a body.
+            second: Name of the other body.
+            allowed: Whether the bodies may touch.
+        """
         entries = dict(self.entries)
         entries[frozenset((first, second))] = allowed
         names = self.names + tuple(name for name in dict.fromkeys((first, second)) if name not in self.names)
         return replace(self, entries=entries, names=names)
 
     def with_defaults(self, defaults: Mapping[str, bool]) -> AllowedCollisionMatrix:
-        """Returns a matrix in which the named bodies have the given default verdicts."""
+        """Returns a copy of the matrix with the given defaults set."""
         names = self.names + tuple(name for name in defaults if name not in self.names)
         return replace(self, defaults={**self.defaults, **defaults}, names=names)
 
     def as_rows(self) -> list[list[bool]]:
-        """Returns the square matrix of verdicts over `names`, defaults applied, as the message wants it."""
+        """Returns the square matrix of verdicts over `names`, including defaults, as in the ROS message."""
         return [[self.allows(row, column) for column in self.names] for row in self.names]
 
 
@@ -69,10 +75,10 @@ def _default(defaults: Mapping[str, bool], first: str, second: str) -> bool:
 
 
 def matrix_from_semantics(semantics: SemanticDescription, links: Sequence[str]) -> AllowedCollisionMatrix:
-    """Builds the matrix a robot begins with; every link is named.
+    """Builds the initial matrix of a robot from its SRDF.
 
-    As in MoveIt: links with disabled default collisions may touch anything by default, then enabled pairs are entered,
-    and disabled pairs last. Names the robot does not have mean nothing.
+    As in MoveIt, links with disabled default collisions may touch everything by default; enabled pairs override these
+    defaults, and disabled pairs override enabled pairs. Unknown names are ignored.
     """
     known = frozenset(links)
     entries = {
@@ -88,22 +94,27 @@ def matrix_from_semantics(semantics: SemanticDescription, links: Sequence[str]) 
 def matrix_from_rows(
     names: Sequence[str], rows: Sequence[Sequence[bool]], defaults: Mapping[str, bool]
 ) -> AllowedCollisionMatrix:
-    """Builds a matrix from its square form, of which the upper triangle counts.
+    """Builds a matrix from the upper triangle of its square form.
 
-    A verdict that is that of the defaults is no entry: it changes with them, and a matrix that was read, and sent back
-    unchanged, means the same. Bodies with a default are named too.
+    Verdicts equal to the defaults become no entries, so that a matrix that is read and sent back keeps its meaning when
+    defaults change. Bodies with a default are named too.
+
+    Args:
+        names: Names of the bodies.
+        rows: Whether each pair of bodies may touch, a square matrix.
+        defaults: Default verdict of each body.
 
     Raises:
-        ValueError: the matrix is not square, or a name stands twice.
+        ValueError: The matrix is not square, or a name occurs twice.
     """
     if len(rows) != len(names) or any(len(row) != len(names) for row in rows):
         raise ValueError(
-            f"allowed_collision_matrix: {len(names)} names but rows of {[len(row) for row in rows]}; "
-            "one row per name and one value per name in each row are needed"
+            f"allowed_collision_matrix: {len(names)} names, but rows have lengths {[len(row) for row in rows]}; "
+            "send a square matrix with one row and one column per name"
         )
     if len(set(names)) != len(names):
-        raise ValueError("allowed_collision_matrix: a name stands twice in entry_names; list each body once")
-    index_of = {name: number for number, name in enumerate(names)}
+        raise ValueError("allowed_collision_matrix: entry_names contains a name twice; list each body once")
+    index_of = {name: index for index, name in enumerate(names)}
     entries: dict[frozenset[str], bool] = {}
     for index, name in enumerate(names):
         for other in names[index:]:

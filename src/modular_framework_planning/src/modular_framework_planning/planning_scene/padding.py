@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The distance that the robot keeps from the world: MoveIt's link padding and link scale.
+"""Margins between the robot and the world: MoveIt's link padding and link scale.
 
-Padding is a margin of a pair of bodies, not a changed shape: a pair of a link and a world object counts as touching
-when it comes closer than the margin. That is the shape swept by a ball of the margin's radius, exactly, meshes too.
+Padding is a margin of a pair of bodies and leaves shapes unchanged: a link and a world object count as touching when
+closer than the margin. The result equals the exact Minkowski sum of the shape and a sphere, for meshes too.
 As in MoveIt, pairs of links are never padded.
 """
 
@@ -19,13 +19,13 @@ from modular_framework_planning.errors import GeometryError
 
 @dataclass(frozen=True, slots=True)
 class Padding:
-    """Distances [m] that links, held objects and world objects keep, and scales of links.
+    """Padding of links, held objects and world objects, and scales of links.
 
     Attributes:
-        links: padding of a link [m]; a link that is not named has none.
-        scales: scale of a link, 1 where it is not named.
-        objects: added for every object of the world [m].
-        attached: added for every held object [m].
+        links: Padding of each link [m], default 0.
+        scales: Scale of each link, default 1.
+        objects: Padding of every world object [m].
+        attached: Padding of every held object [m].
     """
 
     links: Mapping[str, float] = field(default_factory=dict)
@@ -37,32 +37,41 @@ class Padding:
         named = {f"of link '{link}'": value for link, value in self.links.items()}
         for where, value in {**named, "of world objects": self.objects, "of held objects": self.attached}.items():
             if not np.isfinite(value) or value < 0.0:
-                raise GeometryError(f"padding {where}: got {value} m; allowed are finite lengths of 0 m or more")
+                raise GeometryError(f"padding {where}: got {value} m; give a finite length of at least 0 m")
         for link, value in self.scales.items():
             if not np.isfinite(value) or value <= 0.0:
-                raise GeometryError(f"scale of link '{link}': got {value}; allowed are finite numbers above 0")
+                raise GeometryError(f"scale of link '{link}': got {value}; give a finite number above 0")
 
     def margin(self, link: str, geometry: Any) -> float:
-        """Returns the distance [m] a Coal geometry of a link keeps from the world.
+        """Returns the margin between a Coal geometry of a link and the world [m].
 
-        A scale s above 1 moves no point of the surface further than (s - 1) times the largest distance of a point from
-        the centre, so that much is kept everywhere; a scale below 1 keeps the shape as it is: neither makes the robot
-        smaller than was asked for.
+        A scale s above 1 becomes a conservative margin: (s - 1) times the maximum distance of a point from the centre.
+        A scale below 1 leaves the shape unchanged, so that the robot never gets smaller than requested.
         """
-        grown = self.scales.get(link, 1.0) - 1.0
-        if grown > 0.0:
+        growth = self.scales.get(link, 1.0) - 1.0
+        if growth > 0.0:
             geometry.computeLocalAABB()
-        return self.links.get(link, 0.0) + self.objects + (grown * float(geometry.aabb_radius) if grown > 0.0 else 0.0)
+        return (
+            self.links.get(link, 0.0) + self.objects + (growth * float(geometry.aabb_radius) if growth > 0.0 else 0.0)
+        )
 
     def with_links(self, links: Mapping[str, float], scales: Mapping[str, float]) -> Padding:
-        """Returns a padding in which the named links have other values."""
+        """Returns a copy of the padding with the given links changed."""
         return replace(self, links={**self.links, **links}, scales={**self.scales, **scales})
 
 
 def uniform_padding(
     links: Iterable[str], padding: float, scale: float, objects: float = 0.0, attached: float = 0.0
 ) -> Padding:
-    """Returns the padding in which every link has the same values."""
+    """Returns a padding with equal values for all links.
+
+    Args:
+        links: Names of the links.
+        padding: Padding of every link [m].
+        scale: Scale of every link.
+        objects: Padding of every world object [m].
+        attached: Padding of every held object [m].
+    """
     names = list(links)
     return Padding(
         {name: padding for name in names if padding}, {name: scale for name in names if scale != 1.0}, objects, attached

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planning scene as immutable snapshots, so that a plan in progress never sees a partial change."""
+"""The planning scene as immutable snapshots, so that a running plan never sees a partial change."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ class CollisionObject:
     """A body in the world.
 
     Attributes:
-        pose: frame of the object in the planning frame (for an attached one: in the link's frame).
-        shapes: each shape with its pose in the object's frame.
-        subframes: named poses in the object's frame.
+        name: Id of the object.
+        pose: Pose of the object in the planning frame, or in the link's frame if attached.
+        shapes: Shapes with their poses in the object's frame.
+        subframes: Named poses in the object's frame.
     """
 
     name: str
@@ -42,7 +43,7 @@ class CollisionObject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedObject:
-    """A body that moves with a link; it may touch that link and the links named in `touch_links`."""
+    """A body that moves with a link and may touch this link and all `touch_links`."""
 
     body: CollisionObject
     link: str
@@ -50,16 +51,16 @@ class AttachedObject:
 
     @property
     def name(self) -> str:
-        """The id of the attached body."""
+        """Id of the attached body."""
         return self.body.name
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanningScene:
-    """One version of the world: objects, attached objects, allowed collisions and the robot's positions.
+    """Snapshot of objects, attached objects, allowed collisions and the robot's joint positions.
 
-    Every `with_...` method returns a new snapshot with a new version number; the old one stays as it is.
-    `geometry_version` is new whenever a collision check of a state may have another result.
+    Every `with_...` or `without_...` method returns a new snapshot with a new version number.
+    `geometry_version` changes whenever the result of a collision check may change.
     """
 
     model: RobotModel
@@ -76,34 +77,34 @@ class PlanningScene:
     geometry_version: int = 0
 
     def _changed(self, **changes: object) -> PlanningScene:
-        number = next(_versions)
-        geometry = self.geometry_version
+        version = next(_versions)
+        geometry_version = self.geometry_version
         if changes.keys() & {"objects", "attached", "acm", "padding", "octomap"}:
-            geometry = number
-        return replace(self, version=number, geometry_version=geometry, **changes)  # type: ignore[arg-type]
+            geometry_version = version
+        return replace(self, version=version, geometry_version=geometry_version, **changes)  # type: ignore[arg-type]
 
     def with_positions(self, positions: Array) -> PlanningScene:
-        """Returns the scene with the robot at other joint positions."""
+        """Returns the scene with new joint positions of the robot [rad or m]."""
         return self._changed(positions=positions)
 
     def with_acm(self, acm: AllowedCollisionMatrix) -> PlanningScene:
-        """Returns the scene with another allowed collision matrix."""
+        """Returns the scene with a new allowed collision matrix."""
         return self._changed(acm=acm)
 
     def with_name(self, name: str) -> PlanningScene:
-        """Returns the scene under another name."""
+        """Returns the scene with a new name."""
         return self._changed(name=name)
 
     def with_colors(self, colors: Mapping[str, Color]) -> PlanningScene:
-        """Returns the scene with colours (r, g, b, a in 0..1) added to those it has."""
+        """Returns the scene with additional colours of objects (r, g, b, a in 0..1)."""
         return self._changed(colors={**self.colors, **colors})
 
     def with_fixed_frames(self, frames: Mapping[str, Transform]) -> PlanningScene:
-        """Returns the scene with further named frames, given in the planning frame."""
+        """Returns the scene with additional named frames, given in the planning frame."""
         return self._changed(fixed_frames={**self.fixed_frames, **frames}) if frames else self
 
     def with_padding(self, padding: Padding) -> PlanningScene:
-        """Returns the scene with another padding; raises UnknownNameError for a link the robot does not have."""
+        """Returns the scene with a new padding; raises UnknownNameError for an unknown link."""
         for link in (*padding.links, *padding.scales):
             if not self.model.has_link(link):
                 raise UnknownNameError(
@@ -112,7 +113,12 @@ class PlanningScene:
         return self._changed(padding=padding)
 
     def with_octomap(self, octree: Octree | None, pose: Transform = None) -> PlanningScene:
-        """Returns the scene with another octomap, its origin at a pose in the planning frame; None clears it."""
+        """Returns the scene with a new octomap.
+
+        Args:
+            octree: Octomap; None clears the octomap.
+            pose: Pose of the octomap's origin in the planning frame; None for identity.
+        """
         if octree is None:
             return self._changed(octomap=None)
         from pinocchio import SE3
@@ -121,64 +127,69 @@ class PlanningScene:
         return self._changed(octomap=body)
 
     def obstacles(self) -> tuple[CollisionObject, ...]:
-        """Returns the obstacles of the world: every object, and the octomap if it has an occupied voxel."""
+        """Returns all world objects, and the octomap if a voxel is occupied."""
         if self.octomap is None or not len(self.octomap.shapes[0][0].centers):  # type: ignore[attr-defined]
             return tuple(self.objects.values())
         return (*self.objects.values(), self.octomap)
 
     def link_margins(self) -> Array:
-        """Returns the distance [m] each of the model's link geometries keeps from the world; (n,), in their order."""
+        """Returns the margin between each of the model's link geometries and the world, shape (n,) [m]."""
         links, padding = self.model.link_geometries, self.padding
         if not padding.links and not padding.scales:
             return np.full(len(links), padding.objects)
         return np.array([padding.margin(item.link, item.geometry) for item in links])
 
     def attached_padding(self) -> float:
-        """Returns the distance [m] held objects keep from the world."""
+        """Returns the margin between held objects and the world [m]."""
         return self.padding.attached + self.padding.objects
 
     def with_object(self, body: CollisionObject) -> PlanningScene:
-        """Adds an object, or replaces the one of that name.
+        """Adds an object; an existing world or attached object with the same name is replaced.
 
         Raises:
-            GeometryError: it has no shape or no name, or a link or an attached object has that name.
+            GeometryError: The object has no shape or no name, or a link has the same name.
         """
         if not body.name:
             raise GeometryError("collision object: id is empty; give the object a name")
         if not body.shapes:
-            raise GeometryError(f"collision object '{body.name}': no shape; an object to ADD needs at least one")
+            raise GeometryError(f"collision object '{body.name}': no shape; add at least one shape")
         if self.model.has_link(body.name):
-            raise GeometryError(f"collision object '{body.name}': a link of the robot has that name; use another id")
+            raise GeometryError(f"collision object '{body.name}': a link of the robot has this name; use another id")
         return self._changed(
             objects={**self.objects, body.name: body},
             attached={key: value for key, value in self.attached.items() if key != body.name},
         )
 
     def with_shapes_appended(self, body: CollisionObject) -> PlanningScene:
-        """Adds shapes to an object (an unknown object is added); the object keeps its own pose."""
+        """Adds shapes to an object, which keeps its pose; an unknown object is added."""
         old = self.objects.get(body.name)
         if old is None:
             return self.with_object(body)
-        into_old = old.pose.inverse() * body.pose
-        added = [(shape, into_old * pose) for shape, pose in body.shapes]
-        shapes = tuple(sorted((*old.shapes, *added), key=lambda item: _place_in_message(item[0])))
-        subframes = {**old.subframes, **{name: into_old * pose for name, pose in body.subframes.items()}}
+        new_in_old = old.pose.inverse() * body.pose
+        added = [(shape, new_in_old * pose) for shape, pose in body.shapes]
+        shapes = tuple(sorted((*old.shapes, *added), key=lambda item: _message_order(item[0])))
+        subframes = {**old.subframes, **{name: new_in_old * pose for name, pose in body.subframes.items()}}
         return self._changed(objects={**self.objects, body.name: replace(old, shapes=shapes, subframes=subframes)})
 
     def with_object_moved(self, name: str, pose: Transform, shape_poses: Sequence[Transform] = ()) -> PlanningScene:
-        """Moves an object to another pose in the planning frame and, if given, its shapes to other poses in the object.
+        """Moves an object.
+
+        Args:
+            name: Name of the object.
+            pose: New pose in the planning frame.
+            shape_poses: New poses of all shapes in the object's frame; empty to leave the shapes in place.
 
         Raises:
-            UnknownNameError: no such object.
-            GeometryError: there are poses of shapes, but not one for each shape.
+            UnknownNameError: The object does not exist.
+            GeometryError: The number of shape poses differs from the number of shapes.
         """
         body = self.find_object(name)
         shapes = body.shapes
         if shape_poses:
             if len(shape_poses) != len(shapes):
                 raise GeometryError(
-                    f"moving '{name}': {len(shape_poses)} poses of shapes for {len(shapes)} shapes; "
-                    "give one for each shape, or none to move the object as a whole"
+                    f"moving '{name}': got {len(shape_poses)} shape poses for {len(shapes)} shapes; "
+                    "give one pose per shape, or none to move the whole object"
                 )
             shapes = tuple((shape, shape_pose) for (shape, _), shape_pose in zip(shapes, shape_poses, strict=True))
         return self._changed(objects={**self.objects, name: replace(body, pose=pose, shapes=shapes)})
@@ -189,30 +200,30 @@ class PlanningScene:
         return self._without(objects={name})
 
     def without_objects(self) -> PlanningScene:
-        """Removes every object and its colour from the world; attached ones stay."""
+        """Removes every object and its colour from the world; attached objects stay."""
         return self._without(objects=self.objects.keys())
 
     def _without(self, **names: Set[str]) -> PlanningScene:
-        """Returns the scene without some of its `objects` or `attached`, and without their colours."""
+        """Returns the scene without the named `objects` or `attached` objects and their colours."""
         changes: dict[str, object] = {}
-        for kind, drop in names.items():
-            changes[kind] = {key: value for key, value in getattr(self, kind).items() if key not in drop}
-            if self.colors.keys() & drop:
-                changes["colors"] = {key: value for key, value in self.colors.items() if key not in drop}
+        for kind, removed in names.items():
+            changes[kind] = {key: value for key, value in getattr(self, kind).items() if key not in removed}
+            if self.colors.keys() & removed:
+                changes["colors"] = {key: value for key, value in self.colors.items() if key not in removed}
         return self._changed(**changes)
 
     def find_object(self, name: str) -> CollisionObject:
-        """Returns an object of the world; raises UnknownNameError with the known ones."""
+        """Returns an object of the world; raises UnknownNameError."""
         if name not in self.objects:
             raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, "collision object", name, self.objects)
         return self.objects[name]
 
     def with_attached(self, item: AttachedObject) -> PlanningScene:
-        """Attaches a body to a link; a world object of that name disappears from the world.
+        """Attaches a body to a link and removes the world object of the same name.
 
         Raises:
-            UnknownNameError: the link, or a touch link, does not exist.
-            GeometryError: the body has no shape.
+            UnknownNameError: The link or a touch link does not exist.
+            GeometryError: The body has no shape.
         """
         for link in (item.link, *sorted(item.touch_links)):
             if not self.model.has_link(link):
@@ -220,14 +231,16 @@ class PlanningScene:
                     ErrorCode.INVALID_LINK_NAME, f"attaching '{item.name}': link", link, self.model.frame_ids
                 )
         if not item.body.shapes:
-            raise GeometryError(f"attached object '{item.name}': no shape, and the world has no object of that name")
+            raise GeometryError(
+                f"attached object '{item.name}': no shape, and no world object has this name; add a shape"
+            )
         return self._changed(
             attached={**self.attached, item.name: item},
             objects={key: value for key, value in self.objects.items() if key != item.name},
         )
 
     def with_detached(self, name: str) -> PlanningScene:
-        """Puts an attached body back into the world at its present pose; raises UnknownNameError."""
+        """Moves an attached body back into the world at its current pose; raises UnknownNameError."""
         if name not in self.attached:
             raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, "attached object", name, self.attached)
         body = replace(self.attached[name].body, pose=self.attached_pose(name))
@@ -235,11 +248,11 @@ class PlanningScene:
         return self._changed(attached=rest, objects={**self.objects, name: body})
 
     def without_attached(self, names: Iterable[str]) -> PlanningScene:
-        """Drops attached bodies and their colours without putting them into the world."""
+        """Deletes attached bodies and their colours."""
         return self._without(attached=set(names))
 
     def attached_pose(self, name: str) -> Transform:
-        """Returns the pose of an attached body in the planning frame at the scene's positions."""
+        """Returns the pose of an attached body in the planning frame at the scene's joint positions."""
         item = self.attached[name]
         return self.model.link_transforms(self.positions)[item.link] * item.body.pose
 
@@ -247,11 +260,11 @@ class PlanningScene:
         """Returns the pose of a frame in the planning frame.
 
         Args:
-            frame: a link, an object, "object/subframe", a fixed frame (as of tf); empty means the planning frame.
-            positions: joint positions [rad or m] to use instead of the scene's.
+            frame: A link, an object, "object/subframe" or a fixed frame (from tf); empty for the planning frame.
+            positions: Joint positions [rad or m]; None for the scene's positions.
 
         Raises:
-            UnknownNameError: no such frame.
+            UnknownNameError: The frame does not exist.
         """
         from pinocchio import SE3
 
@@ -264,7 +277,9 @@ class PlanningScene:
         if found is None:
             found = self._subframe_transform(frame, positions)
         if found is None:
-            found = self.fixed_frames.get(frame)  # last: what finds objects may call a frame of tf as the object
+            found = self.fixed_frames.get(
+                frame
+            )  # last, because object detectors may publish tf frames named like objects
         if found is None:
             known = [*self.model.frame_ids, *self._body_frames(), *self.fixed_frames]
             raise UnknownNameError(ErrorCode.FRAME_TRANSFORM_FAILURE, "frame", frame, known)
@@ -278,7 +293,7 @@ class PlanningScene:
         return [*bodies, *(f"{name}/{inner}" for name, body in bodies.items() for inner in body.subframes)]
 
     def _subframe_transform(self, frame: str, positions: Array | None) -> Transform | None:
-        for name, body in self._bodies().items():  # names of objects and of subframes may hold a slash themselves
+        for name, body in self._bodies().items():  # names of objects and of subframes may contain slashes
             inner = frame.removeprefix(f"{name}/")
             if inner != frame and inner in body.subframes:
                 return self._body_transform(name, positions) * body.subframes[inner]
@@ -289,21 +304,21 @@ class PlanningScene:
             return self.objects[name].pose
         if name in self.attached:
             item = self.attached[name]
-            at = self.positions if positions is None else positions
-            return self.model.link_transforms(at)[item.link] * item.body.pose
+            state = self.positions if positions is None else positions
+            return self.model.link_transforms(state)[item.link] * item.body.pose
         return None
 
 
 SceneChange = Callable[[PlanningScene], PlanningScene]
 
 
-def _place_in_message(shape: Shape) -> int:
-    """Messages list primitives, then meshes, then planes; poses of shapes are given in that order."""
+def _message_order(shape: Shape) -> int:
+    """Returns the rank of a shape in messages, which list primitives, then meshes, then planes."""
     return 2 if isinstance(shape, Plane) else 1 if isinstance(shape, Mesh) else 0
 
 
 def empty_scene(model: RobotModel, positions: Array | None = None) -> PlanningScene:
-    """Returns the scene of a robot alone in the world, with the SRDF's allowed collisions."""
+    """Returns the scene of a robot in an empty world, with the SRDF's allowed collisions."""
     start = model.default_positions() if positions is None else model.with_mimics(positions)
     return PlanningScene(model=model, positions=start, acm=_matrix_of_srdf(model))
 
