@@ -256,7 +256,7 @@ def test_ik_of_a_chain_is_for_one_tip_which_may_come_as_a_list_of_one() -> None:
     assert solve(ik(ik_link_name="", ik_link_names=[TIP], pose_stamped_vector=[stamped]))[0] == OK
     several = ik(ik_link_names=[TIP, "tool0"], pose_stamped_vector=[stamped, stamped])
     answer, report = report_of(lambda: call("compute_ik", GetPositionIK, several))
-    assert answer.error_code.val == CODES.NO_IK_SOLUTION and "one chain of joints, for one link" in report["reason"]
+    assert answer.error_code.val == CODES.NO_IK_SOLUTION and "is a chain with one tip link" in report["reason"]
 
 
 def test_ik_places_a_held_object() -> None:

@@ -191,7 +191,7 @@ def test_a_motion_into_one_under_way_is_not_begun_and_both_links_are_named(
     done, report = report_of(lambda: right.go() if in_one_go else right.execute(motion), "execute")
     assert not done and report["error_code"] == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
     said = report["reason"]
-    assert "would hit" in said and "link 'left_" in said and "link 'right_" in said, said
+    assert "collide with a running motion" in said and "link 'left_" in said and "link 'right_" in said, said
     assert recorder.now("right_joint1") == pytest.approx(0.0, abs=0.01), "it was not begun"
     until(lambda: abs(recorder.now("left_joint1") + 1.2) < 1e-3, "the end of the motion that came first")
 
@@ -304,8 +304,8 @@ def test_solutions_of_two_tips_that_would_touch_are_refused_where_collisions_cou
 @pytest.mark.parametrize(
     "links, count, code, words",
     [
-        (["left_hand_tcp", "right_hand_tcp"], 1, MoveItErrorCodes.INVALID_LINK_NAME, "one link for each pose"),
-        (["left_hand_tcp", "left_hand_tcp"], 2, MoveItErrorCodes.INVALID_LINK_NAME, "left_hand_tcp twice"),
+        (["left_hand_tcp", "right_hand_tcp"], 1, MoveItErrorCodes.INVALID_LINK_NAME, "one link per pose"),
+        (["left_hand_tcp", "left_hand_tcp"], 2, MoveItErrorCodes.INVALID_LINK_NAME, "repeats left_hand_tcp"),
         (["left_hand_tcp", "left_hand"], 2, MoveItErrorCodes.NO_IK_SOLUTION, "share joints"),
         (["left_hand_tcp", "right_link3"], 2, MoveItErrorCodes.NO_IK_SOLUTION, "right_arm (right_hand_tcp)"),
         (["left_hand_tcp", "third_arm"], 2, MoveItErrorCodes.INVALID_LINK_NAME, "third_arm"),

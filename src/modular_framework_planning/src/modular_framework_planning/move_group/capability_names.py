@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of every endpoint of the move_group node, in one place."""
+"""Names of all endpoints of the move_group node."""
 
 PLAN_SERVICE = "plan_kinematic_path"
 IK_SERVICE = "compute_ik"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Selects the endpoints the node offers: MoveIt's default set, plus and minus those that parameters name."""
+"""Selection of the node's endpoints: MoveIt's defaults, changed by the parameters of capabilities."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ PIPELINES = "~planning_pipelines"
 
 @dataclass(frozen=True, slots=True)
 class Capability:
-    """An endpoint that parameters may name.
+    """An endpoint that parameters can enable or disable.
 
     Attributes:
-        name: as MoveIt's plugin of the same purpose.
-        build: its class.
-        default: offered unless `disable_capabilities` names it; otherwise only where `capabilities` does.
+        name: Name of the MoveIt plugin with the same purpose.
+        build: Class of the endpoint.
+        default: Whether the endpoint is offered unless disabled; otherwise only if `capabilities` lists it.
     """
 
     name: str
@@ -30,9 +30,9 @@ class Capability:
 
 
 def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapability]]:
-    """Reads ~capabilities, ~planning_pipelines/*/capabilities and ~disable_capabilities, each separated by spaces.
+    """Selects endpoints by ~capabilities, ~planning_pipelines/*/capabilities and ~disable_capabilities.
 
-    An unknown name is a warning with the list of those that are known, as in MoveIt.
+    As in MoveIt, the parameters are lists separated by spaces, and an unknown name is only logged as a warning.
     """
     wanted = [(rospy.resolve_name("~capabilities"), name) for name in _split(parameter("~capabilities"))]
     for pipeline, settings in (parameter(PIPELINES) or {}).items():
@@ -47,11 +47,11 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapab
     known = list(dict.fromkeys(item.name for item in table))
     for where, name in (*wanted, *disabled):
         if name not in known:
-            rospy.logwarn("%s names '%s', which is not offered; known: %s", where, name, ", ".join(known))
-    added, dropped = ({name for _, name in items} for items in (wanted, disabled))
-    return [item.build for item in table if (item.default or item.name in added) and item.name not in dropped]
+            rospy.logwarn("%s: unknown capability '%s'; known: %s", where, name, ", ".join(known))
+    enabled, removed = ({name for _, name in items} for items in (wanted, disabled))
+    return [item.build for item in table if (item.default or item.name in enabled) and item.name not in removed]
 
 
 def _split(value: object) -> list[str]:
-    """Splits a parameter; a list is taken as it is."""
+    """Returns the words of a text parameter, or the items of a list parameter."""
     return [str(item) for item in value] if isinstance(value, list) else str(value or "").split()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parts of the node that its endpoints share."""
+"""Shared parts of the node for all endpoints."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from modular_framework_planning.robot_model.robot_model import RobotModel
 
 @dataclass(frozen=True, slots=True)
 class MoveGroupContext:
-    """Parts every endpoint may use; all of them may be used from several threads."""
+    """Thread-safe parts of the node that all endpoints share."""
 
     model: RobotModel
     monitor: SceneMonitor
@@ -33,18 +33,18 @@ class MoveGroupContext:
     new_checker: CollisionCheckerFactory
 
     def plan(self, request: PlanningRequest) -> PlanningAnswer:
-        """Plans with the pipeline the request names, or the default one.
+        """Plans with the requested or default pipeline.
 
         Raises:
-            PlanningError: no such pipeline, or no plan; code and reason.
+            PlanningError: The pipeline does not exist, or planning failed.
         """
         return self.pipelines.plan(request)
 
     @property
     def default_pipeline(self) -> str:
-        """Name of the pipeline of requests that name none."""
+        """Name of the pipeline for requests without a pipeline name."""
         return self.pipelines.default
 
     def pipeline(self, name: str) -> PlanningPipeline:
-        """Returns a pipeline, the default one for an empty name; raises PlanningError, which lists the known ones."""
+        """Returns a pipeline, the default pipeline for an empty name; raises PlanningError for an unknown name."""
         return self.pipelines.choose(name)

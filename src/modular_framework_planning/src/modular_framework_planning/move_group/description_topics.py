@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes the robot's descriptions as texts, for nodes that take them from a topic as MoveIt 2's do."""
+"""Publishers of the URDF and SRDF, for nodes that read robot descriptions from topics as in MoveIt 2."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modular_framework_ros.parameter_search import nearest_parameter
 
 
 def publish_descriptions() -> None:
-    """Publishes what ~planning_scene_monitor/publish_robot_description and publish_robot_description_semantic ask for.
+    """Publishes URDF and SRDF if ~planning_scene_monitor/publish_robot_description[_semantic] are set.
 
     Publishes: robot_description, robot_description_semantic (std_msgs/String, latched).
     """

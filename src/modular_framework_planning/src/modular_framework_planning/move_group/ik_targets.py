@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics of a request with one link to place, or with one for each of several subgroups."""
+"""Inverse kinematics of requests for one link, or for one link of each of several subgroups."""
 
 from __future__ import annotations
 
@@ -28,70 +28,78 @@ from modular_framework_planning.messages.poses import stamped_in_scene
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
 
-MIN_TRIES = 32  # made even after the timeout, so that a busy machine does not report reachable poses as unreachable
-MAX_TRIES = 1024  # where the clock must not decide
-MOST_COMBINED = 256  # solutions of several subgroups put together
-REACHED = 1.0e-4  # [m and rad]; a subgroup that another one carries does not reach its pose in their combination
+MIN_ATTEMPTS = 32  # made even after the timeout, so that a busy machine does not report reachable poses as unreachable
+MAX_ATTEMPTS = 1024  # used without a time limit
+MAX_COMBINATIONS = 256  # combined solutions of several subgroups
+POSE_TOLERANCE = 1.0e-4  # [m and rad]; exceeded if one subgroup moves the base of another
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkTarget:
-    """A link and the pose to bring it to.
+    """A target pose of a frame on a link.
 
     Attributes:
-        link: the link that is moved.
-        placed: pose, in the link's frame, of the frame to place: the link itself, a held object or a subframe of it.
-        target: its target pose in the planning frame.
+        link: Name of the link.
+        offset: Pose of the frame in the link's frame; the frame is the link, a held object or a subframe.
+        target: Target pose of the frame in the planning frame.
     """
 
     link: str
-    placed: Transform
+    offset: Transform
     target: Transform
 
     def solutions(self, solver: InverseKinematics, seed: Array, timeout_s: float | None) -> list[Array]:
-        """Returns positions of the whole robot, nearest to the seed first.
+        """Returns solutions, nearest to the seed first; the orientation is free if the settings say position only.
 
-        The orientation is left open where the group's settings ask for the position only.
+        Args:
+            solver: Solver of the group.
+            seed: Joint positions of the whole robot [rad or m].
+            timeout_s: Time limit [s]; None for the group's own.
         """
         if solver.settings.position_only:
             return solver.position_solutions(
-                self.link, self.placed.translation, self.target.translation, seed, timeout_s
+                self.link, self.offset.translation, self.target.translation, seed, timeout_s
             )
-        return solver.solutions(self.link, self.target * self.placed.inverse(), seed, timeout_s)
+        return solver.solutions(self.link, self.target * self.offset.inverse(), seed, timeout_s)
 
     def constraints(
         self, scene: PlanningScene, position_only: bool
     ) -> tuple[PositionConstraint, list[OrientationConstraint]]:
-        """Returns the target as a position constraint, and as an orientation constraint if that is not left open."""
+        """Returns the target as a position constraint and, unless `position_only`, an orientation constraint."""
         link, world = frame_on_robot(scene, self.link), frame_on_robot(scene, "")
-        place = pin.SE3(np.eye(3), self.target.translation)
-        position = PositionConstraint(link, self.placed.translation, world, ((SphereSolid(0.0), place),))
-        rotation = self.target.rotation @ self.placed.rotation.T
+        point = pin.SE3(np.eye(3), self.target.translation)
+        position = PositionConstraint(link, self.offset.translation, world, ((SphereSolid(0.0), point),))
+        rotation = self.target.rotation @ self.offset.rotation.T
         kind = Parameterization.ROTATION_VECTOR
         return position, [] if position_only else [OrientationConstraint(link, world, rotation, np.zeros(3), kind)]
 
     def is_reached(self, model: RobotModel, positions: Array, position_only: bool) -> bool:
         """Returns whether the frame is at its target."""
-        gap = self.target.actInv(model.link_transforms(positions)[self.link] * self.placed)
-        turned = 0.0 if position_only else float(np.abs(gap.rotation - np.eye(3)).max())
-        return max(float(np.abs(gap.translation).max()), turned) < REACHED
+        error = self.target.actInv(model.link_transforms(positions)[self.link] * self.offset)
+        rotation_error = 0.0 if position_only else float(np.abs(error.rotation - np.eye(3)).max())
+        return max(float(np.abs(error.translation).max()), rotation_error) < POSE_TOLERANCE
 
     def failure_reason(self, solver: InverseKinematics, seed: Array) -> str:
-        """Says why there is no solution."""
+        """Returns the reason why no solution exists."""
         if solver.settings.position_only:
             where = np.array2string(self.target.translation, precision=3, separator=", ")
             return (
                 f"no inverse kinematics for '{self.link}': no joint positions within the bounds of group "
                 f"'{solver.group.name}' reach the position {where} m, whatever the orientation (position_only_ik)"
             )
-        return solver.explain_unreachable(self.link, self.target * self.placed.inverse(), seed)
+        return solver.explain_unreachable(self.link, self.target * self.offset.inverse(), seed)
 
 
 def ik_targets(scene: PlanningScene, group: JointGroup, request: Any) -> list[IkTarget]:
-    """Reads what a moveit_msgs/PositionIKRequest asks for: ik_link_name and pose_stamped, or the lists of several.
+    """Reads the targets of a moveit_msgs/PositionIKRequest: ik_link_name and pose_stamped, or lists of both.
+
+    Args:
+        scene: Planning scene.
+        group: Planning group.
+        request: Request message.
 
     Raises:
-        PlanningError: numbers of links and poses differ, a link is named twice or unknown, or a pose has no meaning.
+        PlanningError: The counts of links and poses differ, a link is repeated or unknown, or a pose is invalid.
     """
     links, poses = list(request.ik_link_names), list(request.pose_stamped_vector)
     if len(links) <= 1 and len(poses) <= 1:
@@ -100,12 +108,12 @@ def ik_targets(scene: PlanningScene, group: JointGroup, request: Any) -> list[Ik
         raise PlanningError(
             ErrorCode.INVALID_LINK_NAME,
             f"{len(links)} ik_link_names ({', '.join(links) or 'none'}) and {len(poses)} poses in pose_stamped_vector; "
-            "one link for each pose is needed",
+            "give one link per pose",
         )
     repeated = sorted({name for name in links if links.count(name) > 1})
     if repeated:
         raise PlanningError(
-            ErrorCode.INVALID_LINK_NAME, f"ik_link_names has {', '.join(repeated)} twice; give each link one pose"
+            ErrorCode.INVALID_LINK_NAME, f"ik_link_names repeats {', '.join(repeated)}; list each link once"
         )
     return [_target(scene, group, *item) for item in zip(links, poses, strict=True)]
 
@@ -116,8 +124,8 @@ def _target(scene: PlanningScene, group: JointGroup, link_name: str, pose: Any) 
     if not name:
         raise PlanningError(
             ErrorCode.INVALID_LINK_NAME,
-            f"no link is named, and group '{group.name}' has no tip of its own; name the links in ik_link_names, which "
-            f"has one for each pose of pose_stamped_vector ({_ends(scene.model, _subgroups(scene.model, group))})",
+            f"no link is given, and group '{group.name}' has no tip link; list one link per pose of "
+            f"pose_stamped_vector in ik_link_names ({_ends(scene.model, _subgroups(scene.model, group))})",
         )
     link = holding_link(scene, name)
     if not link:
@@ -126,44 +134,50 @@ def _target(scene: PlanningScene, group: JointGroup, link_name: str, pose: Any) 
 
 
 def solvers_of(kinematics: KinematicsPool, model: RobotModel, group: JointGroup, links: Sequence[str]) -> list[Any]:
-    """Returns a solver for each link: the group's own for one link of a chain, else that of a subgroup with that tip.
+    """Returns a solver per link: the group's solver for one link of a chain, else the solver of a subgroup.
+
+    Args:
+        kinematics: Solvers of all groups.
+        model: Robot model.
+        group: Planning group.
+        links: Links to place.
 
     Raises:
-        PlanningError: a link is the end of no subgroup, or those of two links share joints.
+        PlanningError: A link is not the tip of a subgroup, or the subgroups share joints.
     """
     if len(links) == 1 and group.is_chain:
         return [kinematics.solver(group.name)]
-    inner = _subgroups(model, group)
-    if not inner:
-        kind = "is one chain of joints, for one link" if group.is_chain else "holds no group that is a chain of joints"
+    subgroups = _subgroups(model, group)
+    if not subgroups:
+        kind = "is a chain with one tip link" if group.is_chain else "contains no subgroup that is a chain"
         raise PlanningError(
             ErrorCode.NO_IK_SOLUTION,
-            f"group '{group.name}' {kind}; got {len(links)} links to place ({', '.join(links)}), and inverse "
-            "kinematics needs a chain from a base link to a tip link for each of them",
+            f"group '{group.name}' {kind}; got {len(links)} links to place ({', '.join(links)}), but inverse "
+            "kinematics needs one chain per link",
         )
-    fitting = [[item for item in inner if _moves(model, item, link)] for link in links]
-    without = [link for link, found in zip(links, fitting, strict=True) if not found]
-    if without:
+    candidates = [[item for item in subgroups if _moves(model, item, link)] for link in links]
+    unmatched = [link for link, found in zip(links, candidates, strict=True) if not found]
+    if unmatched:
         raise PlanningError(
             ErrorCode.NO_IK_SOLUTION,
-            f"no subgroup of '{group.name}' ends at {', '.join(without)}; {_ends(model, inner)}: name these, or links "
-            "rigidly fixed to them",
+            f"no subgroup of '{group.name}' ends at {', '.join(unmatched)}; {_ends(model, subgroups)}; name tips, or "
+            "links rigidly fixed to tips",
         )
-    chosen = next((option for option in product(*fitting) if _share_nothing(option)), None)
+    chosen = next((option for option in product(*candidates) if _are_disjoint(option)), None)
     if chosen is None:
         raise PlanningError(
             ErrorCode.NO_IK_SOLUTION,
-            f"the subgroups of '{group.name}' that end at {', '.join(links)} share joints, so they have no solution "
-            f"each of its own; {_ends(model, inner)}: name links of different ones",
+            f"the subgroups of '{group.name}' that end at {', '.join(links)} share joints and cannot be solved "
+            f"separately; {_ends(model, subgroups)}; name links of subgroups without common joints",
         )
     return [kinematics.solver(item.name) for item in chosen]
 
 
 def _subgroups(model: RobotModel, group: JointGroup) -> list[JointGroup]:
-    """Returns the chains within a group: those the SRDF puts into it first, then those with most joints."""
-    named = model.semantics.groups[group.name].subgroups
-    inner = [item for item in model.groups.values() if item.is_chain and set(item.joints) < set(group.joints)]
-    return sorted(inner, key=lambda item: (item.name not in named, -len(item.joints)))
+    """Returns the chains within a group: subgroups in the SRDF first, then by descending number of joints."""
+    declared = model.semantics.groups[group.name].subgroups
+    chains = [item for item in model.groups.values() if item.is_chain and set(item.joints) < set(group.joints)]
+    return sorted(chains, key=lambda item: (item.name not in declared, -len(item.joints)))
 
 
 def _ends(model: RobotModel, groups: Sequence[JointGroup]) -> str:
@@ -171,11 +185,11 @@ def _ends(model: RobotModel, groups: Sequence[JointGroup]) -> str:
 
 
 def _moves(model: RobotModel, group: JointGroup, link: str) -> bool:
-    """Whether a link is at the end of a chain."""
+    """Returns whether a link is at the end of a chain."""
     return model.is_carried(link, model.document.joint_children[group.joints[-1]])
 
 
-def _share_nothing(groups: Sequence[JointGroup]) -> bool:
+def _are_disjoint(groups: Sequence[JointGroup]) -> bool:
     joints = [joint for group in groups for joint in group.joints]
     return len(joints) == len(set(joints))
 
@@ -183,37 +197,41 @@ def _share_nothing(groups: Sequence[JointGroup]) -> bool:
 def combined_solutions(
     targets: Sequence[IkTarget], solvers: Sequence[InverseKinematics], seed: Array, timeout_s: float | None
 ) -> list[Array]:
-    """Returns positions of the whole robot that bring each link to its target, nearest to the seed first.
+    """Returns joint positions of the whole robot that reach all targets, nearest to the seed first.
 
     Args:
-        targets: what to place.
-        solvers: of these, in the same order; they share no joints.
-        seed: positions of the whole robot [rad or m].
-        timeout_s: for all solvers together; None: the groups' own.
+        targets: Targets.
+        solvers: Solver of each target; the solvers share no joints.
+        seed: Joint positions of the whole robot [rad or m].
+        timeout_s: Time limit for all solvers together [s]; None for the groups' own.
 
     Raises:
-        PlanningError: a target cannot be reached; says which and why.
+        PlanningError: A target is unreachable.
     """
-    share_s = None if timeout_s is None else timeout_s / len(targets)
-    most = max(1, int(MOST_COMBINED ** (1.0 / len(targets))))
+    solver_timeout_s = None if timeout_s is None else timeout_s / len(targets)
+    max_solutions = max(1, int(MAX_COMBINATIONS ** (1.0 / len(targets))))
     found = []
     for target, solver in zip(targets, solvers, strict=True):
-        found.append(target.solutions(solver, seed, share_s)[:most])
+        found.append(target.solutions(solver, seed, solver_timeout_s)[:max_solutions])
         if not found[-1]:
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, target.failure_reason(solver, seed))
     if len(targets) == 1:
         return found[0]
-    together = np.array([_joined(seed, solvers, choice) for choice in product(*found)])
-    together = together[np.argsort(np.linalg.norm(together - seed, axis=1), kind="stable")]
-    parts = list(zip(targets, solvers, strict=True))
-    missed = [item.link for item, by in parts if not item.is_reached(by.model, together[0], by.settings.position_only)]
+    combined = np.array([_combined(seed, solvers, choice) for choice in product(*found)])
+    combined = combined[np.argsort(np.linalg.norm(combined - seed, axis=1), kind="stable")]
+    pairs = list(zip(targets, solvers, strict=True))
+    missed = [
+        target.link
+        for target, solver in pairs
+        if not target.is_reached(solver.model, combined[0], solver.settings.position_only)
+    ]
     if missed:
         raise PlanningError(
             ErrorCode.NO_IK_SOLUTION,
-            f"{', '.join(missed)} is carried by another subgroup of the request, so each cannot be solved for alone; "
-            "ask for one link of a group that is one chain",
+            f"{', '.join(missed)} is moved by another subgroup of the request, so the targets cannot be solved "
+            "separately; request one link of a group that is a chain",
         )
-    return list(together)
+    return list(combined)
 
 
 def sampled_solutions(
@@ -224,42 +242,42 @@ def sampled_solutions(
     constraints: KinematicConstraints,
     end_s: float,
 ) -> Iterator[Array]:
-    """Yields positions of the whole robot that bring each link to its target and keep the constraints.
+    """Yields joint positions of the whole robot that reach all targets and satisfy the constraints.
 
-    The first one is sought from the scene's state with its joints moved within their constraints, the others from
-    random states within these.
+    The first search starts at the scene's state, projected into the joint constraints; further searches start at random
+    states that satisfy these constraints.
 
     Args:
-        scene: the seed.
-        group: the joints that may move.
-        targets: what to place.
-        solvers: of these, in the same order.
-        constraints: of the request.
-        end_s: time.monotonic() at which the search ends; with math.inf the number of tries does.
+        scene: Scene with the seed state.
+        group: Group of joints to move.
+        targets: Targets.
+        solvers: Solver of each target.
+        constraints: Constraints of the request.
+        end_s: Deadline on time.monotonic() [s]; with math.inf, MAX_ATTEMPTS ends the search.
     """
     pairs = zip(targets, solvers, strict=True)
     poses = [target.constraints(scene, solver.settings.position_only) for target, solver in pairs]
-    together = KinematicConstraints(
+    all_constraints = KinematicConstraints(
         scene.model,
         constraints.joints,
         [*constraints.positions, *(position for position, _ in poses)],
-        [*constraints.orientations, *(turn for _, turns in poses for turn in turns)],
+        [*constraints.orientations, *(orientation for _, orientations in poses for orientation in orientations)],
     )
     rng = np.random.default_rng(0)
-    found = together.project(scene.positions, group.indices)
-    for number in count():
+    found = all_constraints.project(scene.positions, group.indices)
+    for attempt in count():
         if found is not None:
             yield found
-        if number >= MAX_TRIES if math.isinf(end_s) else number >= MIN_TRIES and time.monotonic() > end_s:
+        if attempt >= MAX_ATTEMPTS if math.isinf(end_s) else attempt >= MIN_ATTEMPTS and time.monotonic() > end_s:
             return
-        found = together.sample(rng, scene.positions, group.indices, attempts=1)
+        found = all_constraints.sample(rng, scene.positions, group.indices, attempts=1)
 
 
-def _joined(seed: Array, solvers: Sequence[InverseKinematics], solutions: Sequence[Array]) -> Array:
-    """Returns the seed with each solver's joints, and those that follow them, as in its solution."""
+def _combined(seed: Array, solvers: Sequence[InverseKinematics], solutions: Sequence[Array]) -> Array:
+    """Returns the seed with each solver's joints, and their mimic joints, replaced by the solver's solution."""
     result = seed.copy()
     for solver, solution in zip(solvers, solutions, strict=True):
-        own = set(solver.group.indices.tolist())
-        columns = sorted(own | {follower for follower, leader, _, _ in solver.model.mimics if leader in own})
+        joints = set(solver.group.indices.tolist())
+        columns = sorted(joints | {follower for follower, leader, _, _ in solver.model.mimics if leader in joints})
         result[columns] = solution[columns]
     return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Works on a goal of pickup or place: tries its grasps or locations in turn and executes the first that can be done."""
+"""Execution of pickup and place goals: plans each grasp or location in turn and executes the first feasible one."""
 
 from __future__ import annotations
 
@@ -37,11 +37,14 @@ class Task:
     """The differences between pickup and place.
 
     Attributes:
-        kind: of the report.
-        check: refuses goals of which no candidate can be done.
-        candidates: indices of the grasps or locations in the goal, best first.
-        read: returns the manoeuvre of a candidate.
-        accept: notes in the result which candidate was taken.
+        kind: Kind of result for the report, pickup or place.
+        goal: Goal message.
+        group: Name of the planning group; may be empty.
+        end_effector: Name of the end effector; may be empty.
+        check: Function that raises PlanningError for goals without a feasible candidate.
+        candidates: Indices of the grasps or locations in the goal, best first.
+        read: Function that returns the manoeuvre of a candidate.
+        accept: Function that writes the chosen candidate to the result.
     """
 
     kind: str
@@ -55,58 +58,66 @@ class Task:
 
 
 def best_first(qualities: Iterable[float]) -> list[int]:
-    """Returns the indices of the qualities from the highest to the lowest; equal ones stay in their order."""
+    """Returns the indices of the qualities in descending order; equal qualities keep their order."""
     values = list(qualities)
     return sorted(range(len(values)), key=lambda index: -values[index])
 
 
 @dataclass(slots=True)
 class _Attempts:
-    """Candidates that failed so far."""
+    """Failed candidates with their errors."""
 
     failures: list[tuple[str, PlanningError]] = field(default_factory=list)
 
     def error(self) -> PlanningError:
-        """Joins the reasons; the code is that of all of them, or PLANNING_FAILED where they differ."""
+        """Returns an error with all reasons and their common code, or PLANNING_FAILED if the codes differ."""
         codes = {error.code for _, error in self.failures}
         reported = [error.reason for _, error in self.failures[:MAX_REASONS]]
-        more = len(self.failures) - len(reported)
+        omitted = len(self.failures) - len(reported)
         return PlanningError(
             codes.pop() if len(codes) == 1 else ErrorCode.PLANNING_FAILED,
-            f"none of {len(self.failures)} ways can be done: "
+            f"none of {len(self.failures)} candidates is feasible: "
             + " | ".join(reported)
-            + (f" | and {more} more" if more else ""),
+            + (f" | and {omitted} more" if omitted else ""),
         )
 
     def entries(self) -> list[dict[str, Any]]:
-        """For the report."""
+        """Returns the failures as JSON for the report."""
         return [{"id": name, "error_code": int(error.code), "reason": error.reason} for name, error in self.failures]
 
 
 class Manipulation:
-    """One goal."""
+    """Plans and executes one goal."""
 
     def __init__(
         self, context: MoveGroupContext, task: Task, cancelled: threading.Event, feedback: Callable[[str], None]
     ) -> None:
+        """Stores the goal.
+
+        Args:
+            context: Shared parts of the node.
+            task: Goal of pickup or place.
+            cancelled: Event that is set when the client cancels the goal.
+            feedback: Function that publishes the state of the goal.
+        """
         self._context, self._task, self._cancelled, self._feedback = context, task, cancelled, feedback
         self._attempts = _Attempts()
         self._grasped = False
 
     def run(self, result: Any) -> str:
-        """Fills the result and returns a sentence about it; failures come back as a code with their reason."""
+        """Fills the result and returns a text for the client; failures are returned as a code in the result."""
         task, options = self._task, self._task.goal.planning_options
         details: dict[str, Any] = {"group": task.group}
         try:
             check_options(options)
-            tries = self._context.settings.plan_execution.attempts(options)
-            for number in range(tries):
+            attempts = self._context.settings.plan_execution.attempts(options)
+            for attempt in range(attempts):
                 try:
-                    self._once(result)
+                    self._plan_and_execute(result)
                     break
                 except PlanningError as error:
-                    last = number + 1 == tries or self._grasped or self._cancelled.wait(options.replan_delay)
-                    if last or error.code != ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
+                    is_last = attempt + 1 == attempts or self._grasped or self._cancelled.wait(options.replan_delay)
+                    if is_last or error.code != ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
                         raise
         except Exception as error:  # noqa: BLE001 - the client must get a code; the reporter logs the error
             result.error_code.val = self._context.reporter.failure(
@@ -124,14 +135,14 @@ class Manipulation:
         )
         return "planned" if options.plan_only else "planned and executed"
 
-    def _once(self, result: Any) -> None:
+    def _plan_and_execute(self, result: Any) -> None:
         options = self._task.goal.planning_options
         self._attempts.failures.clear()
         self._feedback("PLANNING")
         self._context.monitor.wait_for_state()
         change = scene_change(options, not options.plan_only)
         scene = change(self._context.monitor.snapshot())
-        stages = self._planned(scene, result)
+        stages = self._plan(scene, result)
         result.trajectory_start = state_message(scene)
         result.trajectory_stages = [self._message(stage) for stage in stages]
         result.trajectory_descriptions = [stage.name for stage in stages]
@@ -142,9 +153,9 @@ class Manipulation:
             self._execute(stage, message, change)
 
     # ---------------------------------------------------------------- planning
-    def _planned(self, scene: PlanningScene, result: Any) -> tuple[Stage, ...]:
-        """Returns the stages of the first candidate that can be done; raises PlanningError with the reasons of all."""
-        task, begun = self._task, time.monotonic()
+    def _plan(self, scene: PlanningScene, result: Any) -> tuple[Stage, ...]:
+        """Returns the stages of the first feasible candidate; raises PlanningError with the reasons of all failures."""
+        task, start = self._task, time.monotonic()
         model = self._context.model
         group, effector = choose_end_effector(model, task.group, task.end_effector)
         fingers = frozenset(model.group(effector.group).joints)
@@ -157,18 +168,18 @@ class Manipulation:
         task.check(scene)
         candidates = [(candidate, task.read(scene, candidate, hand)) for candidate in task.candidates]
         planner = self._planner(scene, group, hand)
-        for number, (candidate, manoeuvre) in enumerate(candidates):
+        for attempted, (candidate, manoeuvre) in enumerate(candidates):
             if self._cancelled.is_set():
                 raise PlanningError(ErrorCode.PREEMPTED, "cancelled while planning")
             try:
-                stages = planner.plan(manoeuvre, planner.remaining_s / (len(candidates) - number))
+                stages = planner.plan(manoeuvre, planner.remaining_s / (len(candidates) - attempted))
             except PlanningError as error:
                 if error.code == ErrorCode.PREEMPTED:
                     raise
                 self._attempts.failures.append((manoeuvre.name, error))
                 continue
             task.accept(candidate)
-            result.planning_time = time.monotonic() - begun
+            result.planning_time = time.monotonic() - start
             return stages
         raise self._attempts.error()
 
@@ -177,7 +188,7 @@ class Manipulation:
         allowed_s = goal.allowed_planning_time
         if not np.isfinite(allowed_s):
             raise PlanningError(
-                ErrorCode.TIMED_OUT, f"allowed_planning_time is {allowed_s}; a finite number of seconds is needed"
+                ErrorCode.TIMED_OUT, f"allowed_planning_time is {allowed_s}; give a finite number of seconds"
             )
         settings = self._context.pipeline("").settings
         constraints = constraints_from_message(scene, goal.path_constraints, "path_constraints")
@@ -215,11 +226,11 @@ class Manipulation:
         message = RobotTrajectory()
         motion = message.joint_trajectory
         motion.header.frame_id, motion.joint_names = model.planning_frame, list(stage.fingers)
-        numbers = [model.index[name] for name in stage.fingers]
-        start, end = stage.scene.positions[numbers], np.array(list(stage.fingers.values()))
-        if not len(numbers):
+        indices = [model.index[name] for name in stage.fingers]
+        start, end = stage.scene.positions[indices], np.array(list(stage.fingers.values()))
+        if not len(indices):
             return message
-        duration_s = float((np.abs(end - start) / model.max_velocity[numbers]).max()) + FINGER_SETTLE_S
+        duration_s = float((np.abs(end - start) / model.max_velocity[indices]).max()) + FINGER_SETTLE_S
         motion.points = [
             JointTrajectoryPoint(positions=start.tolist(), time_from_start=genpy.Duration(0)),
             JointTrajectoryPoint(positions=end.tolist(), time_from_start=genpy.Duration.from_sec(duration_s)),
@@ -227,22 +238,22 @@ class Manipulation:
         return message
 
     def _execute(self, stage: Stage, message: RobotTrajectory, change: SceneChange) -> None:
-        """Executes a stage and makes its effect real; raises PlanningError naming the stage."""
+        """Executes a stage and applies its effect to the monitored scene; raises PlanningError naming the stage."""
         try:
             if stage.motion is not None:
                 WatchedMotion(self._context, message, stage.scene, lambda scene: stage.change(change(scene))).execute(
                     self._cancelled
                 )
             elif stage.fingers:
-                self._context.execution.execute(self._from_here(message), self._cancelled)
+                self._context.execution.execute(self._from_current_positions(message), self._cancelled)
             if stage.effect is not None:
                 self._context.monitor.apply(stage.effect)
                 self._grasped = True
         except PlanningError as error:
             raise PlanningError(error.code, f"executing '{stage.name}': {error.reason}") from error
 
-    def _from_here(self, message: RobotTrajectory) -> RobotTrajectory:
-        """Lets the motion of the fingers begin where they are: what they hold keeps them from where they should be."""
+    def _from_current_positions(self, message: RobotTrajectory) -> RobotTrajectory:
+        """Starts the finger motion at the measured positions, because a held object stops the fingers early."""
         positions, index = self._context.monitor.positions(), self._context.model.index
         motion = message.joint_trajectory
         motion.points[0].positions = [float(positions[index[name]]) for name in motion.joint_names]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Answers a MotionPlanRequest message: used by the planning service and by the move_group action."""
+"""Planning of MotionPlanRequest messages, for the planning service and the move_group action."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ def read_request(
     """Reads a moveit_msgs/MotionPlanRequest.
 
     Args:
-        context: parts of the node.
-        scene: the world and the current state; the request's start state is put into it.
-        message: the request.
-        cancelled: true when the caller gave up.
+        context: Shared parts of the node.
+        scene: Planning scene with the current state, which the request's start state replaces.
+        message: Request message.
+        cancelled: Returns whether the caller cancelled the request.
 
     Raises:
-        PlanningError: a name does not exist, or something is not finite, not supported or missing.
+        PlanningError: A name is unknown, or a value is missing, not finite or not supported.
     """
     group = context.model.group(message.group_name)
     pipeline = context.pipeline(message.pipeline_id)
@@ -52,7 +52,7 @@ def read_request(
         raise PlanningError(
             ErrorCode.TIMED_OUT,
             f"allowed_planning_time is {message.allowed_planning_time}, "
-            f"max_cartesian_speed {message.max_cartesian_speed}; both must be finite",
+            f"max_cartesian_speed is {message.max_cartesian_speed}; both must be finite",
         )
     scene = scene_with_state(scene, message.start_state, "start_state")
     state = message.start_state.joint_state
@@ -80,24 +80,31 @@ def read_request(
 def _path_constraints(
     pipeline: PlanningPipeline, scene: PlanningScene, message: Any, tip: str
 ) -> tuple[KinematicConstraints | None, AuxiliaryPoint | None]:
-    """Returns the path constraints, or the auxiliary point that a planner takes from the same field."""
-    given = message.path_constraints
-    if given.name and given.name in pipeline.auxiliary_constraints:
-        return None, auxiliary_point(scene, given)
-    constraints = constraints_from_message(scene, given, "path_constraints", ErrorCode.PLANNING_FAILED, tip)
+    """Returns the path constraints, or the auxiliary point (of CIRC) given in the same field of the message.
+
+    Args:
+        pipeline: Requested pipeline.
+        scene: Planning scene.
+        message: moveit_msgs/MotionPlanRequest.
+        tip: Tip link of the group.
+    """
+    path_constraints = message.path_constraints
+    if path_constraints.name and path_constraints.name in pipeline.auxiliary_constraints:
+        return None, auxiliary_point(scene, path_constraints)
+    constraints = constraints_from_message(scene, path_constraints, "path_constraints", ErrorCode.PLANNING_FAILED, tip)
     return (None if constraints.is_empty else constraints), None
 
 
 def _workspace(scene: PlanningScene, message: Any) -> Workspace | None:
-    """Reads the workspace; None where the request gives none."""
-    low, high = (np.array([corner.x, corner.y, corner.z]) for corner in (message.min_corner, message.max_corner))
+    """Reads the workspace; None if the request has no workspace."""
+    low, high = (np.array([vector.x, vector.y, vector.z]) for vector in (message.min_corner, message.max_corner))
     if not low.any() and not high.any():
         return None
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low <= high).all()):
         raise PlanningError(
             ErrorCode.PLANNING_FAILED,
             f"workspace_parameters: min_corner {low.tolist()}, max_corner "
-            f"{high.tolist()}; both must be finite and min at most max",
+            f"{high.tolist()}; both must be finite, and min_corner must not exceed max_corner",
         )
     frame = scene.frame_transform(message.header.frame_id)
     corners = np.array(
@@ -111,21 +118,21 @@ def _workspace(scene: PlanningScene, message: Any) -> Workspace | None:
     return Workspace(corners.min(axis=0), corners.max(axis=0))
 
 
-def answer(
+def plan_and_report(
     context: MoveGroupContext, message: Any, change: SceneChange, cancelled: Callable[[], bool]
 ) -> MotionPlanResponse:
-    """Plans, reports and shows the motion; holds simulated time meanwhile where that may be held.
+    """Plans, reports and visualizes a motion; holds simulated time meanwhile if possible.
 
     Args:
-        context: parts of the node.
+        context: Shared parts of the node.
         message: moveit_msgs/MotionPlanRequest.
-        change: changes the scene for this plan only.
-        cancelled: true when the caller gave up.
+        change: Scene change for this plan only.
+        cancelled: Returns whether the caller cancelled the request.
 
     Raises:
-        PlanningError: with code and reason, already reported.
+        PlanningError: Planning failed; the error is already reported.
     """
-    name, begun_s = message.goal_constraints[0].name if message.goal_constraints else "", time.monotonic()
+    name, start_s = message.goal_constraints[0].name if message.goal_constraints else "", time.monotonic()
     details: dict[str, Any] = {
         "group": message.group_name,
         "planner_id": message.planner_id,
@@ -142,27 +149,27 @@ def answer(
             request = read_request(context, change(context.monitor.snapshot()), message, cancelled)
             scene = request.scene
             details["start"] = dict(zip(scene.model.joint_names, scene.positions.tolist(), strict=True))
-            begun_s = time.monotonic()
-            found = context.plan(request)
+            start_s = time.monotonic()
+            planned = context.plan(request)
     except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
-        details["planning_time_s"] = time.monotonic() - begun_s
+        details["planning_time_s"] = time.monotonic() - start_s
         code = context.reporter.failure("plan", error, **details)
         if isinstance(error, PlanningError):
             context.markers.show_contacts(error.contacts)
             raise
         raise PlanningError(ErrorCode(code), f"planning failed: {type(error).__name__}: {error}") from error
     response = MotionPlanResponse(group_name=message.group_name)
-    response.trajectory_start = state_message(scene, found.start)
-    response.trajectory = trajectory_message(found.trajectory, scene.model)
-    response.planning_time = found.total_time_s
+    response.trajectory_start = state_message(scene, planned.start)
+    response.trajectory = trajectory_message(planned.trajectory, scene.model)
+    response.planning_time = planned.total_time_s
     response.error_code.val = ErrorCode.SUCCESS
     details.update(
-        planner_id=found.planner_id,
-        planning_time_s=found.total_time_s,
-        **found.statistics.as_json(),
-        goal=dict(zip(scene.model.joint_names, found.goal.tolist(), strict=True)),
+        planner_id=planned.planner_id,
+        planning_time_s=planned.total_time_s,
+        **planned.statistics.as_json(),
+        goal=dict(zip(scene.model.joint_names, planned.goal.tolist(), strict=True)),
     )
     context.reporter.report("plan", ErrorCode.SUCCESS, "", **details)
     context.markers.show_contacts(())
-    context.markers.show_path(scene, response, found)
+    context.markers.show_path(scene, response, planned)
     return response

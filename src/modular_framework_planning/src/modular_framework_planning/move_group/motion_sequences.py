@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans a MotionSequenceRequest message: used by the service plan_sequence_path and the action sequence_move_group."""
+"""Planning of MotionSequenceRequest messages, for plan_sequence_path and sequence_move_group."""
 
 from __future__ import annotations
 
@@ -30,7 +30,13 @@ from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolvedSequence:
-    """The response and the parts it was made of; no part if planning failed."""
+    """Result of planning a sequence.
+
+    Attributes:
+        response: Response message.
+        parts: Planned parts; empty if planning failed.
+        reason: Reason of a failure.
+    """
 
     response: MotionSequenceResponse
     parts: tuple[SequencePart, ...]
@@ -40,11 +46,15 @@ class SolvedSequence:
 def solve_sequence(
     context: MoveGroupContext, message: Any, change: SceneChange, cancelled: Callable[[], bool]
 ) -> SolvedSequence:
-    """Plans all motions or none; failures come back as a code and a reason, never as an exception.
+    """Plans all motions of a sequence, or none; failures are returned as code and reason, never raised.
 
-    Args: as those of `motion_plan_requests.answer`, with a moveit_msgs/MotionSequenceRequest.
+    Args:
+        context: Shared parts of the node.
+        message: moveit_msgs/MotionSequenceRequest.
+        change: Scene change for this plan only.
+        cancelled: Returns whether the caller cancelled the request.
     """
-    begun = time.monotonic()
+    start = time.monotonic()
     response = MotionSequenceResponse()
     runs: list[dict[str, Any]] = []
     details = {"items": len(message.items), "groups": [item.req.group_name for item in message.items], "runs": runs}
@@ -53,7 +63,7 @@ def solve_sequence(
     except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
         response.error_code.val = context.reporter.failure("sequence", error, **details)
         return SolvedSequence(response, (), str(error))
-    response.planning_time = time.monotonic() - begun
+    response.planning_time = time.monotonic() - start
     response.error_code.val = ErrorCode.SUCCESS
     response.planned_trajectories = [trajectory_message(part.trajectory, context.model) for part in parts]
     if parts:
@@ -70,10 +80,17 @@ def _plan(
     cancelled: Callable[[], bool],
     runs: list[dict[str, Any]],
 ) -> tuple[SequencePart, ...]:
-    """Plans each motion from the end of the one before, then joins them; raises PlanningError with the item.
+    """Plans each motion from the end of the previous motion, then joins the motions.
 
-    Args: as those of `solve_sequence`, with the items of the message; `runs` takes what planned each of them, also one
-    that failed.
+    Args:
+        context: Shared parts of the node.
+        items: Items of the message.
+        change: Scene change for this plan only.
+        cancelled: Returns whether the caller cancelled the request.
+        runs: Extended by the planner runs of all items, including a failed item.
+
+    Raises:
+        PlanningError: Planning of an item failed; the reason names the item.
     """
     radii, warnings = checked_radii(
         [ItemSpec(item.req.group_name, item.blend_radius, _has_start(item.req.start_state)) for item in items]
@@ -85,22 +102,22 @@ def _plan(
     context.monitor.wait_for_state()
     scene = change(context.monitor.snapshot())
     planned = []
-    for number, (item, radius) in enumerate(zip(items, radii, strict=True)):
+    for index, (item, radius) in enumerate(zip(items, radii, strict=True)):
         try:
-            request = read_request(context, scene, _own_request(context, item.req, number), cancelled)
-            answer = context.plan(request)
+            request = read_request(context, scene, _item_request(context, item.req, index), cancelled)
+            planned_motion = context.plan(request)
         except PlanningError as error:
-            _note_run(error.statistics, runs)
-            raise PlanningError(error.code, f"items[{number}]: {error.reason}") from error
-        _note_run(answer.statistics, runs)
-        planned.append(PlannedItem(request, answer, radius))
-        scene = request.scene.with_positions(answer.goal)
+            _append_run(error.statistics, runs)
+            raise PlanningError(error.code, f"items[{index}]: {error.reason}") from error
+        _append_run(planned_motion.statistics, runs)
+        planned.append(PlannedItem(request, planned_motion, radius))
+        scene = request.scene.with_positions(planned_motion.goal)
     pipeline = context.pipeline(_pipeline_of(context, items[0].req))
     period = float(pipeline.settings.parameters.get("sampling_time", DEFAULT_SAMPLING_TIME_S))
     return SequenceJoiner(context.kinematics, pipeline.checker, period, pipeline.settings.motion_step).join(planned)
 
 
-def _note_run(statistics: PlanStatistics | None, runs: list[dict[str, Any]]) -> None:
+def _append_run(statistics: PlanStatistics | None, runs: list[dict[str, Any]]) -> None:
     if statistics is not None and statistics.run is not None:
         runs.append(asdict(statistics.run))
 
@@ -110,18 +127,18 @@ def _has_start(state: RobotState) -> bool:
     return bool(joints.name or joints.position or joints.velocity or joints.effort)
 
 
-def _own_request(context: MoveGroupContext, request: Any, number: int) -> Any:
-    """Returns a copy that names its pipeline; only the first item may replace what the robot holds."""
+def _item_request(context: MoveGroupContext, request: Any, index: int) -> Any:
+    """Returns a copy of the request with its pipeline; only the first item may replace attached objects."""
     request = copy.copy(request)
     request.pipeline_id = _pipeline_of(context, request)
-    if number:
+    if index:
         request.start_state = copy.copy(request.start_state)
         request.start_state.is_diff = True
     return request
 
 
 def _pipeline_of(context: MoveGroupContext, request: Any) -> str:
-    """Returns the pipeline of an item: the one it names, else the one that has PTP, LIN and CIRC, if that is asked."""
+    """Returns the named pipeline, or for planners PTP, LIN and CIRC the pipeline that offers them."""
     if not request.pipeline_id and request.planner_id in CommandPlanner.planner_ids:
         for name, pipeline in context.pipelines.items():
             if request.planner_id in pipeline.planner_ids:
@@ -130,12 +147,12 @@ def _pipeline_of(context: MoveGroupContext, request: Any) -> str:
 
 
 def _show(context: MoveGroupContext, parts: Sequence[SequencePart], response: MotionSequenceResponse) -> None:
-    """Shows the longest part."""
-    number = max(range(len(parts)), key=lambda item: parts[item].trajectory.duration_s)
-    part = parts[number]
+    """Visualizes the longest part."""
+    index = max(range(len(parts)), key=lambda item: parts[item].trajectory.duration_s)
+    part = parts[index]
     shown = MotionPlanResponse(
         group_name=part.group.name,
-        trajectory=response.planned_trajectories[number],
+        trajectory=response.planned_trajectories[index],
         trajectory_start=state_message(part.scene, part.answers[0].start),
     )
     context.markers.show_path(part.scene, shown, replace(part.answers[0], trajectory=part.trajectory))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The move_group node: loads the robot, then offers every endpoint; each is advertised only once it can answer."""
+"""The move_group node: loads the robot, then advertises the endpoints once they are ready."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ from modular_framework_planning.process_setup.garbage_collection import freeze_l
 from modular_framework_planning.process_setup.many_threads import prepare
 from modular_framework_ros.service_backlog import widen_backlog
 
-# Every endpoint of the node under the name MoveIt's parameters `capabilities` and `disable_capabilities` use.
+# All endpoints by their names in MoveIt's parameters `capabilities` and `disable_capabilities`
 CAPABILITIES = (
     Capability("move_group/MoveGroupPlanService", PlanService),
     Capability("move_group/MoveGroupCartesianPathService", CartesianPathService),
@@ -80,12 +80,12 @@ CAPABILITIES = (
 
 
 def build_context() -> MoveGroupContext:
-    """Reads parameters and builds the shared parts; raises PlanningError with what is missing."""
+    """Reads the parameters and builds the shared parts; raises PlanningError for a missing or invalid parameter."""
     model = load_robot_model()
     kinematics = KinematicsPool(model, load_kinematics_settings())
     monitor = SceneMonitor(model, load_padding(model), settings_below("planning_scene_monitor", SceneMonitorSettings))
-    for sentence in ignored_parameters():
-        rospy.logwarn("%s", sentence)
+    for warning in ignored_parameters():
+        rospy.logwarn("%s", warning)
     execution = load_execution(monitor)
     detector = collision_detector_name()
     new_checker = collision_detector(detector)
@@ -108,7 +108,7 @@ def build_context() -> MoveGroupContext:
 
 
 def advertise(context: MoveGroupContext) -> None:
-    """Starts every endpoint that is not disabled."""
+    """Starts all enabled endpoints."""
     context.monitor.listeners.append(context.markers.show_scene)
     context.monitor.connect()
     OctomapMonitor(context.monitor).connect()
@@ -124,32 +124,32 @@ def advertise(context: MoveGroupContext) -> None:
 
 
 def warm_up(context: MoveGroupContext) -> None:
-    """Compiles what is missing, and lets a checker build what its checks need of the links.
+    """Compiles missing kernels, and runs one collision check so that the checker builds its link geometry.
 
     Raises:
-        PlanningError: the checker cannot check the scene, or lacks its model.
+        PlanningError: The checker cannot check the scene or has no attribute `model`.
     """
     if cache_is_empty():
-        rospy.logwarn("compiling the planner's loops, which takes some minutes once; ./install.sh does it beforehand")
+        rospy.logwarn("compiling the planner's kernels, which takes some minutes once; ./install.sh does so in advance")
         compile_all()
     scene = context.monitor.snapshot()
     checker = context.new_checker(scene)
     if not hasattr(checker, "model"):
-        raise ModelError(f"collision_detector: {type(checker).__name__} has no attribute model, the robot; add it")
+        raise ModelError(f"collision_detector: {type(checker).__name__} lacks the attribute model (RobotModel); add it")
     checker.is_free(scene.positions)
     checker.distance(scene.positions)
     freeze_loaded_objects()
 
 
-def prepare_more() -> None:
-    """Loads the compiled loops that no request has asked for yet."""
+def load_remaining_kernels() -> None:
+    """Loads all remaining compiled kernels."""
     compile_all()
     freeze_loaded_objects()
 
 
 def main() -> int:
-    """Runs the node; returns its exit code."""
-    begun = time.monotonic()
+    """Runs the node and returns the exit code."""
+    start = time.monotonic()
     prepare()
     rospy.init_node("move_group")
     widen_backlog()
@@ -167,9 +167,9 @@ def main() -> int:
         ", ".join(context.pipelines),
         context.default_pipeline,
         context.execution.describe(),
-        time.monotonic() - begun,
+        time.monotonic() - start,
     )
-    prepare_more()
+    load_remaining_kernels()
     rospy.spin()
     return 0
 

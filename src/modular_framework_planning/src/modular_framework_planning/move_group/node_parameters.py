@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the parameters of move_group that `parameters/move_group.yaml` declares."""
+"""Access to the parameters of move_group that `parameters/move_group.yaml` declares."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Settings = TypeVar("Settings")
 
 @cache
 def declared_parameters() -> DeclaredParameters:
-    """Returns the parameters of the node."""
+    """Returns the declared parameters of the node."""
     return DeclaredParameters("modular_framework_planning", "move_group")
 
 
 def parameter(name: str) -> Any:
-    """Returns a parameter; as in MoveIt a value that is not allowed is an error in the log, and the default is used."""
+    """Returns a parameter; as in MoveIt, an invalid value is logged as an error and replaced by the default."""
     return declared_parameters().value_or_default(name)
 
 
 def settings_below(namespace: str, kind: Callable[..., Settings]) -> Settings:
-    """Returns settings whose attributes have the names of the parameters below a namespace of the node."""
+    """Returns a settings object with one attribute per parameter below a private namespace."""
     return kind(**{item.name: parameter(f"~{namespace}/{item.name}") for item in fields(kind)})  # type: ignore[arg-type]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings of move_group that may change while it runs, under MoveIt's names."""
+"""Settings of move_group that can change at runtime, under MoveIt's names."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ class SceneMonitorSettings:
     """Parameters below ~planning_scene_monitor.
 
     Attributes:
-        publish_planning_scene: whether anything is published on ~monitored_planning_scene.
-        publish_planning_scene_hz: how often joints and frames are published while they change; objects are at once.
-        publish_geometry_updates, publish_state_updates, publish_transforms_updates: whether changes of objects, of
-            joints and of frames outside the robot are published.
+        publish_planning_scene: Whether ~monitored_planning_scene is published.
+        publish_planning_scene_hz: Maximum rate for changes of joints and frames [Hz]; objects are published at once.
+        publish_geometry_updates: Whether changes of objects are published.
+        publish_state_updates: Whether changes of joint positions are published.
+        publish_transforms_updates: Whether changes of frames outside the robot are published.
     """
 
     publish_planning_scene: bool
@@ -32,15 +33,15 @@ class PlanExecutionSettings:
     """Parameters below ~plan_execution.
 
     Attributes:
-        max_replan_attempts: how often a goal is planned anew where it asks for that and does not say how often.
-        record_trajectory_state_frequency: of what `executed_trajectory` holds [Hz]; 0: nothing is recorded.
+        max_replan_attempts: Maximum planning attempts for goals that ask for replanning without a limit.
+        record_trajectory_state_frequency: Sampling rate of `executed_trajectory` [Hz]; 0 disables recording.
     """
 
     max_replan_attempts: int
     record_trajectory_state_frequency: float
 
     def attempts(self, options: Any) -> int:
-        """Returns how often moveit_msgs/PlanningOptions allow to plan."""
+        """Returns the maximum number of planning attempts for moveit_msgs/PlanningOptions."""
         if not options.replan:
             return 1
         return options.replan_attempts if options.replan_attempts > 0 else max(1, self.max_replan_attempts)
@@ -48,7 +49,7 @@ class PlanExecutionSettings:
 
 @dataclass(slots=True)
 class MotionSettings:
-    """Holds the settings of motions; each motion uses those in force when it starts."""
+    """Current settings of motions; each motion uses the settings at its start."""
 
     plan_execution: PlanExecutionSettings
     pick_place: PickPlaceSettings

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Builds the planning pipelines from the parameters of the node, in the layouts config packages load them."""
+"""The planning pipelines of the node, built from parameters in the layouts of MoveIt config packages."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from modular_framework_ros.seeds import SeedError, derived_seed, seed_parameter
 
 PARENT = "~planning_pipelines"
 SEEDED_ITERATIONS_PER_S = 1000.0
-"""Iterations that stand for a second of the allowed time where /seed is set: about what one core does for an arm."""
+"""Iterations per second of allowed time if /seed is set; about the rate of one core for an arm."""
 CLOCK_MARGIN = 20.0
-"""With /seed the clock ends a plan only after so many times the allowed time: a busy machine must not decide."""
+"""Factor on the allowed time if /seed is set, so that iterations, and not the machine's load, end a search."""
 
 
 def launch_seed() -> int | None:
-    """Returns the parameter /seed; raises PlanningError where it is no seed."""
+    """Returns the parameter /seed, or None if unset; raises PlanningError for an invalid seed."""
     try:
         return seed_parameter()
     except SeedError as error:
@@ -45,7 +45,7 @@ def launch_seed() -> int | None:
 
 
 class PipelineSet(Mapping[str, PlanningPipeline]):
-    """The pipelines of the node, by name."""
+    """The loaded pipelines, keyed by name."""
 
     def __init__(
         self, loaded: Mapping[str, PlanningPipeline], default: str, refused: Mapping[str, str], seeded: SeededPlanning
@@ -53,18 +53,18 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         """Stores the parts.
 
         Args:
-            loaded: the pipelines.
-            default: name of the one an empty name means.
-            refused: why others, which the parameters name, are not there.
-            seeded: plans requests with a seed.
+            loaded: Usable pipelines, keyed by name.
+            default: Name of the default pipeline.
+            refused: Reasons why other configured pipelines are not usable, keyed by name.
+            seeded: Planner for requests with a seed.
         """
         self._loaded, self.default, self._refused, self._seeded = dict(loaded), default, dict(refused), seeded
         self._sampling = SamplingSettings()
-        self._asked = RequestCounts()
+        self._request_counts = RequestCounts()
 
     @property
     def sampling_settings(self) -> SamplingSettings:
-        """Sampling settings of all pipelines; in force for plans that begin later."""
+        """Sampling settings of all pipelines, used by plans that start later."""
         return self._sampling
 
     @sampling_settings.setter
@@ -83,32 +83,32 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
         return len(self._loaded)
 
     def plan(self, request: PlanningRequest) -> PlanningAnswer:
-        """Plans with the pipeline the request names; with a seed in a process of its own."""
+        """Plans with the requested pipeline; seeded requests are planned in a worker process."""
         pipeline = self.choose(request.pipeline_id)
         request = self._with_launch_seed(request)
         seed = pipeline.settings.seed if request.seed is None else request.seed
         return pipeline.plan(request) if seed is None else self._seeded.plan(pipeline, request, seed)
 
     def _with_launch_seed(self, request: PlanningRequest) -> PlanningRequest:
-        """Gives a request without a seed one that follows from /seed; iterations bound its searches, not the clock."""
+        """Derives a seed from /seed for a request without a seed, and bounds its searches by iterations."""
         seed = launch_seed() if request.seed is None else None
         if seed is None:
             return request
         digest = request_digest(request)
-        number = self._asked.count(digest, rospy.get_time())
+        repetition = self._request_counts.count(digest, rospy.get_time())
         return replace(
             request,
-            seed=derived_seed(seed, "planning", digest, number),
+            seed=derived_seed(seed, "planning", digest, repetition),
             max_iterations=max(1, int(SEEDED_ITERATIONS_PER_S * request.allowed_time_s)),
             allowed_time_s=CLOCK_MARGIN * request.allowed_time_s,
         )
 
     def close(self) -> None:
-        """Ends the worker processes."""
+        """Stops the worker processes."""
         self._seeded.close()
 
     def choose(self, name: str) -> PlanningPipeline:
-        """Returns a pipeline, the default one for an empty name; raises PlanningError with those there are."""
+        """Returns a pipeline, the default pipeline for an empty name; raises PlanningError for an unknown name."""
         name = name or self.default
         if name in self._loaded:
             return self._loaded[name]
@@ -120,15 +120,15 @@ class PipelineSet(Mapping[str, PlanningPipeline]):
 
 
 def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_detector: str) -> PipelineSet:
-    """Builds every pipeline; one that cannot be built is left out, with its reason in the log.
+    """Builds all configured pipelines; a pipeline that cannot be built is logged and left out.
 
     Args:
-        model: the robot.
-        kinematics: inverse kinematics of its groups.
-        collision_detector: name of the collision checker of all of them.
+        model: Robot model.
+        kinematics: Inverse kinematics of the groups.
+        collision_detector: Name of the collision checker for all pipelines.
 
     Raises:
-        ModelError: the default pipeline is not among the parameters, or cannot be built.
+        ModelError: The default pipeline is not configured or cannot be built.
     """
     parameters, default = pipelines_of(rospy.get_param("~", {}) or {})
     loaded: dict[str, PlanningPipeline] = {}
@@ -142,7 +142,7 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_dete
         except PlanningError as error:
             refused[name] = error.reason
     if default not in loaded:
-        reason = refused.get(default, f"there is none of that name below {rospy.resolve_name(PARENT)}")
+        reason = refused.get(default, f"{rospy.resolve_name(PARENT)} has no pipeline of this name")
         raise ModelError(
             f"{rospy.resolve_name('~default_planning_pipeline')}: pipeline '{default}' cannot be used: "
             f"{reason}; usable: {', '.join(loaded) or 'none'}"
@@ -156,7 +156,7 @@ def load_pipelines(model: RobotModel, kinematics: KinematicsPool, collision_dete
 
 
 def _start(seeded: SeededPlanning) -> None:
-    """Starts the worker early; a request that cannot wait for it gets the reason itself."""
+    """Starts the worker process in advance; a failure is logged here and raised again by the first request."""
     try:
         seeded.start()
     except PlanningError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads moveit_msgs/PlanningOptions for the actions that plan and execute."""
+"""Reader for moveit_msgs/PlanningOptions."""
 
 from __future__ import annotations
 
@@ -17,29 +17,32 @@ from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
 
 def check_options(options: Any) -> None:
-    """Refuses planning_options that cannot be honoured; raises PlanningError."""
+    """Checks that planning_options are supported; raises PlanningError."""
     if options.look_around:
         raise PlanningError(
             ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
-            "planning_options.look_around: there is no sensor to point; ask with look_around false",
+            "planning_options.look_around is true, but no sensor can be moved; set look_around to false",
         )
     if not (math.isfinite(options.replan_delay) and options.replan_delay >= 0.0):
         raise PlanningError(
             ErrorCode.FAILURE,
-            f"planning_options.replan_delay is {options.replan_delay} s; a finite number of at least 0 is needed",
+            f"planning_options.replan_delay is {options.replan_delay} s; give a finite number of at least 0",
         )
 
 
 def scene_change(options: Any, keep_state: bool) -> SceneChange:
-    """Returns what planning_scene_diff does to a scene.
+    """Returns the scene change of planning_scene_diff.
 
-    As in MoveIt it is always a difference to the current scene, whatever its is_diff says; and where the robot will
-    move (`keep_state`), its state stays the real one.
+    As in MoveIt, the message is a difference to the current scene even if its is_diff is false.
+
+    Args:
+        options: moveit_msgs/PlanningOptions.
+        keep_state: Whether the robot keeps its real state, as it must for a motion to execute.
     """
     diff = copy.copy(options.planning_scene_diff)
     diff.is_diff = True
     if keep_state and (names_joints(diff.robot_state) or diff.robot_state.attached_collision_objects):
-        rospy.logwarn("planning_scene_diff.robot_state is ignored: a motion to execute starts where the robot is")
+        rospy.logwarn("planning_scene_diff.robot_state is ignored: an executed motion starts at the current state")
     if keep_state or not names_joints(diff.robot_state):
         diff.robot_state = RobotState(
             is_diff=True, attached_collision_objects=[] if keep_state else diff.robot_state.attached_collision_objects
@@ -48,15 +51,15 @@ def scene_change(options: Any, keep_state: bool) -> SceneChange:
 
 
 def with_current_start(request: Any, where: str) -> Any:
-    """Returns the request with the current state as its start, the only one from which a motion can be executed.
+    """Returns a copy of the request that starts at the current state, as an executed motion must.
 
     Args:
-        request: moveit_msgs/MotionPlanRequest, left as it is.
-        where: its name in a warning.
+        request: moveit_msgs/MotionPlanRequest.
+        where: Name of the request in a warning.
     """
     start = request.start_state
     if names_joints(start) or start.attached_collision_objects:
-        rospy.logwarn("%s.start_state is ignored: a motion to execute starts where the robot is", where)
+        rospy.logwarn("%s.start_state is ignored: an executed motion starts at the current state", where)
     request = copy.copy(request)
     request.start_state = RobotState(is_diff=True)
     return request

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reports every planning, kinematics and execution result: in the log once, and on ~planning_report as JSON."""
+"""Reports of all planning, kinematics and execution results, in the log and as JSON on ~planning_report."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from modular_framework_ros.publishing import publish
 
 
 class Reporter:
-    """Publishes ~planning_report (std_msgs/String, JSON) and, if asked to, ~motion_plan_request (latched)."""
+    """Publishes ~planning_report (std_msgs/String, JSON) and optionally ~motion_plan_request (latched)."""
 
     def __init__(self, publish_requests: bool = False) -> None:
         """Advertises the topics.
 
         Args:
-            publish_requests: whether requests for plans are published, as MoveIt does with the argument --debug.
+            publish_requests: Whether planning requests are published, as by MoveIt with the argument --debug.
         """
         self._ids = itertools.count(1)
         self._publisher = rospy.Publisher(names.REPORT_TOPIC, String, queue_size=100)
@@ -34,18 +34,18 @@ class Reporter:
         )
 
     def request(self, message: MotionPlanRequest) -> None:
-        """Publishes a request as it came."""
+        """Publishes a planning request."""
         if self._requests is not None:
             publish(self._requests, message)
 
     def report(self, kind: str, code: int, reason: str, **details: Any) -> None:
-        """Publishes one result; a failure is logged as well.
+        """Publishes a result and logs a failure.
 
         Args:
-            kind: plan, ik, fk, validity, scene or execute.
-            code: number of moveit_msgs/MoveItErrorCodes.
-            reason: why it failed; empty on success.
-            details: further keys; values must fit into JSON.
+            kind: Kind of result: plan, ik, fk, validity, scene or execute.
+            code: Value of moveit_msgs/MoveItErrorCodes.
+            reason: Reason of a failure; empty on success.
+            **details: Additional keys with JSON values.
         """
         entry = {
             "id": next(self._ids),
@@ -62,7 +62,7 @@ class Reporter:
         publish(self._publisher, String(json.dumps(entry)))
 
     def failure(self, kind: str, error: Exception, **details: Any) -> int:
-        """Reports an exception and returns the code to answer with."""
+        """Reports an exception and returns its error code."""
         if isinstance(error, PlanningError):
             if error.statistics is not None:
                 details = {**details, **error.statistics.as_json()}

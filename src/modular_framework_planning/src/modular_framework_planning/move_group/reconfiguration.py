@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The settings of move_group that may be adjusted while it runs, by dynamic_reconfigure as in MoveIt."""
+"""Settings of move_group that dynamic_reconfigure can change at runtime, as in MoveIt."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from modular_framework_ros.reconfiguration import Reconfiguration, adjustable
 
 
 def reconfigurations(context: MoveGroupContext) -> tuple[Reconfiguration, ...]:
-    """Returns a server for each part of the node that may be adjusted."""
+    """Returns a dynamic_reconfigure server for each adjustable part of the node."""
     adjusted: tuple[tuple[str, Any, str], ...] = (
         ("trajectory_execution", context.execution, "settings"),
         ("planning_scene_monitor", context.monitor, "settings"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the robot from the parameter server, as MoveIt config packages load it."""
+"""Readers for the robot's parameters, as MoveIt config packages load them."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from modular_framework_ros.parameter_search import nearest_parameter
 
 DESCRIPTION = "robot_description"
 COLLISION_DETECTOR = "collision_detector"
-_NO_COSTS = "the scene has no costs, space is either free or not"
-IGNORED = (  # parameter, its value in MoveIt's launch files, why another one changes nothing
+_NO_COSTS = "the scene has no costs, space is either free or occupied"
+IGNORED = (  # parameter, value in MoveIt's launch files, reason why the parameter has no effect
     ("max_safe_path_cost", 1, _NO_COSTS),
     ("sense_for_plan/max_safe_path_cost", 1, _NO_COSTS),
     ("monitor_dynamics", False, "velocities and efforts of the robot's state are not used"),
@@ -29,17 +29,17 @@ IGNORED = (  # parameter, its value in MoveIt's launch files, why another one ch
 
 
 def load_robot_model(timeout_s: float = 30.0) -> RobotModel:
-    """Builds the robot model from the parameter server: the node's own description, or else one above it.
+    """Builds the robot model from the nearest descriptions in the node's namespace and the namespaces above.
 
     Raises:
-        ModelError: a description is missing after the timeout, or not usable.
+        ModelError: A description is missing after the timeout, or invalid.
     """
     deadline = time.monotonic() + timeout_s
     names = (DESCRIPTION, f"{DESCRIPTION}_semantic")
     while missing := [name for name in map(nearest_parameter, names) if not rospy.has_param(name)]:
         if time.monotonic() > deadline or rospy.is_shutdown():
             raise ModelError(
-                f"parameter {' and '.join(missing)} not set after {timeout_s:.0f} s; load the robot's "
+                f"parameter {' and '.join(missing)} is not set after {timeout_s:.0f} s; load the robot "
                 "description (planning_context.launch) before move_group"
             )
         rospy.rostime.wallsleep(0.1)
@@ -57,35 +57,33 @@ def load_planning_limits() -> dict[str, Any]:
 
 
 def load_kinematics_settings() -> dict[str, KinematicsSettings]:
-    """Returns the settings of groups in robot_description_kinematics (kinematics.yaml); raises PlanningError."""
+    """Returns the settings of each group in robot_description_kinematics (kinematics.yaml); raises PlanningError."""
     return settings_from(rospy.get_param(nearest_parameter(f"{DESCRIPTION}_kinematics"), {}) or {})
 
 
 def ignored_parameters() -> list[str]:
-    """Returns one sentence for each parameter of MoveIt's launch files that asks for something that is not here."""
-    sentences = []
-    for name, default, why in IGNORED:
+    """Returns a warning for each of MoveIt's parameters that is set but has no effect here."""
+    warnings = []
+    for name, default, reason in IGNORED:
         value = rospy.get_param(f"~{name}", default)
         if value != default:
-            sentences.append(
-                f"parameter {rospy.resolve_name(f'~{name}')} is {value!r} and has no effect: {why}; leave it at "
+            warnings.append(
+                f"parameter {rospy.resolve_name(f'~{name}')} is {value!r} and has no effect: {reason}; leave it at "
                 f"{default}"
             )
-    return sentences
+    return warnings
 
 
 def collision_detector_name() -> str:
-    """Returns `collision_detector` of the node or of a namespace above it; empty where there is none.
+    """Returns the parameter `collision_detector` of the node or a namespace above, empty if unset.
 
-    As in MoveIt a name that is not known is an error in the log, and the default is used; the classes of
-    `module/Class` are not looked up here.
+    As in MoveIt, an unknown name is logged as an error and replaced by the default. Names of the form `module/Class`
+    are not checked here.
     """
     found = rospy.search_param(COLLISION_DETECTOR)
     name = rospy.get_param(found) if found else ""
     if not isinstance(name, str):
-        rospy.logwarn(
-            "parameter %s is no text but %r: it is ignored, and %s is used", found, name, DEFAULT_COLLISION_DETECTOR
-        )
+        rospy.logwarn("parameter %s is %r, not a string; %s is used instead", found, name, DEFAULT_COLLISION_DETECTOR)
         return ""
     if "/" not in name and not is_detector_name(name):
         rospy.logerr(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base classes of the node's endpoints: a capability offers a service, an action, or whatever its `connect` opens."""
+"""Base classes of the node's endpoints (capabilities)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class MoveGroupCapability(ABC):
     """An endpoint of the node.
 
     Args:
-        context: parts of the node.
+        context: Shared parts of the node.
     """
 
     def __init__(self, context: MoveGroupContext) -> None:
@@ -29,11 +29,11 @@ class MoveGroupCapability(ABC):
 
     @abstractmethod
     def connect(self) -> None:
-        """Advertises what the capability offers."""
+        """Advertises the endpoint."""
 
 
 class ServiceCapability(MoveGroupCapability):
-    """Offers one service, called `name`, of the type `kind`."""
+    """Offers the service `name` of type `kind`."""
 
     name: str
     kind: Any
@@ -48,31 +48,31 @@ class ServiceCapability(MoveGroupCapability):
 
 
 class ActionCapability(MoveGroupCapability):
-    """Offers one action, called `name`, of the type `kind`; a goal has succeeded where its result's code says so."""
+    """Offers the action `name` of type `kind`; a goal succeeds if its result has the code SUCCESS."""
 
     name: str
     kind: Any
 
     def connect(self) -> None:
         """Starts the action server."""
-        self._runner = GoalRunner(self.name, self.kind, self._work, self._uses)
+        self._runner = GoalRunner(self.name, self.kind, self._execute, self._resources)
         self._runner.connect()
 
-    def _work(self, goal: Any, cancelled: Event, feedback: Callable[[Any], None]) -> tuple[Any, bool, str]:
+    def _execute(self, goal: Any, cancelled: Event, feedback: Callable[[Any], None]) -> tuple[Any, bool, str]:
         feedback_type = type(self.kind().action_feedback.feedback)
         result, text = self._perform(goal, cancelled, lambda state: feedback(feedback_type(state)))
         return result, error_code_of(result).val == ErrorCode.SUCCESS, text
 
-    def _uses(self, goal: Any) -> frozenset[str] | None:
-        """Returns the joints a goal moves; None: any, so that a new goal cancels it."""
+    def _resources(self, goal: Any) -> frozenset[str] | None:
+        """Returns the joints that a goal moves; None for all joints, so that every new goal cancels this goal."""
         return None
 
     @abstractmethod
     def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:
-        """Works on a goal and returns the result with a sentence about it.
+        """Executes a goal and returns the result and a text for the client.
 
         Args:
-            goal: the message.
-            cancelled: set when the client gives the goal up.
-            publish_state: publishes the goal's feedback.
+            goal: Goal message.
+            cancelled: Event that is set when the client cancels the goal.
+            publish_state: Function that publishes the state of the goal as feedback.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Service compute_cartesian_path: a timed path of straight lines through waypoints, and the reason if it ends early."""
+"""Service compute_cartesian_path: a timed path of straight lines through waypoints."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Lines:
-    """A parsed request; `carried` is the pose, in the frame of `link`, of the frame that follows the lines."""
+    """A parsed request; `offset` is the pose, in the frame of `link`, of the frame that follows the lines."""
 
     scene: PlanningScene
     group: JointGroup
     solver: InverseKinematics
     link: str
-    carried: Transform
+    offset: Transform
     waypoints: tuple[Transform, ...]
     motion: MotionChecker
     checker: CollisionChecker | None
@@ -53,9 +53,9 @@ class _Lines:
 class CartesianPathService(ServiceCapability):
     """Offers compute_cartesian_path (moveit_msgs/GetCartesianPath).
 
-    As in MoveIt the answer is a success with the fraction that was found, also where that is less than 1; the log and
-    ~planning_report say at which waypoint and step it ended, and why. Waypoints in the frame of the moved link itself
-    are relative to the waypoint before.
+    As in MoveIt, the response is a success with the planned fraction even if the path ends early; the log and
+    ~planning_report then name the waypoint, the step and the reason. Waypoints in the frame of the moved link are
+    relative to the previous waypoint.
     """
 
     name, kind = names.CARTESIAN_PATH_SERVICE, GetCartesianPath
@@ -75,7 +75,7 @@ class CartesianPathService(ServiceCapability):
                     request.jump_threshold, request.prismatic_jump_threshold, request.revolute_jump_threshold
                 ),
                 self._objection(lines, request),
-                lines.carried,
+                lines.offset,
             )
             trajectory = self._timed(lines, found, request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
@@ -87,7 +87,7 @@ class CartesianPathService(ServiceCapability):
         response.error_code.val = ErrorCode.SUCCESS
         if found.stop:
             rospy.logwarn(
-                "cartesian_path: %.1f %% of the lines were followed, until %s", 100.0 * found.fraction, found.stop
+                "cartesian_path: %.1f %% of the path was planned, until %s", 100.0 * found.fraction, found.stop
             )
         self._context.reporter.report(
             "cartesian_path",
@@ -110,16 +110,16 @@ class CartesianPathService(ServiceCapability):
             raise UnknownNameError(
                 ErrorCode.INVALID_LINK_NAME, "link_name", name, [*scene.model.frame_ids, *scene.attached]
             )
-        carried = scene.frame_transform(link).actInv(scene.frame_transform(name))
+        offset = scene.frame_transform(link).actInv(scene.frame_transform(name))
         checker = None
         if request.avoid_collisions:
             checker = self._context.pipeline("").checker(scene, group, scene.positions)
-        any_checker = checker or self._context.new_checker(scene, group.indices)
-        motion = MotionChecker(any_checker, group.indices, scene.positions)
-        return _Lines(scene, group, solver, link, carried, _waypoints(scene, name, request), motion, checker)
+        motion_checker = checker or self._context.new_checker(scene, group.indices)
+        motion = MotionChecker(motion_checker, group.indices, scene.positions)
+        return _Lines(scene, group, solver, link, offset, _waypoints(scene, name, request), motion, checker)
 
     def _objection(self, lines: _Lines, request: Any) -> Objection:
-        """Returns the check of each step: path constraints, then collisions."""
+        """Returns a check of a step that finds violated path constraints, then collisions."""
         constraints = constraints_from_message(
             lines.scene, request.path_constraints, "path_constraints", tip=lines.link
         )
@@ -155,16 +155,22 @@ class CartesianPathService(ServiceCapability):
 
 
 def _waypoints(scene: PlanningScene, follower: str, request: Any) -> tuple[Transform, ...]:
-    """Returns the waypoints in the planning frame; raises PlanningError for numbers or frames that cannot be used.
+    """Returns the waypoints in the planning frame.
 
-    Args: the scene, the link or held object that follows the lines, the message.
+    Args:
+        scene: Planning scene.
+        follower: Link or held object that follows the lines.
+        request: Request message.
+
+    Raises:
+        PlanningError: A number is not finite, or a frame is unknown.
     """
     if not math.isfinite(request.max_cartesian_speed):
         raise PlanningError(
             ErrorCode.INVALID_MOTION_PLAN,
-            f"max_cartesian_speed is {request.max_cartesian_speed}; a finite number is needed, 0 for no limit",
+            f"max_cartesian_speed is {request.max_cartesian_speed}; give a finite number, or 0 for no limit",
         )
-    poses = [transform_from_pose(pose, f"waypoints[{number}]") for number, pose in enumerate(request.waypoints)]
+    poses = [transform_from_pose(pose, f"waypoints[{index}]") for index, pose in enumerate(request.waypoints)]
     frame = request.header.frame_id.removeprefix("/")
     base = scene.frame_transform(frame)
     if frame != follower:

@@ -15,14 +15,14 @@ from modular_framework_planning.move_group.motion_watch import WatchedMotion
 
 
 class ExecuteTrajectory(ActionCapability):
-    """Offers execute_trajectory (moveit_msgs/ExecuteTrajectory): a new motion cancels those of the same joints.
+    """Offers execute_trajectory (moveit_msgs/ExecuteTrajectory); a new motion cancels motions of the same joints.
 
-    As in MoveIt, changes of the world do not stop it; the robot's other joints do where they get in its way.
+    As in MoveIt, changes of the world do not stop a motion; the robot's other joints stop the motion if they block it.
     """
 
     name, kind = names.EXECUTE_ACTION, ExecuteTrajectoryAction
 
-    def _uses(self, goal: Any) -> frozenset[str] | None:
+    def _resources(self, goal: Any) -> frozenset[str] | None:
         return frozenset(goal.trajectory.joint_trajectory.joint_names) or None
 
     def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[ExecuteTrajectoryResult, str]:

@@ -36,14 +36,14 @@ from modular_framework_planning.move_group.ik_targets import (
 from modular_framework_planning.move_group.pipeline_parameters import launch_seed
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-LONGEST_TIMEOUT_S = 10.0
-MAX_COMPARED = 4  # free solutions whose clearance decides between them
+MAX_TIMEOUT_S = 10.0
+MAX_COMPARED = 4  # collision-free solutions whose clearances are compared
 
 
 class KinematicsService(MoveGroupCapability):
     """Offers compute_ik (GetPositionIK) and compute_fk (GetPositionFK).
 
-    As in MoveIt, pose_stamped_vector with ik_link_names asks for several tips of a group that holds a chain for each.
+    As in MoveIt, pose_stamped_vector with ik_link_names requests several tips of a group with one chain per tip.
     Links may be attached objects and their subframes ("object/subframe").
     """
 
@@ -76,12 +76,12 @@ class KinematicsService(MoveGroupCapability):
         return response
 
     def _solve(self, scene: PlanningScene, request: Any) -> Array:
-        """Returns the solution nearest to the seed; raises PlanningError with the cause.
+        """Returns a valid solution near the seed; raises PlanningError with the cause.
 
-        Where these solutions do not do, and the solvers may have missed others, the rest of the time is for solutions
-        that are searched for together with the constraints.
+        If no solution of the solvers is valid and the solvers may have missed solutions, the remaining time is spent on
+        a search that includes the constraints.
         """
-        begun = time.monotonic()
+        start = time.monotonic()
         group = self._context.model.group(request.group_name)
         targets = ik_targets(scene, group, request)
         links = [target.link for target in targets]
@@ -91,36 +91,38 @@ class KinematicsService(MoveGroupCapability):
         )
         timeout_s = self._timeout(request)
         found = combined_solutions(targets, solvers, scene.positions, timeout_s)
-        kept = [positions for positions in found if constraints.satisfied(positions)]
-        if kept and not request.avoid_collisions:
-            return kept[0]
+        valid = [positions for positions in found if constraints.satisfied(positions)]
+        if valid and not request.avoid_collisions:
+            return valid[0]
         checker = self._context.new_checker(scene, group.indices) if request.avoid_collisions else None
         if checker is not None:
-            free = first_free(kept, checker.is_free, MAX_COMPARED)
-            if free:
-                return clearest(free, scene.positions, checker.distance)
+            collision_free = first_free(valid, checker.is_free, MAX_COMPARED)
+            if collision_free:
+                return clearest(collision_free, scene.positions, checker.distance)
         if not all(solver.is_complete for solver in solvers):
-            end_s = begun + (
+            end_s = start + (
                 sum(solver.settings.total_timeout_s for solver in solvers) if timeout_s is None else timeout_s
             )
             for positions in sampled_solutions(scene, group, targets, solvers, constraints, end_s):
                 if checker is None or checker.is_free(positions):
                     return positions
         tips = f"{len(found)} inverse kinematics solutions for {', '.join(links)}"
-        if not kept:
-            reason = f"none of {tips} satisfies the constraints; the nearest: {constraints.describe(found[0])}"
+        if not valid:
+            reason = f"none of {tips} satisfies the constraints; nearest solution: {constraints.describe(found[0])}"
             raise PlanningError(ErrorCode.NO_IK_SOLUTION, reason)
         assert checker is not None
-        contacts = describe_contacts(checker.contacts(kept[0], include_fixed=False))
-        raise PlanningError(ErrorCode.NO_IK_SOLUTION, f"all {len(kept)} of {tips} collide; the nearest: {contacts}")
+        contacts = describe_contacts(checker.contacts(valid[0], include_fixed=False))
+        raise PlanningError(
+            ErrorCode.NO_IK_SOLUTION, f"all {len(valid)} of {tips} collide; nearest solution: {contacts}"
+        )
 
     @staticmethod
     def _timeout(request: Any) -> float | None:
-        """Returns the requested timeout; None for the group's own, none at all where /seed is set."""
+        """Returns the requested timeout; None for the group's own, infinite if /seed is set."""
         if launch_seed() is not None:
-            return math.inf  # numbers of tries bound the search: the clock must not decide
-        asked = request.timeout.to_sec()
-        return min(asked, LONGEST_TIMEOUT_S) if asked > 0.0 else None
+            return math.inf  # attempt counts bound the search, so that results do not depend on the clock
+        requested = request.timeout.to_sec()
+        return min(requested, MAX_TIMEOUT_S) if requested > 0.0 else None
 
     def _serve_fk(self, request: Any) -> GetPositionFKResponse:
         response = GetPositionFKResponse()

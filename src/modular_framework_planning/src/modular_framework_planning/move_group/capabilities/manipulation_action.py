@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base class of the actions pickup and place."""
+"""Base class for the actions pickup and place."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 
 class ManipulationAction(ActionCapability):
-    """Carries out a task with the best feasible one of several candidates."""
+    """Executes the best feasible candidate of a task."""
 
     def _perform(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:
         result = self.kind().action_result.result
@@ -23,11 +23,11 @@ class ManipulationAction(ActionCapability):
 
     @abstractmethod
     def _task(self, goal: Any, result: Any) -> Task:
-        """Returns what is to be done; it notes in the result which candidate was taken."""
+        """Returns the task of a goal; the task writes the chosen candidate to the result."""
 
 
 def check_objects(scene: PlanningScene, goal: Any) -> None:
-    """Refuses a goal whose support surface or touch objects the scene does not have; raises PlanningError."""
+    """Checks that support surface and touch objects of a goal exist; raises PlanningError."""
     for name in (goal.support_surface_name, *goal.allowed_touch_objects):
         if name:
             scene.find_object(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action move_group: plans and, unless plan_only is set, executes; replans when the scene changes, if allowed."""
+"""Action move_group: plans a motion and, unless plan_only is set, executes it, with optional replanning."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from moveit_msgs.msg import MoveGroupAction, MoveGroupResult
 from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.planned_motion_action import PlannedMotion, PlannedMotionAction
-from modular_framework_planning.move_group.motion_plan_requests import answer
+from modular_framework_planning.move_group.motion_plan_requests import plan_and_report
 from modular_framework_planning.move_group.motion_watch import WatchedMotion
 from modular_framework_planning.move_group.planning_options import with_current_start
 from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
 
 class MoveAction(PlannedMotionAction):
-    """Offers move_group (moveit_msgs/MoveGroup): a new goal cancels those of groups that share joints with its own."""
+    """Offers move_group (moveit_msgs/MoveGroup); a new goal cancels goals of groups that share joints with it."""
 
     name, kind, report = names.MOVE_ACTION, MoveGroupAction, "plan"
 
-    def _uses(self, goal: Any) -> frozenset[str] | None:
+    def _resources(self, goal: Any) -> frozenset[str] | None:
         group = self._context.model.groups.get(goal.request.group_name)
         return frozenset(group.joints) if group else frozenset()
 
@@ -31,11 +31,11 @@ class MoveAction(PlannedMotionAction):
         planned_in = self._context.monitor.snapshot()
         result = MoveGroupResult()
         try:
-            response = answer(self._context, request, change, cancelled.is_set)
+            response = plan_and_report(self._context, request, change, cancelled.is_set)
         except PlanningError as error:
             result.error_code.val = int(error.code)
             return PlannedMotion(result, error.reason)
-        if cancelled.is_set():  # an improving planner returns a path also when the client has cancelled
+        if cancelled.is_set():  # an anytime planner returns a path even after cancellation
             result.error_code.val = ErrorCode.PREEMPTED
             return PlannedMotion(result, "cancelled while planning")
         result = MoveGroupResult(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action pickup: picks an object up by the best feasible one of several grasps."""
+"""Action pickup: picks up an object with the best feasible grasp."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 
 class PickupAction(ManipulationAction):
-    """Offers pickup (moveit_msgs/Pickup). Grasps are tried from the highest grasp_quality to the lowest."""
+    """Offers pickup (moveit_msgs/Pickup); grasps are tried in descending order of grasp_quality."""
 
     name, kind = names.PICKUP_ACTION, PickupMessages
 
     def _task(self, goal: PickupGoal, result: PickupResult) -> Task:
-        def read(scene: PlanningScene, number: int, hand: Hand) -> Manoeuvre:
-            return grasp_manoeuvre(scene, goal, goal.possible_grasps[number], hand, f"possible_grasps[{number}]")
+        def read(scene: PlanningScene, index: int, hand: Hand) -> Manoeuvre:
+            return grasp_manoeuvre(scene, goal, goal.possible_grasps[index], hand, f"possible_grasps[{index}]")
 
-        def accept(number: int) -> None:
-            result.grasp = goal.possible_grasps[number]
+        def accept(index: int) -> None:
+            result.grasp = goal.possible_grasps[index]
 
         order = best_first(grasp.grasp_quality for grasp in goal.possible_grasps)
         return Task(
@@ -34,11 +34,11 @@ class PickupAction(ManipulationAction):
 
 
 def _check(scene: PlanningScene, goal: PickupGoal) -> None:
-    """Refuses goals that fail with every grasp; raises PlanningError."""
+    """Checks the parts of a goal that all grasps need; raises PlanningError."""
     scene.find_object(goal.target_name)
     check_objects(scene, goal)
     if not goal.possible_grasps:
         raise PlanningError(
             ErrorCode.INVALID_GOAL_CONSTRAINTS,
-            "possible_grasps is empty and nobody here plans grasps; give at least one",
+            "possible_grasps is empty; this node plans no grasps, so give at least one",
         )

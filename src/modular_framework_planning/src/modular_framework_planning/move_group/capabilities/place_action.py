@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action place: puts a held object down at the best feasible one of several locations."""
+"""Action place: puts down a held object at the best feasible location."""
 
 from __future__ import annotations
 
@@ -16,26 +16,24 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 
 class PlaceAction(ManipulationAction):
-    """Offers place (moveit_msgs/Place). Locations are tried from the highest quality to the lowest."""
+    """Offers place (moveit_msgs/Place); locations are tried in descending order of quality."""
 
     name, kind = names.PLACE_ACTION, PlaceMessages
 
     def _task(self, goal: PlaceGoal, result: PlaceResult) -> Task:
-        def read(scene: PlanningScene, number: int, hand: Hand) -> Manoeuvre:
+        def read(scene: PlanningScene, index: int, hand: Hand) -> Manoeuvre:
             held = held_object(scene, goal.attached_object_name, hand)
-            return place_manoeuvre(scene, goal, goal.place_locations[number], hand, held, f"place_locations[{number}]")
+            return place_manoeuvre(scene, goal, goal.place_locations[index], hand, held, f"place_locations[{index}]")
 
-        def accept(number: int) -> None:
-            result.place_location = goal.place_locations[number]
+        def accept(index: int) -> None:
+            result.place_location = goal.place_locations[index]
 
         order = best_first(location.quality for location in goal.place_locations)
         return Task("place", goal, goal.group_name, "", lambda scene: _check(scene, goal), order, read, accept)
 
 
 def _check(scene: PlanningScene, goal: PlaceGoal) -> None:
-    """Refuses goals that fail at every location; raises PlanningError."""
+    """Checks the parts of a goal that all locations need; raises PlanningError."""
     check_objects(scene, goal)
     if not goal.place_locations:
-        raise PlanningError(
-            ErrorCode.INVALID_GOAL_CONSTRAINTS, "place_locations is empty; give at least one place for the object"
-        )
+        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, "place_locations is empty; give at least one location")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An action that plans and, unless plan_only is set, executes, and does both again as often as its goal allows."""
+"""Base class for actions that plan and, unless plan_only is set, execute, with replanning after failures."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from modular_framework_planning.move_group.goal_runner import error_code_of
 from modular_framework_planning.move_group.planning_options import check_options, scene_change
 from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
-SHORTEST_DELAY_S = 0.05  # between two attempts: a plan that fails at once must not fill the log
-WORTH_ANOTHER_TRY = (
+MIN_DELAY_S = 0.05  # between attempts, so that immediate failures do not flood the log
+RETRYABLE_CODES = (
     ErrorCode.PLANNING_FAILED,
     ErrorCode.INVALID_MOTION_PLAN,
     ErrorCode.TIMED_OUT,
@@ -29,10 +29,10 @@ class PlannedMotion:
     """Result of one planning attempt.
 
     Attributes:
-        result: of the action; its code says whether there is a plan.
-        text: a sentence about it.
-        execute: executes the plan; raises PlanningError. None where there is no plan.
-        details: what the report of the execution says besides its code.
+        result: Action result; its code tells whether planning succeeded.
+        text: Text for the client.
+        execute: Function that executes the plan and may raise PlanningError; None without a plan.
+        details: Additional keys for the report of the execution.
     """
 
     result: Any
@@ -42,7 +42,7 @@ class PlannedMotion:
 
 
 class PlannedMotionAction(ActionCapability):
-    """Honours planning_options but for look_around, which is refused; `report` is the kind of its failures' reports."""
+    """Supports all planning_options except look_around; `report` is the kind of result in failure reports."""
 
     report: str
 
@@ -52,11 +52,11 @@ class PlannedMotionAction(ActionCapability):
         result, text = self.kind().action_result.result, ""
         try:
             check_options(options)
-            for number in range(attempts):
+            for attempt in range(attempts):
                 result, text = self._plan_and_execute(goal, cancelled, publish_state)
-                if error_code_of(result).val not in WORTH_ANOTHER_TRY or number + 1 == attempts:
+                if error_code_of(result).val not in RETRYABLE_CODES or attempt + 1 == attempts:
                     break
-                if cancelled.wait(max(options.replan_delay, SHORTEST_DELAY_S)):
+                if cancelled.wait(max(options.replan_delay, MIN_DELAY_S)):
                     raise PlanningError(ErrorCode.PREEMPTED, "cancelled before the next attempt")
         except PlanningError as error:
             error_code_of(result).val = self._context.reporter.failure(self.report, error, **self._details(goal))
@@ -65,7 +65,7 @@ class PlannedMotionAction(ActionCapability):
         return result, text
 
     def _plan_and_execute(self, goal: Any, cancelled: Event, publish_state: PublishState) -> tuple[Any, str]:
-        """Plans once and executes once; failures come back as a code with their reason."""
+        """Plans and executes once; failures are returned as code and reason."""
         moves = not goal.planning_options.plan_only
         change = scene_change(goal.planning_options, moves)
         publish_state("PLANNING")
@@ -84,8 +84,14 @@ class PlannedMotionAction(ActionCapability):
 
     @abstractmethod
     def _plan(self, goal: Any, change: SceneChange, cancelled: Event) -> PlannedMotion:
-        """Plans once, in the monitored scene with a change; a failure comes back as a code with its reason."""
+        """Plans once; a failure is returned as code and reason.
+
+        Args:
+            goal: Goal message.
+            change: Change of the monitored scene for this plan only.
+            cancelled: Event that is set when the client cancels the goal.
+        """
 
     def _details(self, _: Any) -> dict[str, Any]:
-        """Returns what the report of a goal's failure says besides code and reason."""
+        """Returns additional keys for the report of a goal's failure."""
         return {}

@@ -19,7 +19,7 @@ from modular_framework_planning.move_group.capabilities.capability import Servic
 
 
 class GetPlanningSceneService(ServiceCapability):
-    """Offers get_planning_scene (GetPlanningScene): the asked parts of the current scene."""
+    """Offers get_planning_scene (GetPlanningScene), which returns the requested parts of the current scene."""
 
     name, kind = names.GET_SCENE_SERVICE, GetPlanningScene
 
@@ -28,7 +28,7 @@ class GetPlanningSceneService(ServiceCapability):
 
 
 class ApplyPlanningSceneService(ServiceCapability):
-    """Offers apply_planning_scene (ApplyPlanningScene); a change is in force when it answers."""
+    """Offers apply_planning_scene (ApplyPlanningScene); the change is applied before the response."""
 
     name, kind = names.APPLY_SCENE_SERVICE, ApplyPlanningScene
 
@@ -42,7 +42,7 @@ class ApplyPlanningSceneService(ServiceCapability):
 
 
 class ClearOctomapService(ServiceCapability):
-    """Offers clear_octomap (std_srvs/Empty): the octomap is empty until a sensor's next message."""
+    """Offers clear_octomap (std_srvs/Empty), which empties the octomap until the next sensor message."""
 
     name, kind = names.CLEAR_OCTOMAP_SERVICE, Empty
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Services that list pipelines and planners, and read and change the planners' settings."""
+"""Services that list pipelines and planners, and get and set the planners' parameters."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ class QueryPlannersService(MoveGroupCapability):
         )
 
     def _ids(self, pipeline: PlanningPipeline) -> list[str]:
-        """Names that any group takes, then group[name] for those a group lists."""
+        """Returns the planner names for all groups, then group[name] for the planners of a single group."""
         return [
             *pipeline.planner_ids,
             *(f"{group}[{name}]" for group in self._context.model.groups for name in pipeline.group_planners(group)),
         ]
 
     def _get(self, request: Any) -> GetPlannerParamsResponse:
-        """Returns the settings; none where no planner or group of that name has any, as in MoveIt."""
+        """Returns the parameters of a planner; as in MoveIt, none for an unknown planner or group."""
         try:
             pipeline = self._context.pipeline(request.pipeline_id)
         except PlanningError as error:
@@ -68,7 +68,7 @@ class QueryPlannersService(MoveGroupCapability):
                 raise PlanningError(
                     ErrorCode.FAILURE,
                     f"set_planner_params: {len(request.params.keys)} keys and "
-                    f"{len(request.params.values)} values; one value a key is needed",
+                    f"{len(request.params.values)} values; give one value per key",
                 )
         except PlanningError as error:
             raise rospy.ServiceException(error.reason) from error
@@ -88,5 +88,5 @@ class QueryPlannersService(MoveGroupCapability):
 
 
 def _text(value: object) -> str:
-    """Writes a value as the wire has it: booleans as 0 and 1."""
+    """Returns a value as text for the message, with booleans as 0 and 1."""
     return str(int(value)) if isinstance(value, bool) else str(value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Action sequence_move_group: plans a sequence of motions together and, unless plan_only is set, executes it."""
+"""Action sequence_move_group: plans a sequence of motions and, unless plan_only is set, executes the sequence."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from modular_framework_planning.planning_scene.planning_scene import SceneChange
 
 
 class SequenceAction(PlannedMotionAction):
-    """Offers sequence_move_group (moveit_msgs/MoveGroupSequence); the motions run even if the robot is at the goal."""
+    """Offers sequence_move_group (moveit_msgs/MoveGroupSequence), which moves even if the robot is at the goal."""
 
     name, kind, report = names.SEQUENCE_ACTION, MoveGroupSequenceAction, "sequence"
 
     def _plan(self, goal: Any, change: SceneChange, cancelled: Event) -> PlannedMotion:
-        request = goal.request if goal.planning_options.plan_only else _from_here(goal.request)
+        request = goal.request if goal.planning_options.plan_only else _from_current_state(goal.request)
         planned_in = self._context.monitor.snapshot()
         solved = solve_sequence(self._context, request, change, cancelled.is_set)
         result = MoveGroupSequenceResult(solved.response)
@@ -41,11 +41,11 @@ class SequenceAction(PlannedMotionAction):
         return PlannedMotion(result, solved.reason, execute, {"parts": len(solved.parts)})
 
 
-def _from_here(request: Any) -> MotionSequenceRequest:
-    """Returns the sequence without start states."""
+def _from_current_state(request: Any) -> MotionSequenceRequest:
+    """Returns a copy of the sequence without start states."""
     items = []
-    for number, item in enumerate(request.items):
+    for index, item in enumerate(request.items):
         item = copy.copy(item)
-        item.req = with_current_start(item.req, f"items[{number}].req")
+        item.req = with_current_start(item.req, f"items[{index}].req")
         items.append(item)
     return MotionSequenceRequest(items)

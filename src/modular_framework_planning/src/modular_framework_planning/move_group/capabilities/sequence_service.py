@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Service plan_sequence_path: plans a sequence of motions, blended where asked, without moving."""
+"""Service plan_sequence_path: plans a sequence of optionally blended motions without executing it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Service check_state_validity: whether a state is free, within bounds and satisfies constraints; if not, why."""
+"""Service check_state_validity: checks a state for collisions, joint bounds and constraints."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.move_group import capability_names as names
 from modular_framework_planning.move_group.capabilities.capability import ServiceCapability
 
-_LOG_PERIOD_S = 5.0
-"""Time between two identical messages: clients ask for many states in a row [s]."""
+_LOG_PERIOD_S = 5.0  # of identical messages, since clients check many states in a row
 
 
 class StateValidationService(ServiceCapability):
@@ -29,17 +28,17 @@ class StateValidationService(ServiceCapability):
 
     def _serve(self, request: Any) -> GetStateValidityResponse:
         try:
-            return self._answer(request)
+            return self._check(request)
         except Exception as error:  # noqa: BLE001 - one bad request must not take the node down; the reporter logs it
             self._context.reporter.failure("validity", error, group=request.group_name)
             return GetStateValidityResponse(valid=False)
 
-    def _answer(self, request: Any) -> GetStateValidityResponse:
-        """Checks the state; raises PlanningError for an invalid request.
+    def _check(self, request: Any) -> GetStateValidityResponse:
+        """Checks a state; raises PlanningError for an invalid request.
 
-        The response lists every contact and one result a constraint (joints, then positions, then orientations, then
-        visibility); one that is refused is not satisfied, its distance is infinite, the log has the reason. Cost
-        sources stay empty: the scene has no costs, space is either free or not.
+        The response lists all contacts and one result per constraint: joints, positions, orientations, visibility.
+        A malformed constraint is logged and reported as violated with infinite distance. Cost sources stay empty,
+        because space in the scene is either free or occupied.
         """
         if not names_joints(request.robot_state) or request.robot_state.is_diff:
             self._context.monitor.wait_for_state()
@@ -48,7 +47,7 @@ class StateValidationService(ServiceCapability):
         if not np.isfinite(scene.positions).all():
             raise PlanningError(ErrorCode.INVALID_ROBOT_STATE, "robot_state: a joint position is not finite")
         group = model.group(request.group_name) if request.group_name else None
-        moving = [int(number) for number in (group.indices if group else range(len(model.joint_names)))]
+        moving = [int(index) for index in (group.indices if group else range(len(model.joint_names)))]
         contacts = self._context.new_checker(scene, moving).contacts(scene.positions, include_fixed=group is None)
         problems = model.bound_violations(scene.positions, moving, 1e-6)
         results, refused = evaluated_one_by_one(

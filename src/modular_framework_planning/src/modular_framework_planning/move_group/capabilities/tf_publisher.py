@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes tf frames of the objects in the planning scene, for other nodes."""
+"""Publisher of tf frames for the objects in the planning scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from modular_framework_planning.move_group.node_parameters import parameter
 
 
 class TfPublisher(MoveGroupCapability):
-    """Broadcasts a frame for every world and attached object, and for each of their subframes ("object/subframe").
+    """Broadcasts a frame for each world object, attached object and subframe ("object/subframe").
 
     Parameters: ~planning_scene_frame_publishing_rate (10) [Hz], ~planning_scene_tf_prefix ("").
     """
