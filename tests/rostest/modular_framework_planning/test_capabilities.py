@@ -40,8 +40,7 @@ def test_defaults_are_offered_but_for_the_disabled_one(session: Any) -> None:
 
 
 def test_an_unknown_capability_is_a_warning_with_the_list_of_known_ones(session: Any) -> None:
-    log = session.log().splitlines()
-    warning = next(line for line in log if "nobody/Nothing" in line and "unknown capability" in line)
+    warning = next(
         line for line in session.log().splitlines() if "nobody/Nothing" in line and "unknown capability" in line
     )
     assert "/move_group/capabilities" in warning and "move_group/MoveGroupMoveAction" in warning

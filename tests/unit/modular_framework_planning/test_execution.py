@@ -211,7 +211,7 @@ def test_a_gripper_gets_its_goal_even_where_it_is_because_it_is_to_squeeze() -> 
 
 
 def test_a_motion_that_names_no_joint_is_refused() -> None:
-    with pytest.raises(PlanningError, match="no joint_names"):
+    with pytest.raises(PlanningError, match="joint_names is empty"):
         executor(RecordedControllers(ARM)).execute(motion("", (0.0, [])), threading.Event())
 
 

@@ -111,7 +111,9 @@ def test_a_stopped_motion_stays_on_its_way(kind: str) -> None:
 def test_a_motion_nobody_shows_on_joint_states_is_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("modular_framework_planning.move_group.controllers.fake_controllers.SEEN_TIMEOUT_S", 0.1)
     motion = begin("last point", Echo(passes_on=False))
-    with pytest.raises(PlanningError, match="does not show where fake controller 'fake' put a, b .*source_list"):
+    with pytest.raises(
+        PlanningError, match="does not show the positions of fake controller 'fake' for a, b .*source_list"
+    ):
         wait(motion.is_done)
 
 
@@ -125,7 +127,7 @@ def test_the_robot_starts_in_named_poses_of_its_groups() -> None:
         ],
     )
     assert positions == {"a": 1.0, "b": 2.0}, "the base that moves is no part of joint_states"
-    assert len(faults) == 2 and "group 'hand' has no pose 'open' in the SRDF; it has none" in faults[0]
+    assert len(faults) == 2 and "group 'hand' has no pose 'open' in the SRDF; known poses: none" in faults[0]
 
 
 class LateEcho(Echo):
@@ -164,4 +166,4 @@ def test_the_controllers_are_connected_when_the_robot_stands_at_the_initial_posi
 def test_initial_positions_that_nobody_shows_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("modular_framework_planning.move_group.controllers.fake_controllers.SEEN_TIMEOUT_S", 0.1)
     (warning,) = connect(Echo(passes_on=False), monkeypatch)
-    assert "joint_states does not show where the initial positions put a, b" in warning and "source_list" in warning
+    assert "joint_states does not show the initial positions for a, b" in warning and "source_list" in warning

@@ -49,7 +49,7 @@ def refuse(scene: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("new_checker", "reason"),
-    [(refuse, "a shape cannot be checked"), (lambda scene: SimpleNamespace(), "no attribute model")],
+    [(refuse, "a shape cannot be checked"), (lambda scene: SimpleNamespace(), "lacks the attribute model")],
 )
 def test_a_checker_that_cannot_check_the_scene_keeps_the_node_from_starting(
     new_checker: Any, reason: str, log: list[str], monkeypatch: pytest.MonkeyPatch

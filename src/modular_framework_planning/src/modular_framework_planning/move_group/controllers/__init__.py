@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Execution of trajectories by the controllers of a robot."""
+"""Trajectory execution by the controllers of a robot."""

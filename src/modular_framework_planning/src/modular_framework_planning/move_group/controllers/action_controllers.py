@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers of a robot as the executor sees them, and those of ~controller_list, commanded by actions."""
+"""The executor's interface to controllers, and the controllers of ~controller_list, commanded by actions."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class RunningMotion(Protocol):
     """A motion that one controller executes."""
 
     def is_done(self) -> bool:
-        """Whether the controller reports success; raises PlanningError when it failed."""
+        """Returns whether the controller has reported success; raises PlanningError if the motion failed."""
 
     def has_begun(self) -> bool:
-        """Whether the controller has taken the motion up, or refused it."""
+        """Returns whether the controller has accepted or refused the motion."""
 
     def cancel(self) -> None:
-        """Asks the controller to stop; nothing happens when it has ended."""
+        """Asks the controller to stop; has no effect on a finished motion."""
 
 
 class ControllerManager(Protocol):
@@ -46,23 +46,28 @@ class ControllerManager(Protocol):
     may_switch: bool
 
     def connect(self) -> None:
-        """Starts to connect to the controllers."""
+        """Starts connecting to the controllers."""
 
     def describe(self) -> str:
-        """Describes the controllers: their number, or the controller manager that is asked for them."""
+        """Returns a description of the controllers for the log."""
 
     def controllers(self) -> tuple[ControllerSpec, ...]:
-        """Returns the controllers there are now; raises PlanningError when they cannot be known."""
+        """Returns the current controllers; raises PlanningError if they cannot be listed."""
 
     def prepare(self, parts: Sequence[MotionPart]) -> None:
-        """Waits until the controllers of these parts would take a goal; raises PlanningError."""
+        """Waits until the controllers of these parts accept goals; raises PlanningError."""
 
     def begin(self, part: MotionPart) -> RunningMotion:
         """Starts a motion."""
 
 
 def listed_controllers(kinds: Sequence[str] = ACTION_KINDS, default_kind: str = "") -> tuple[ControllerSpec, ...]:
-    """Returns the usable controllers of ~controller_list; faults of the others are logged."""
+    """Returns the valid controllers of ~controller_list; invalid entries are logged.
+
+    Args:
+        kinds: Accepted controller types.
+        default_kind: Type of entries without a type.
+    """
     where = rospy.resolve_name("~controller_list")
     specs, faults = parse_controllers(parameter("~controller_list") or [], kinds, default_kind)
     for fault in faults:
@@ -71,7 +76,7 @@ def listed_controllers(kinds: Sequence[str] = ACTION_KINDS, default_kind: str = 
 
 
 class ActionControllers:
-    """The controllers of ~controller_list, each reached by its action; they are taken to be running.
+    """The controllers of ~controller_list, which are assumed to be running.
 
     Action clients: <name>/<action_ns> of every controller (control_msgs/FollowJointTrajectory or GripperCommand).
     """
@@ -84,16 +89,16 @@ class ActionControllers:
         self._clients: dict[str, Any] = {}
 
     def connect(self) -> None:
-        """Starts to connect to the actions."""
+        """Starts connecting to the actions."""
         for spec in self._specs:
             self._client(spec)
 
     def describe(self) -> str:
-        """Says how many there are."""
+        """Returns the number of controllers as text."""
         return f"{len(self._specs)} controllers"
 
     def controllers(self) -> tuple[ControllerSpec, ...]:
-        """Returns those listed."""
+        """Returns the listed controllers."""
         return self._specs
 
     def _client(self, spec: ControllerSpec) -> Any:
@@ -102,9 +107,9 @@ class ActionControllers:
         return self._clients[spec.action]
 
     def prepare(self, parts: Sequence[MotionPart]) -> None:
-        """Waits for the actions; raises PlanningError naming one that is not there."""
+        """Waits for the actions; raises PlanningError naming a missing action."""
         for spec in (part.controller for part in parts):
-            # real time: while a simulation is paused, simulated time never runs out
+            # wall time, because simulated time stops while a simulation is paused
             deadline = time.monotonic() + self._timeout_s
             while not is_connected(self._client(spec)):
                 if time.monotonic() > deadline or rospy.is_shutdown():
@@ -124,15 +129,15 @@ class ActionControllers:
 
 
 class ActionMotion:
-    """A goal that a controller's action server executes."""
+    """A goal of a controller's action server."""
 
     def __init__(self, spec: ControllerSpec, client: Any) -> None:
         self._spec = spec
         self._client = client
 
     def is_done(self) -> bool:
-        """Whether the goal has succeeded; raises PlanningError with the controller's message when it has failed."""
-        # the status of the goal is final some time before its result is here; DONE means that both are
+        """Returns whether the goal has succeeded; raises PlanningError with the controller's message if it failed."""
+        # DONE means that both the final status and the later result have arrived
         if self._client.simple_state != actionlib.SimpleGoalState.DONE:
             return False
         state, result = self._client.get_state(), self._client.get_result()
@@ -140,7 +145,7 @@ class ActionMotion:
         if state == GoalStatus.SUCCEEDED and (is_gripper or getattr(result, "error_code", 0) == 0):
             return True
         if is_gripper and self._spec.allow_failure and state == GoalStatus.ABORTED:
-            rospy.loginfo("controller '%s' gave up, which its allow_failure permits", self._spec.name)
+            rospy.loginfo("controller '%s' aborted its goal, which allow_failure permits", self._spec.name)
             return True
         code = getattr(result, "error_code", None)
         text = getattr(result, "error_string", "") or self._client.get_goal_status_text()
@@ -151,7 +156,7 @@ class ActionMotion:
         )
 
     def has_begun(self) -> bool:
-        """Whether the goal is no longer pending."""
+        """Returns whether the goal is no longer pending."""
         return self._client.get_state() != GoalStatus.PENDING
 
     def cancel(self) -> None:

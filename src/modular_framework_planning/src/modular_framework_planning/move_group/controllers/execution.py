@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Executes trajectories: chooses controllers, checks the start state, monitors the duration, reacts to stop events."""
+"""Trajectory execution: controller selection, start state check, duration monitoring and stop events."""
 
 from __future__ import annotations
 
@@ -45,25 +45,25 @@ from modular_framework_ros.calls import wait_until
 SETTLE_TIMEOUT_S = 1.0
 SETTLED_RAD = 1.0e-4
 SETTLE_STATES = round(SETTLE_TIMEOUT_S / STATE_PERIOD_S)
-"""Most states that are waited for where time is held."""
+"""Maximum number of states to wait for if simulated time is held."""
 STOP_TIMEOUT_S = 1.0
 BEGIN_TIMEOUT_S = 5.0
 START_STATE_TIMEOUT_S = 0.5
 STALL_S = 0.25
-"""Pause between two polls of a motion after which this process is taken to have stood still [s]."""
+"""Time between two polls of a motion from which this process counts as stalled [s]."""
 AFTER_STALL_S = 0.5
-"""Time in which the ends of motions that came during a stall are received [s]."""
+"""Time after a stall to receive delayed results of motions [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Motion:
-    """A motion under way.
+    """A running motion.
 
     Attributes:
-        joints: All joints of its controllers.
-        path: Where it goes; None where nobody watches it.
-        stop: Set to stop it.
-        admitted: Set when it may begin.
+        joints: All joints of the motion's controllers.
+        path: Path of the motion; None if the motion is not monitored.
+        stop: Event that stops the motion.
+        admitted: Event that is set when the motion may start.
     """
 
     joints: frozenset[str]
@@ -76,31 +76,33 @@ Admission = Callable[[Sequence[PathWatch]], None]
 
 
 def _always(_: Sequence[PathWatch]) -> None:
-    """Lets a motion begin whatever moves."""
+    """Admits every motion."""
 
 
-class _Stalls:
-    """Notices pauses of this process, which then knows of the ends of motions later than they were sent."""
+class _StallDetector:
+    """Detects stalls of this process, after which results of motions arrive late."""
 
     def __init__(self) -> None:
-        self._polled_s = self._over_s = time.monotonic()
+        self._last_poll_s = self._recovered_s = time.monotonic()
 
     def are_over(self) -> bool:
-        """Returns whether nothing that arrived during a stall is still to be received; to be called at each poll."""
+        """Returns whether all results delayed by a stall should have arrived; must be called at each poll."""
         now_s = time.monotonic()
-        if now_s - self._polled_s > STALL_S:
-            self._over_s = now_s + AFTER_STALL_S
-        self._polled_s = now_s
-        return now_s >= self._over_s
+        if now_s - self._last_poll_s > STALL_S:
+            self._recovered_s = now_s + AFTER_STALL_S
+        self._last_poll_s = now_s
+        return now_s >= self._recovered_s
 
 
 class TrajectoryExecution:
-    """Executes motions; several at the same time where their controllers share no joints.
+    """Executes motions, simultaneously if their controllers share no joints.
 
     Subscribes: trajectory_execution_event (std_msgs/String "stop").
 
     Args:
-        manager: the controllers; None where this node is only to plan.
+        manager: Controllers; None if this node only plans.
+        settings: Execution settings; may be replaced at runtime.
+        monitor: Scene monitor, for the current joint positions.
     """
 
     def __init__(self, manager: ControllerManager | None, settings: ExecutionSettings, monitor: SceneMonitor) -> None:
@@ -111,13 +113,13 @@ class TrajectoryExecution:
         self._ended = threading.Condition()
 
     def connect(self) -> None:
-        """Subscribes to stop events and starts to connect to the controllers."""
+        """Subscribes to stop events and starts connecting to the controllers."""
         rospy.Subscriber(names.EXECUTION_EVENT_TOPIC, String, self._on_event, queue_size=5)
         if self.manager is not None:
             self.manager.connect()
 
     def close(self) -> None:
-        """Stops all motions and waits until they have stopped; to be called while topics are still open."""
+        """Stops all motions and waits until they have stopped; must be called while topics are open."""
         self._stop_all()
         with self._ended:
             self._ended.wait_for(lambda: not self._motions, timeout=STOP_TIMEOUT_S)
@@ -129,24 +131,24 @@ class TrajectoryExecution:
 
     def _on_event(self, message: String) -> None:
         if message.data == "stop":
-            rospy.loginfo("trajectory_execution_event: stopping what moves")
+            rospy.loginfo("trajectory_execution_event: stopping all motions")
             self._stop_all()
         else:
             rospy.logwarn(
-                "%s: event '%s' is not known; known: stop",
+                "%s: unknown event '%s'; known: stop",
                 rospy.resolve_name(names.EXECUTION_EVENT_TOPIC),
                 message.data,
             )
 
     def describe(self) -> str:
-        """Describes the controllers that execute motions."""
+        """Returns a description of the controllers for the log."""
         return "no execution of motions" if self.manager is None else self.manager.describe()
 
     def others(self, path: PathWatch) -> list[PathWatch]:
-        """Returns the paths of the motions under way other than this one."""
+        """Returns the paths of all other running motions."""
         with self._ended:
-            known = [motion.path for motion in self._motions if motion.admitted.is_set()]
-        return [other for other in known if other is not None and other is not path]
+            paths = [motion.path for motion in self._motions if motion.admitted.is_set()]
+        return [other for other in paths if other is not None and other is not path]
 
     def execute(
         self,
@@ -155,28 +157,28 @@ class TrajectoryExecution:
         path: PathWatch | None = None,
         admit: Admission = _always,
     ) -> None:
-        """Executes a RobotTrajectory and returns when the robot is there.
+        """Executes a trajectory to its end.
 
         Args:
-            trajectory: the message.
-            cancelled: set to stop it.
-            path: where it goes, for motions beside it.
-            admit: called with the paths of the motions that came before it; raises PlanningError to refuse it.
+            trajectory: moveit_msgs/RobotTrajectory.
+            cancelled: Event that stops the motion.
+            path: Path of the motion, for checks of simultaneous motions.
+            admit: Function called with the paths of earlier motions; raises PlanningError to refuse the motion.
 
         Raises:
-            PlanningError: what went wrong, with the controller's own message where it sent one.
+            PlanningError: Execution failed; the reason includes the controller's message, if any.
         """
         if self.manager is None:
             raise PlanningError(
                 ErrorCode.CONTROL_FAILED,
-                f"{rospy.resolve_name('~allow_trajectory_execution')} is false: this move_group plans only",
+                f"{rospy.resolve_name('~allow_trajectory_execution')} is false: this move_group only plans",
             )
         if trajectory.multi_dof_joint_trajectory.points:
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
                 f"multi_dof_joint_trajectory of {', '.join(trajectory.multi_dof_joint_trajectory.joint_names)}: no "
-                "controller of move_group moves a planar or floating joint; hand it to that of the base, and plan for "
-                "a group without the joint to move the rest here",
+                "controller of move_group moves a planar or floating joint; send the trajectory to the controller of "
+                "the base, and plan the other joints in a group without this joint",
             )
         check_trajectory(trajectory.joint_trajectory)
         if not trajectory.joint_trajectory.points:
@@ -184,40 +186,40 @@ class TrajectoryExecution:
         motion = at_speed(trajectory.joint_trajectory, self.settings.execution_velocity_scaling)
         parts = self._parts(motion, self.manager)
         joints = frozenset(joint for part in parts for joint in part.controller.joints)
-        with self._entered(_Motion(joints, path), admit) as stop:
+        with self._registered(_Motion(joints, path), admit) as stop:
             self._check_start(motion)
             if self._is_there_already(motion, parts):
                 return
             self.manager.prepare(parts)
             try:
                 self._run(parts, self.manager, _delay_s(motion), cancelled, stop)
-            finally:  # a motion that was stopped, too: the goal that takes its place begins where the robot stays
+            finally:  # also after a stop, because the next goal starts at the robot's rest position
                 if self.settings.wait_for_trajectory_completion and not rospy.is_shutdown():
                     self._settle(motion.joint_names)
 
     @contextmanager
-    def _entered(self, entered: _Motion, admit: Admission) -> Iterator[threading.Event]:
-        """Enters a motion; yields the event that stops it.
+    def _registered(self, new_motion: _Motion, admit: Admission) -> Iterator[threading.Event]:
+        """Registers a motion and yields the event that stops the motion.
 
         Raises:
-            PlanningError: another motion moves one of its joints, or it was not admitted beside the others.
+            PlanningError: Another motion moves one of the joints, or the motion was refused.
         """
         with self._ended:
-            busy = sorted({joint for motion in self._motions for joint in motion.joints & entered.joints})
+            busy = sorted({joint for motion in self._motions for joint in motion.joints & new_motion.joints})
             if busy:
                 raise PlanningError(
                     ErrorCode.CONTROL_FAILED,
-                    f"another motion of {', '.join(busy)} is under way; wait for its end or stop it",
+                    f"another motion of {', '.join(busy)} is running; wait for its end or stop it",
                 )
             others = [motion.path for motion in self._motions if motion.path is not None]
-            self._motions.append(entered)
+            self._motions.append(new_motion)
         try:
             admit(others)
-            entered.admitted.set()
-            yield entered.stop
+            new_motion.admitted.set()
+            yield new_motion.stop
         finally:
             with self._ended:
-                self._motions.remove(entered)
+                self._motions.remove(new_motion)
                 self._ended.notify_all()
 
     def _parts(self, motion: JointTrajectory, manager: ControllerManager) -> list[MotionPart]:
@@ -231,34 +233,34 @@ class TrajectoryExecution:
         if not any(self.settings.start_tolerance(joint) > 0.0 for joint in motion.joint_names):
             return
         self._monitor.wait_for_state()
-        away = self._far_joint(motion)
-        if away and self._monitor.wait_for_next_state(START_STATE_TIMEOUT_S):
-            away = self._far_joint(motion)
-        if away:
-            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, away)
+        deviation = self._start_deviation(motion)
+        if deviation and self._monitor.wait_for_next_state(START_STATE_TIMEOUT_S):
+            deviation = self._start_deviation(motion)
+        if deviation:
+            raise PlanningError(ErrorCode.INVALID_MOTION_PLAN, deviation)
 
-    def _far_joint(self, motion: JointTrajectory) -> str:
-        """Says which joint is furthest beyond its tolerance from the first point; empty where none is."""
-        model, now = self._monitor.model, self._monitor.positions()
-        worst, sentence = 0.0, ""
-        for joint, wanted in zip(motion.joint_names, motion.points[0].positions, strict=True):
-            tolerance, number = self.settings.start_tolerance(joint), model.index.get(joint)
-            if number is None or tolerance <= 0.0:
+    def _start_deviation(self, motion: JointTrajectory) -> str:
+        """Returns a message on the joint with the largest deviation above tolerance from the first point, or ""."""
+        model, current = self._monitor.model, self._monitor.positions()
+        max_deviation, message = 0.0, ""
+        for joint, position in zip(motion.joint_names, motion.points[0].positions, strict=True):
+            tolerance, index = self.settings.start_tolerance(joint), model.index.get(joint)
+            if index is None or tolerance <= 0.0:
                 continue
-            gap = now[number] - wanted
-            gap = abs(math.remainder(gap, math.tau) if model.is_continuous(number) else gap)
-            if gap > max(worst, tolerance):
-                worst = gap
-                sentence = (
-                    f"joint '{joint}' is {gap:.4f} from the trajectory's first point (allowed_start_tolerance "
+            deviation = current[index] - position
+            deviation = abs(math.remainder(deviation, math.tau) if model.is_continuous(index) else deviation)
+            if deviation > max(max_deviation, tolerance):
+                max_deviation = deviation
+                message = (
+                    f"joint '{joint}' is {deviation:.4f} from the trajectory's first point (allowed_start_tolerance "
                     f"{tolerance}); plan again from the current state"
                 )
-        return sentence
+        return message
 
     def _is_there_already(self, motion: JointTrajectory, parts: list[MotionPart]) -> bool:
-        """Whether a motion ends where it starts and was seen to start where the robot is.
+        """Returns whether the motion has zero duration and the robot is at its only point.
 
-        Controllers refuse such a motion: its only point is due at once. Grippers do not: their goal is also a force.
+        Trajectory controllers would refuse this motion. Grippers must execute it, because their goal is also a force.
         """
         return (
             motion.points[-1].time_from_start.to_sec() <= 0.0
@@ -274,22 +276,31 @@ class TrajectoryExecution:
         cancelled: threading.Event,
         stop: threading.Event,
     ) -> None:
-        begun = rospy.Time.now()
+        """Sends all parts and waits for their ends.
+
+        Args:
+            parts: Part of the motion for each controller.
+            manager: Controllers.
+            delay_s: Delay until the start time of the motion [s].
+            cancelled: Event of the client that stops the motion.
+            stop: Event of this node that stops the motion.
+        """
+        start = rospy.Time.now()
         running: list[tuple[MotionPart, RunningMotion]] = []
         try:
-            # with held time all parts begin at the same time; one part needs no hold
+            # holding simulated time makes all parts start at the same time
             with self._monitor.time.held("begin of a motion", during_motions=True) if len(parts) > 1 else nullcontext():
                 for part in parts:
                     running.append((part, manager.begin(part)))
                 if len(parts) > 1 and self._monitor.time.enabled:
                     wait_until(lambda: all(motion.has_begun() for _, motion in running), BEGIN_TIMEOUT_S)
-            stalls = _Stalls()
+            stalls = _StallDetector()
             while running:
                 if cancelled.is_set() or stop.is_set() or rospy.is_shutdown():
                     raise PlanningError(ErrorCode.PREEMPTED, "the motion was stopped on request")
                 running = [item for item in running if not item[1].is_done()]
                 if stalls.are_over():
-                    self._check_time([part for part, _ in running], (rospy.Time.now() - begun).to_sec() - delay_s)
+                    self._check_time([part for part, _ in running], (rospy.Time.now() - start).to_sec() - delay_s)
                 cancelled.wait(POLL_S)
         finally:
             for _, motion in running:
@@ -298,7 +309,7 @@ class TrajectoryExecution:
     def _check_time(self, parts: list[MotionPart], elapsed_s: float) -> None:
         for part in parts if self.settings.execution_duration_monitoring else ():
             if part.controller.kind in FAKE_KINDS:
-                continue  # they end by themselves, and joint_states shows that as late as the machine is busy
+                continue  # fake motions always end, but joint_states shows the end late on a busy machine
             scaling, margin_s = part.controller.duration_scaling, part.controller.duration_margin
             allowed_s = part.duration_s * (
                 self.settings.allowed_execution_duration_scaling if scaling is None else scaling
@@ -308,29 +319,29 @@ class TrajectoryExecution:
                 raise PlanningError(
                     ErrorCode.TIMED_OUT,
                     f"the motion should take {part.duration_s:.2f} s and was not "
-                    f"done after {elapsed_s:.2f} s (allowed {allowed_s:.2f} s); waiting for "
+                    f"done after {elapsed_s:.2f} s (allowed {allowed_s:.2f} s); unfinished controllers: "
                     f"{', '.join(late.controller.name for late in parts)}",
                 )
 
     def _settle(self, joint_names: list[str]) -> None:
-        """Waits until the joints stand still, so that the next plan starts from where the robot stays."""
+        """Waits until the joints are at rest, so that the next plan starts at the robot's rest position."""
         monitor, index = self._monitor, self._monitor.model.index
-        numbers = [index[name] for name in joint_names if name in index]
-        monitor.catch_up()  # where time is held, the same states are compared whenever messages arrive
+        indices = [index[name] for name in joint_names if name in index]
+        monitor.catch_up()  # makes the compared states independent of message delays if simulated time is held
         end, states = rospy.Time.now() + rospy.Duration(SETTLE_TIMEOUT_S), 0
-        before = monitor.positions()[numbers]
+        before = monitor.positions()[indices]
         while states < SETTLE_STATES if monitor.time.enabled else rospy.Time.now() < end:
             if not monitor.wait_for_next_state(SETTLE_TIMEOUT_S):
                 return
             states += 1
-            now = monitor.positions()[numbers]
+            now = monitor.positions()[indices]
             if np.abs(now - before).max() < SETTLED_RAD:
                 return
             before = now
 
 
 def _delay_s(motion: JointTrajectory) -> float:
-    """Returns how long a motion that is to begin at a given time still has to wait [s]."""
+    """Returns the delay until the start time in the motion's header [s]."""
     stamp = motion.header.stamp
     return 0.0 if stamp.is_zero() else max((stamp - rospy.Time.now()).to_sec(), 0.0)
 
@@ -339,7 +350,7 @@ def load_execution(monitor: SceneMonitor) -> TrajectoryExecution:
     """Builds the executor from ~trajectory_execution, ~allow_trajectory_execution and ~moveit_controller_manager.
 
     Raises:
-        ModelError: a controller manager of that name does not exist.
+        ModelError: The controller manager is unknown.
     """
     settings = settings_below("trajectory_execution", ExecutionSettings)
     allowed = parameter("~allow_trajectory_execution")
@@ -355,10 +366,10 @@ def _load_manager(timeout_s: float, monitor: SceneMonitor) -> ControllerManager:
         case known if known == FAKE_MANAGER:
             return FakeControllers(listed_controllers(FAKE_KINDS, FAKE_KINDS[0]), monitor)
         case known if known in (ROS_CONTROL_MANAGER, ALL_ROS_CONTROL_MANAGERS):
-            only = parameter("~ros_control_namespace") if known == ROS_CONTROL_MANAGER else None
+            namespace = parameter("~ros_control_namespace") if known == ROS_CONTROL_MANAGER else None
             may_switch = parameter("~moveit_manage_controllers")
-            return RosControlControllers(listed_controllers(), only, may_switch, timeout_s)
+            return RosControlControllers(listed_controllers(), namespace, may_switch, timeout_s)
     raise ModelError(
-        f"parameter {rospy.resolve_name('~moveit_controller_manager')}: '{name}' is not known; known: "
+        f"parameter {rospy.resolve_name('~moveit_controller_manager')}: unknown '{name}'; known: "
         f"{', '.join(CONTROLLER_MANAGERS)}"
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers loaded by a controller manager of ros_control; stopped ones are started when a motion needs them."""
+"""Controllers of ros_control's controller managers; stopped controllers are started when a motion needs them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from modular_framework_planning.move_group.controllers.action_controllers import
 from modular_framework_planning.trajectory_execution.controllers import GRIPPER, TRAJECTORY, ControllerSpec
 
 LIST_SERVICE = "controller_manager/list_controllers"
-KEPT_S = 1.0
-# end of a controller's type -> kind and name of its action
+MAX_AGE_S = 1.0  # of the list of controllers
+# suffix of a controller's type -> kind and name of its action
 CONTROLLER_TYPES = {
     "JointTrajectoryController": (TRAJECTORY, "follow_joint_trajectory"),
     "GripperActionController": (GRIPPER, "gripper_cmd"),
@@ -30,10 +30,10 @@ CONTROLLER_TYPES = {
 
 
 def spec_of(state: ControllerState, namespace: str = "/") -> ControllerSpec | None:
-    """Returns a controller as the executor sees it; None for one that executes no motions."""
-    for ending, (kind, action_ns) in CONTROLLER_TYPES.items():
+    """Returns the executor's description of a controller; None for a controller that executes no motions."""
+    for suffix, (kind, action_ns) in CONTROLLER_TYPES.items():
         joints = tuple(dict.fromkeys(name for claim in state.claimed_resources for name in claim.resources))
-        if state.type.endswith(ending) and joints:
+        if state.type.endswith(suffix) and joints:
             return ControllerSpec(
                 rosgraph.names.ns_join(namespace, state.name),
                 action_ns,
@@ -45,31 +45,37 @@ def spec_of(state: ControllerState, namespace: str = "/") -> ControllerSpec | No
     return None
 
 
-def running_claims(states: Sequence[ControllerState], joints: set[str], without: set[str]) -> list[str]:
-    """Returns the running controllers that hold one of the joints, except those named."""
+def running_claims(states: Sequence[ControllerState], joints: set[str], excluded: set[str]) -> list[str]:
+    """Returns the names of running controllers that claim one of the joints.
+
+    Args:
+        states: Controllers of a controller manager.
+        joints: Names of joints.
+        excluded: Names of controllers to leave out.
+    """
     return [
         state.name
         for state in states
         if state.state == "running"
-        and state.name not in without
+        and state.name not in excluded
         and joints & {name for claim in state.claimed_resources for name in claim.resources}
     ]
 
 
 def manager_namespaces() -> list[str]:
-    """Returns the namespaces of all controller managers the ROS master knows."""
+    """Returns the namespaces of all controller managers known to the ROS master."""
     services = rosgraph.Master(rospy.get_name()).getSystemState()[2]
     return sorted(name[: -len(LIST_SERVICE)] for name, _ in services if name.endswith(f"/{LIST_SERVICE}"))
 
 
 class RosControlControllers(ActionControllers):
-    """Asks controller_manager/list_controllers, and controller_manager/switch_controller where allowed.
+    """Uses controller_manager/list_controllers and, if allowed, controller_manager/switch_controller.
 
     Args:
-        listed: of ~controller_list; they add settings to the controllers of the same name.
-        namespace: of the controller manager; None asks all there are.
-        may_switch: whether stopped controllers may be started, and those that hold their joints stopped.
-        timeout_s: how long to wait for a service or an action [s].
+        listed: Entries of ~controller_list, which add settings to controllers of the same name.
+        namespace: Namespace of the controller manager; None for all controller managers.
+        may_switch: Whether stopped controllers may be started and controllers that claim their joints stopped.
+        timeout_s: Timeout for services and actions [s].
     """
 
     def __init__(
@@ -80,16 +86,16 @@ class RosControlControllers(ActionControllers):
         self._settings = {rosgraph.names.ns_join("/", spec.name): spec for spec in listed}
         self._namespace = namespace
         self._states: dict[str, list[ControllerState]] = {}
-        self._asked_s = -KEPT_S
+        self._listed_s = -MAX_AGE_S
 
     def describe(self) -> str:
-        """Describes which controller manager is asked."""
+        """Returns the namespace of the controller manager as text."""
         return f"controllers of {'all controller managers' if self._namespace is None else self._namespace}"
 
     def controllers(self) -> tuple[ControllerSpec, ...]:
-        """Returns what the controller managers have loaded, at most a second ago."""
-        if time.monotonic() - self._asked_s > KEPT_S:
-            self._ask()
+        """Returns the loaded controllers, at most MAX_AGE_S old."""
+        if time.monotonic() - self._listed_s > MAX_AGE_S:
+            self._update()
         found = []
         for namespace, states in self._states.items():
             for spec in (spec_of(state, namespace) for state in states):
@@ -110,24 +116,24 @@ class RosControlControllers(ActionControllers):
                     )
         return tuple(found)
 
-    def _ask(self) -> None:
+    def _update(self) -> None:
         namespaces = manager_namespaces() if self._namespace is None else [self._namespace]
         try:
             self._states = {name: self._client_of(name).list_controllers() for name in namespaces}
         except ControllerManagerClientError as error:
             raise PlanningError(
                 ErrorCode.CONTROL_FAILED,
-                f"controllers are not known: {error}; is the controller "
+                f"cannot list controllers: {error}; is the controller "
                 f"manager running, and is {rospy.resolve_name('~ros_control_namespace')} its "
                 "namespace?",
             ) from error
-        self._asked_s = time.monotonic()
+        self._listed_s = time.monotonic()
 
     def _client_of(self, namespace: str) -> ControllerManagerClient:
         return ControllerManagerClient(namespace, self._timeout_s)
 
     def prepare(self, parts: Sequence[MotionPart]) -> None:
-        """Starts the controllers that are stopped, then waits for their actions; raises PlanningError."""
+        """Starts stopped controllers, then waits for the actions; raises PlanningError."""
         for namespace, states in self._states.items():
             stopped = [
                 part.controller
@@ -143,7 +149,7 @@ class RosControlControllers(ActionControllers):
         start = [spec.name.rsplit("/", 1)[-1] for spec in specs]
         stop = running_claims(states, {joint for spec in specs for joint in spec.joints}, set(start))
         rospy.loginfo("starting controllers %s, stopping %s", ", ".join(start), ", ".join(stop) or "none")
-        self._asked_s = -KEPT_S
+        self._listed_s = -MAX_AGE_S
         try:
             self._client_of(namespace).switch(start, stop)
         except ControllerManagerClientError as error:

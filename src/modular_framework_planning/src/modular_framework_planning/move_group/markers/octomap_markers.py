@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shows the octomap as cubes coloured by height, for an RViz without MoveIt's plugin."""
+"""Markers of the octomap, cubes coloured by height, for an RViz without MoveIt's plugin."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class OctomapMarkers:
         self._shown: object = None
 
     def show(self, scene: PlanningScene) -> None:
-        """Publishes the occupied voxels of a scene, MAX_CUBES of them at most."""
+        """Publishes at most MAX_CUBES occupied voxels of a scene."""
         if scene.octomap is self._shown:
             return
         self._shown = scene.octomap
