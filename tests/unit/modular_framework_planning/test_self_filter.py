@@ -239,23 +239,23 @@ def test_sensors_are_read_as_moveit_writes_them_and_faults_are_named() -> None:
 def test_joints_are_remembered_and_interpolated() -> None:
     history = JointHistory(np.array([False]))
     with pytest.raises(PlanningError, match="none"):
-        history.at(1.0)
+        history.positions_at(1.0)
     for stamp, value in ((10.0, 0.0), (10.1, 1.0), (10.1, 2.0), (10.3, 4.0)):
         history.add(stamp, np.array([value]))
-    assert history.at(10.05) == pytest.approx(1.0) and history.at(10.2) == pytest.approx(3.0)
-    assert history.covers(10.3) and not history.covers(10.4)
+    assert history.positions_at(10.05) == pytest.approx(1.0) and history.positions_at(10.2) == pytest.approx(3.0)
+    assert history.has_reached(10.3) and not history.has_reached(10.4)
     for stamp in (9.0, 10.4):
         with pytest.raises(PlanningError, match="10.000 to 10.300"):
-            history.at(stamp)
+            history.positions_at(stamp)
     history.add(1.0, np.array([7.0]))
-    assert history.at(1.0) == 7.0, "a clock that was set back begins anew"
+    assert history.positions_at(1.0) == 7.0, "a clock that was set back begins anew"
 
 
 def test_a_joint_without_ends_that_jumps_by_a_turn_was_never_half_a_turn_away() -> None:
     history = JointHistory(np.array([True, False]))
     for stamp, value in ((1.0, 3.1), (2.0, -3.1)):
         history.add(stamp, np.array([value, value]))
-    endless, bounded = history.at(1.5)
+    endless, bounded = history.positions_at(1.5)
     assert np.cos(endless) == pytest.approx(-1.0) and bounded == 0.0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the scene's octomap up to date with what depth sensors see, and saves and loads it."""
+"""Updates of the scene's octomap from depth sensors, and services to save and load the octomap."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ from modular_framework_planning.planning_scene.planning_scene import PlanningSce
 
 DEFAULT_RESOLUTION = 0.1  # [m]
 ATTEMPTS = 3
-WAIT_S = 1.0  # for transforms and joint positions at the time of a sensor's message
+WAIT_S = 1.0  # for transforms and joint positions at the time of a sensor message
 
 
 class OctomapMonitor:
-    """Puts what sensors see into the scene as object <octomap>. The scene holds the map: what clears it clears all.
+    """Inserts sensor data into the octomap of the scene, which is the only copy of the map.
 
-    Parameters: ~octomap_resolution (0.1 m), ~octomap_frame (planning frame), ~max_range (of clouds that name none),
-    ~sensors (list, see perception/sensor_settings).
+    Parameters: ~octomap_resolution (0.1 m), ~octomap_frame (planning frame), ~max_range (default for clouds), ~sensors
+    (list, see perception/sensor_settings).
     Publishes: ~octomap_markers (MarkerArray).
-    Services: ~save_map (SaveMap), ~load_map (LoadMap): .bt files; nothing but an octomap is overwritten.
+    Services: ~save_map (SaveMap), ~load_map (LoadMap) for .bt files; only octomap files are overwritten.
     """
 
     def __init__(self, monitor: SceneMonitor) -> None:
@@ -53,7 +53,7 @@ class OctomapMonitor:
         self._resolution = DEFAULT_RESOLUTION
         self._frame = ""
         self._transforms: Any = None
-        self._known: dict[str, Any] = {}
+        self._known_bodies: dict[str, Any] = {}
 
     def connect(self) -> None:
         """Reads the parameters, subscribes to the sensors and advertises the services."""
@@ -61,7 +61,7 @@ class OctomapMonitor:
         self._frame = parameter("~octomap_frame")
         sensors, faults = read_sensors(parameter("~sensors"), parameter("~max_range"))
         for fault in faults:
-            rospy.logerr("%s: this sensor is left out of the octomap", fault)
+            rospy.logerr("%s: this sensor is ignored", fault)
         self._monitor.listeners.append(OctomapMarkers().show)
         rospy.Service(names.SAVE_MAP_SERVICE, SaveMap, self._save)
         rospy.Service(names.LOAD_MAP_SERVICE, LoadMap, self._load)
@@ -82,17 +82,17 @@ class OctomapMonitor:
         """Inserts one point cloud of a sensor into the map.
 
         Args:
-            frame: of the points.
-            stamp: when they were seen; robot and sensor are taken where they were then.
-            seen: the points.
-            make_filter: makes the filter of what the scene knows, from bodies and the sensor's position.
-            shadow: how far behind a known body a point still belongs to it [m].
+            frame: Frame of the points.
+            stamp: Time of the measurement, at which the poses of robot and sensor are looked up.
+            seen: Points in the sensor's frame.
+            make_filter: Function that builds the self filter from bodies and the sensor's position.
+            shadow: Maximum distance of a point behind a known body that still belongs to the body [m].
 
         Returns:
-            Which of the points that ended within range lie on the robot or on known objects (n,).
+            Whether each point within range lies on the robot or on a known object, shape (n,).
 
         Raises:
-            PlanningError: where the sensor or the robot was is not known, or the map changes all the time.
+            PlanningError: The pose of sensor or robot is unknown, or the map changes too often.
         """
         positions = self._monitor.positions_at(stamp.to_sec(), WAIT_S)
         sensor = self._pose_in_planning_frame(frame, stamp, positions)
@@ -111,12 +111,12 @@ class OctomapMonitor:
                 return hidden
         raise PlanningError(
             ErrorCode.FAILURE,
-            f"octomap: it changed during each of {ATTEMPTS} attempts to put a look "
-            "into it; change it less often, or use larger voxels (octomap_resolution)",
+            f"octomap: the map changed during each of {ATTEMPTS} attempts to insert a point cloud; "
+            "change the map less often, or use larger voxels (octomap_resolution)",
         )
 
     def _map(self, scene: PlanningScene, pose: Transform) -> VoxelMap:
-        """The scene's map to update; an empty one if it has none, or one of another frame or resolution."""
+        """Returns the scene's map, or an empty map if frame or resolution differ or the scene has no map."""
         voxels = voxels_of(scene)
         if (
             voxels is None
@@ -128,44 +128,48 @@ class OctomapMonitor:
         return voxels
 
     def _replace(self, base: PlanningScene, voxels: VoxelMap, pose: Transform) -> bool:
-        """Puts a map that was made from one scene into the scene of now.
+        """Inserts an updated map into the current scene; bodies added meanwhile are freed in the map afterwards.
+
+        Args:
+            base: Scene that the map was made from.
+            voxels: Updated map.
+            pose: Pose of the map in the planning frame.
 
         Returns:
-            False when the map has changed meanwhile. A map that was cleared meanwhile stays cleared: what was seen
-            before that is of no interest. Bodies that are new meanwhile are taken out of the map afterwards.
+            False if the map has changed meanwhile; a map cleared meanwhile stays cleared and counts as success.
         """
         octree = Octree(voxels)
         if len(octree.centers):
-            octree.geometry  # noqa: B018 - built here, where nobody waits for it
-        done = []
+            octree.geometry  # noqa: B018 - built here, so that planning requests need not wait
+        is_done = []
 
         def change(scene: PlanningScene) -> PlanningScene:
             cleared = scene.octomap is None and base.octomap is not None
             same = scene.octomap is base.octomap
             if scene.objects is not base.objects or scene.attached is not base.attached:
-                self._known = {}
-            done.append(cleared or same)
+                self._known_bodies = {}
+            is_done.append(cleared or same)
             return scene.with_octomap(octree, pose) if same else scene
 
         self._monitor.apply(change)
-        return done[0]
+        return is_done[0]
 
     def free_new_objects(self, scene: PlanningScene) -> None:
-        """Frees the voxels of bodies that the scene now knows as objects."""
+        """Frees the voxels inside objects that are new in the scene."""
         bodies = {**scene.objects, **scene.attached}
-        fresh = [name for name, body in bodies.items() if self._known.get(name) is not body]
-        self._known = bodies
+        new_objects = [name for name, body in bodies.items() if self._known_bodies.get(name) is not body]
+        self._known_bodies = bodies
         voxels = voxels_of(scene)
-        if not fresh or voxels is None or scene.octomap is None:
+        if not new_objects or voxels is None or scene.octomap is None:
             return
-        things = bodies_in_scene(scene, scene.positions)[len(scene.model.link_geometries) :]
-        known = self_filter_of(self._regions, things, 1.0, voxels.resolution * np.sqrt(0.75))
+        objects = bodies_in_scene(scene, scene.positions)[len(scene.model.link_geometries) :]
+        known = self_filter_of(self._regions, objects, 1.0, voxels.resolution * np.sqrt(0.75))
         centers = scene.octomap.shapes[0][0].centers  # type: ignore[attr-defined]
         points = centers @ scene.octomap.pose.rotation.T + scene.octomap.pose.translation
-        inside = known.hides(points, np.zeros(3))
-        if not inside.any():
+        is_inside = known.hides(points, np.zeros(3))
+        if not is_inside.any():
             return
-        keys, resolution = voxels.occupied_keys[inside], voxels.resolution
+        keys, resolution = voxels.occupied_keys[is_inside], voxels.resolution
 
         def change(now: PlanningScene) -> PlanningScene:
             newest = voxels_of(now)
@@ -184,26 +188,26 @@ class OctomapMonitor:
         import tf2_ros
 
         try:
-            found = self._transforms.lookup_transform(model.planning_frame, frame, stamp, rospy.Duration(WAIT_S))
+            stamped = self._transforms.lookup_transform(model.planning_frame, frame, stamp, rospy.Duration(WAIT_S))
         except tf2_ros.TransformException as error:
             raise PlanningError(
                 ErrorCode.FRAME_TRANSFORM_FAILURE,
-                f"sensor data in frame '{frame}': waited {WAIT_S} s "
-                f"for its transform to '{model.planning_frame}' at {stamp.to_sec():.3f} s ({error}); "
-                "is it published on tf?",
+                f"sensor data in frame '{frame}': no transform to '{model.planning_frame}' at "
+                f"{stamp.to_sec():.3f} s after {WAIT_S} s ({error}); "
+                "is the transform published on tf?",
             ) from error
-        t, q = found.transform.translation, found.transform.rotation
+        t, q = stamped.transform.translation, stamped.transform.rotation
         return make_transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w), f"transform of '{frame}'")
 
     def _save(self, request: Any) -> SaveMapResponse:
         voxels = voxels_of(self._monitor.snapshot())
         try:
             if voxels is None:
-                raise OSError("the planning scene has no octomap; save one after a sensor has seen something")
+                raise OSError("the planning scene has no octomap; save after sensor data has been inserted")
             write_file(Path(request.filename), voxels)
         except OSError as error:
             rospy.logerr(
-                "%s: '%s' cannot be written: %s", rospy.resolve_name(names.SAVE_MAP_SERVICE), request.filename, error
+                "%s: cannot write '%s': %s", rospy.resolve_name(names.SAVE_MAP_SERVICE), request.filename, error
             )
             return SaveMapResponse(success=False)
         return SaveMapResponse(success=True)
@@ -220,12 +224,12 @@ class OctomapMonitor:
 
 
 def _compile_loops() -> None:
-    """Inserts a point into an empty map, so that the first message of a sensor need not wait for the compiler."""
-    here, point = np.zeros(3), np.ones((1, 3))
-    empty_map(DEFAULT_RESOLUTION).with_point_cloud(here, point, point, point)
-    SelfFilter(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, here)
+    """Compiles the kernels by inserting a point into an empty map, so that the first sensor message need not wait."""
+    origin, point = np.zeros(3), np.ones((1, 3))
+    empty_map(DEFAULT_RESOLUTION).with_point_cloud(origin, point, point, point)
+    SelfFilter(np.zeros((1, 4)), np.zeros((0, 4)), np.zeros(2, np.int64)).hides(point, origin)
 
 
 def _into(pose: Transform, points: Array) -> Array:
-    """Points (n, 3) of the outer frame in the frame whose pose is given."""
+    """Transforms points, shape (n, 3), into the frame with the given pose."""
     return np.asarray((points - pose.translation) @ pose.rotation)

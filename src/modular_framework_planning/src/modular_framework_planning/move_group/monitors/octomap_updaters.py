@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inserts depth images and point clouds into the octomap: MoveIt's two octomap updaters."""
+"""MoveIt's two octomap updaters, which insert depth images and point clouds into the octomap."""
 
 from __future__ import annotations
 
@@ -34,36 +34,36 @@ class InsertPointCloud(Protocol):
     def __call__(
         self, frame: str, stamp: rospy.Time, seen: SeenPoints, make_filter: FilterMaker, shadow: float = 0.0
     ) -> Array:
-        """Returns which of the points lie on the robot or on known objects."""
+        """Returns whether each point lies on the robot or on a known object."""
         ...
 
 
 class _Updater(ABC):
-    """Processes messages in a thread of its own; when it is late, the oldest are dropped."""
+    """Processes messages in a separate thread; the oldest messages are dropped if the queue is full."""
 
-    def __init__(self, settings: SensorSettings, insert: InsertPointCloud, waiting: int) -> None:
+    def __init__(self, settings: SensorSettings, insert: InsertPointCloud, queue_size: int) -> None:
         self._settings: Any = settings
         self._insert = insert
-        self._messages: deque[Any] = deque(maxlen=waiting)
+        self._messages: deque[Any] = deque(maxlen=queue_size)
         self._arrived = threading.Event()
-        self._last = rospy.Time()
+        self._last_accepted = rospy.Time()
         self._filtered: Any = None
 
     def _connect(self, topic: str, kind: Any, filtered_kind: Any) -> None:
         if self._settings.filtered_cloud_topic:
             name = "/".join(part for part in (self._settings.ns, self._settings.filtered_cloud_topic) if part)
             self._filtered = rospy.Publisher(f"~{name}", filtered_kind, queue_size=2)
-        rospy.Subscriber(topic, kind, self._take, queue_size=2, buff_size=1 << 24)
+        rospy.Subscriber(topic, kind, self._enqueue, queue_size=2, buff_size=1 << 24)
         threading.Thread(target=self._run, name=f"octomap from {topic}", daemon=True).start()
 
-    def _take(self, message: Any) -> None:
+    def _enqueue(self, message: Any) -> None:
         now = rospy.Time.now()
         rate = self._settings.max_update_rate
-        if now < self._last:  # the clock was set back
-            self._last = rospy.Time()
-        if rate and (now - self._last).to_sec() <= 1.0 / rate:
+        if now < self._last_accepted:  # clock reset
+            self._last_accepted = rospy.Time()
+        if rate and (now - self._last_accepted).to_sec() <= 1.0 / rate:
             return
-        self._last = now
+        self._last_accepted = now
         self._messages.append(message)
         self._arrived.set()
 
@@ -77,8 +77,8 @@ class _Updater(ABC):
                 try:
                     self._process(message)
                 except PlanningError as error:
-                    rospy.logwarn_throttle(5.0, "octomap: a look is left out: %s", error.reason)
-                except rospy.ROSException as error:  # the node is going down
+                    rospy.logwarn_throttle(5.0, "octomap: a sensor message is ignored: %s", error.reason)
+                except rospy.ROSException as error:  # shutdown
                     rospy.logdebug("octomap: %s", error)
 
     @abstractmethod
@@ -87,13 +87,13 @@ class _Updater(ABC):
 
 
 class PointCloudUpdater(_Updater):
-    """Subscribes to a PointCloud2; publishes the points that are neither robot nor known object."""
+    """Subscribes to a PointCloud2 and publishes the points that lie neither on the robot nor on known objects."""
 
     def __init__(self, settings: PointCloudSettings, insert: InsertPointCloud) -> None:
         super().__init__(settings, insert, 1)
 
     def connect(self) -> None:
-        """Subscribes."""
+        """Subscribes to the point cloud."""
         self._connect(self._settings.point_cloud_topic, PointCloud2, PointCloud2)
 
     def _process(self, message: PointCloud2) -> None:
@@ -110,16 +110,16 @@ class PointCloudUpdater(_Updater):
 
 
 class DepthImageUpdater(_Updater):
-    """Subscribes to a depth image and the camera_info beside it; publishes the image without robot and objects."""
+    """Subscribes to a depth image and its camera_info, and publishes the image without robot and known objects."""
 
     def __init__(self, settings: DepthImageSettings, insert: InsertPointCloud) -> None:
         super().__init__(settings, insert, settings.queue_size)
         self._camera: Pinhole | None = None
 
     def connect(self) -> None:
-        """Subscribes."""
-        beside = rospy.resolve_name(self._settings.image_topic).rsplit("/", 1)[0]
-        rospy.Subscriber(f"{beside}/camera_info", CameraInfo, self._on_info, queue_size=1)
+        """Subscribes to image and camera_info."""
+        namespace = rospy.resolve_name(self._settings.image_topic).rsplit("/", 1)[0]
+        rospy.Subscriber(f"{namespace}/camera_info", CameraInfo, self._on_info, queue_size=1)
         self._connect(self._settings.image_topic, Image, Image)
 
     def _on_info(self, message: CameraInfo) -> None:
@@ -133,7 +133,7 @@ class DepthImageUpdater(_Updater):
         if self._camera is None:
             rospy.logwarn_throttle(
                 5.0,
-                "octomap: no usable camera_info beside '%s' yet; its images are left out",
+                "octomap: no valid camera_info for '%s' yet; images are ignored",
                 rospy.resolve_name(s.image_topic),
             )
             return
@@ -157,9 +157,9 @@ class DepthImageUpdater(_Updater):
             s.shadow_threshold,
         )
         if self._filtered is not None:
-            kept = np.zeros(depth.size)
-            kept[seen.pixels[~hidden]] = depth.ravel()[seen.pixels[~hidden]]
-            data = np.clip(np.round(kept * 1000.0), 0, 65535).astype("<u2").tobytes()
+            filtered = np.zeros(depth.size)
+            filtered[seen.pixels[~hidden]] = depth.ravel()[seen.pixels[~hidden]]
+            data = np.clip(np.round(filtered * 1000.0), 0, 65535).astype("<u2").tobytes()
             self._filtered.publish(
                 Image(
                     header=message.header,
@@ -173,7 +173,7 @@ class DepthImageUpdater(_Updater):
 
 
 def _cloud_message(header: Any, points: Any) -> PointCloud2:
-    fields = [PointField(name, 4 * number, PointField.FLOAT32, 1) for number, name in enumerate("xyz")]
+    fields = [PointField(name, 4 * index, PointField.FLOAT32, 1) for index, name in enumerate("xyz")]
     data = np.ascontiguousarray(points, dtype=FLOAT_POINT).tobytes()
     return PointCloud2(header, 1, len(points), fields, False, 12, 12 * len(points), data, True)
 

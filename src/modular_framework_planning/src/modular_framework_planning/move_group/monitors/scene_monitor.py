@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps the current planning scene: changes arrive by service and topic, joints by joint_states, a base by tf."""
+"""The current planning scene, updated by services, topics, joint_states and tf."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ from modular_framework_ros.calls import CallError
 from modular_framework_ros.simulated_time import SimulatedTime
 
 STATE_PERIOD_S = 0.02
-"""Simulated time that passes from one joint state to the next that is waited for, where time is held [s]."""
+"""Simulated time between two joint states to wait for if simulated time is held [s]."""
 
 
 class SceneMonitor:
-    """Owns the scene: all changes are made here, and readers get immutable snapshots.
+    """Owns the scene; all changes are made here, and readers get immutable snapshots.
 
-    A thread of its own publishes what changed and calls the listeners, so that nobody waits for large messages; changes
-    that follow each other closely are published as one.
+    A separate thread publishes changes and calls the listeners, so that callers do not wait for large messages. Changes
+    in quick succession are published together.
 
     Subscribes: joint_states, planning_scene, planning_scene_world, collision_object, attached_collision_object, tf.
-    Publishes: ~monitored_planning_scene: to each new subscriber the whole scene, to all the changes, among them the
-    joint positions and frames of tf while they change, as often as `settings` say at most.
+    Publishes: ~monitored_planning_scene, the whole scene to each new subscriber, then the changes. Changes of joint
+    positions and tf frames are published at most at the rate in `settings`.
     Parameters: those of `settings`, below ~planning_scene_monitor.
     """
 
@@ -55,16 +55,16 @@ class SceneMonitor:
         self._scene = empty_scene(model).with_padding(padding)
         self._lock = threading.RLock()
         self._positions = model.default_positions()
-        self._base_is_seen = False  # tf has shown where a planar or floating base is
+        self._base_is_seen = False  # whether tf has shown the pose of a planar or floating base
         self._history = JointHistory(model.continuous)
         self._stamps: dict[int, rospy.Time] = {}
         self._arrivals = 0
         self._latest: rospy.Time | None = None
         self.time = SimulatedTime()
         self._arrived = threading.Condition()
-        base = set(model.base.variables if model.base else ())  # joint_states does not have it
-        needless = model.follower_joints | base
-        self._needed = [number for number, name in enumerate(model.joint_names) if name not in needless]
+        base = set(model.base.variables if model.base else ())  # not part of joint_states
+        optional = model.follower_joints | base
+        self._required = [index for index, name in enumerate(model.joint_names) if name not in optional]
         self.listeners: list[Callable[[PlanningScene], None]] = []
         self._publisher: Any = None
         self._published_scene = self._scene
@@ -73,7 +73,7 @@ class SceneMonitor:
         self._scene_changed = threading.Event()
 
     def connect(self) -> None:
-        """Starts to listen and to publish."""
+        """Subscribes to the topics and starts publishing."""
         self._frames.connect()
         self._published_scene = self.snapshot()
         self._publisher = rospy.Publisher(
@@ -90,13 +90,13 @@ class SceneMonitor:
         threading.Thread(target=self._publish_changes, name="planning scene", daemon=True).start()
 
     def publish_to_new_subscriber(self, publish: Callable[[Any], None]) -> None:
-        """Publishes the scene that the others know to a new subscriber; under the lock, so that no change is lost."""
+        """Sends the last published scene to a new subscriber; holds the lock so that no change is lost."""
         with self._publish_lock:
             if self.settings.publish_planning_scene:
                 publish(scene_message(self._published_scene, 0))
 
     def _publish_changes(self) -> None:
-        """Publishes changes of the scene at once, and of joints and frames at the configured rate."""
+        """Publishes changes of objects at once, and changes of joints and frames at the configured rate."""
         while not rospy.is_shutdown():
             settings = self.settings
             changed = self._scene_changed.wait(1.0 / settings.publish_planning_scene_hz)
@@ -108,13 +108,13 @@ class SceneMonitor:
                 self._publish(scene, settings)
                 for listener in self.listeners if changed else ():
                     listener(scene)
-            except rospy.ROSException as error:  # the node is going down
-                rospy.logdebug("the change of the planning scene was not published: %s", error)
-            except Exception:  # what one change does to one listener must not keep the next ones from all
+            except rospy.ROSException as error:  # shutdown
+                rospy.logdebug("a change of the planning scene was not published: %s", error)
+            except Exception:  # an error in one listener must not stop later updates
                 rospy.logerr("a change of the planning scene was not published:\n%s", traceback.format_exc())
 
     def _publish(self, scene: PlanningScene, settings: SceneMonitorSettings) -> None:
-        """Publishes the wanted parts of what changed, or everything where publishing was switched off before."""
+        """Publishes the enabled kinds of changes, or the whole scene after publishing was disabled."""
         with self._publish_lock:
             has_subscribers = settings.publish_planning_scene and self._publisher.get_num_connections() > 0
             if not has_subscribers:
@@ -139,10 +139,10 @@ class SceneMonitor:
         except PlanningError as error:
             rospy.logerr("%s: message ignored: %s", rospy.resolve_name(topic), error.reason)
         except (ValueError, TypeError, IndexError) as error:
-            rospy.logerr("%s: message ignored, it is malformed: %s", rospy.resolve_name(topic), error)
+            rospy.logerr("%s: malformed message ignored: %s", rospy.resolve_name(topic), error)
 
     def apply(self, change: SceneChange) -> PlanningScene:
-        """Changes the scene, all or nothing; the next snapshot has the change. Raises PlanningError."""
+        """Applies a change atomically and returns the new scene; raises PlanningError."""
         frames, base = self._frames.now(), self._frames.base()
         with self._lock:
             self._follow_base(base)
@@ -155,7 +155,7 @@ class SceneMonitor:
         return scene
 
     def _follow_base(self, transform: Transform | None) -> None:
-        """Puts the base where tf shows it; until it does, it is where the last change of the scene put it."""
+        """Moves the base to its pose from tf; without tf, the base stays where the scene last placed it."""
         if transform is not None:
             self._positions, self._base_is_seen = self.model.with_base(self._positions, transform), True
 
@@ -185,22 +185,26 @@ class SceneMonitor:
             self._arrived.notify_all()
 
     def positions_at(self, stamp_s: float, timeout_s: float) -> Any:
-        """Returns the joint positions [rad or m] at a time, waiting for them if they are still to come.
+        """Returns the joint positions at a time [rad or m], waiting for joint_states if necessary.
+
+        Args:
+            stamp_s: ROS time [s].
+            timeout_s: Maximum wall time to wait [s].
 
         Raises:
-            PlanningError: they were not received in time, or the time is too long ago.
+            PlanningError: The positions did not arrive in time, or the time is too long ago.
         """
         with self._arrived:
-            self._arrived.wait_for(lambda: self._history.covers(stamp_s), timeout_s)
+            self._arrived.wait_for(lambda: self._history.has_reached(stamp_s), timeout_s)
         with self._lock:
-            return self._history.at(stamp_s)
+            return self._history.positions_at(stamp_s)
 
     def missing_joints(self) -> list[str]:
-        """Returns joints never received on joint_states (mimic and passive ones are not needed)."""
-        return [self.model.joint_names[number] for number in self._needed if number not in self._stamps]
+        """Returns the joints never received on joint_states; mimic and passive joints are optional."""
+        return [self.model.joint_names[index] for index in self._required if index not in self._stamps]
 
     def wait_for_state(self, timeout_s: float = 3.0) -> None:
-        """Waits until every joint was received; raises PlanningError naming those that were not."""
+        """Waits until every required joint was received; raises PlanningError naming missing joints."""
         deadline = time.monotonic() + timeout_s
         while self.missing_joints():
             remaining = deadline - time.monotonic()
@@ -217,10 +221,10 @@ class SceneMonitor:
         self._warn_of_unseen_base()
 
     def catch_up(self) -> None:
-        """Where simulated time is held: waits until objects and joints are those of the time at which it stands.
+        """Waits, if simulated time is held, until objects and joints of the held time have arrived.
 
         Raises:
-            PlanningError: they did not come.
+            PlanningError: Timeout.
         """
         try:
             self.time.catch_up(lambda: self._latest)
@@ -228,14 +232,14 @@ class SceneMonitor:
             raise PlanningError(ErrorCode.ROBOT_STATE_STALE, str(error)) from error
 
     def _warn_of_unseen_base(self) -> None:
-        """Warns where tf does not show a planar or floating base; as in MoveIt that stops no plan."""
+        """Warns if tf does not show a planar or floating base; as in MoveIt, planning continues."""
         joint = self.model.base
         if joint is None or joint.name in self.model.semantics.passive_joints or self._frames.base() is not None:
             return
         rospy.logwarn_throttle(
             30.0,
-            "tf has no transform from '%s' to '%s' (%s virtual joint '%s' of the SRDF): the robot is taken to be where "
-            "the planning scene last put it, at first at the origin; publish the transform, or place the robot by "
+            "tf has no transform from '%s' to '%s' (%s virtual joint '%s' of the SRDF): the planning scene's last pose "
+            "of the robot is used, initially the origin; publish the transform, or place the robot by "
             "multi_dof_joint_state",
             joint.parent_frame,
             joint.child_link,
@@ -244,20 +248,20 @@ class SceneMonitor:
         )
 
     def wait_for_next_state(self, timeout_s: float) -> bool:
-        """Waits for one more joint_states message; false when none came in time.
+        """Waits for the next joint_states message; returns False on timeout.
 
-        Where simulated time may be held, lets a little of it pass, and waits for the state after that.
+        If simulated time can be held, the method lets STATE_PERIOD_S of it pass and waits for the state after that.
         """
         if self.time.enabled:
             self.time.sleep(STATE_PERIOD_S)
             self.catch_up()
             return True
         with self._arrived:
-            seen = self._arrivals
-            return self._arrived.wait_for(lambda: self._arrivals > seen, timeout_s)
+            previous = self._arrivals
+            return self._arrived.wait_for(lambda: self._arrivals > previous, timeout_s)
 
     def snapshot(self) -> PlanningScene:
-        """Returns the scene as it is now, with the robot and the frames of tf where they are now."""
+        """Returns the current scene with the current state of the robot and tf frames."""
         frames, base = self._frames.now(), self._frames.base()
         with self._lock:
             self._follow_base(base)
@@ -285,5 +289,5 @@ class _NewSubscriberListener(rospy.SubscribeListener):
         self._monitor = monitor
 
     def peer_subscribe(self, _topic: str, _publish: Any, peer_publish: Callable[[Any], None]) -> None:
-        """Called by rospy with a function that publishes to the new subscriber alone."""
+        """Sends the scene through rospy's function that publishes to the new subscriber only."""
         self._monitor.publish_to_new_subscriber(peer_publish)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames outside the robot that only tf has, such as a camera's or a map's, so that requests may use them."""
+"""Frames outside the robot that only tf knows, such as camera or map, for use in requests."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from modular_framework_planning.errors import PlanningError
 from modular_framework_planning.geometry.spatial import Transform, make_transform
 from modular_framework_planning.robot_model.robot_model import RobotModel
 
-SAME = 1.0e-9  # [m] and of the rotation's entries; a frame that moves by less has not moved
+SAME = 1.0e-9  # [m and rotation matrix entries]; smaller motions are ignored
 
 
 class TfFrames:
-    """Listens to tf; a frame keeps its last known transform. Threads may share it."""
+    """Thread-safe listener to tf that remembers the last transform of each frame."""
 
     def __init__(self, model: RobotModel) -> None:
         self._model = model
@@ -25,16 +25,16 @@ class TfFrames:
         self._known: dict[str, Transform] = {}
 
     def connect(self) -> None:
-        """Starts to listen."""
+        """Starts listening to tf."""
         buffer = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(buffer)
         self._buffer = buffer
 
     def now(self) -> Mapping[str, Transform]:
-        """Returns where the frames are in the planning frame; one that did not move is the same object as before."""
+        """Returns the frames' poses in the planning frame; an unmoved frame keeps its transform object."""
         if self._buffer is None:
             return self._known
-        names = set(self._buffer._getFrameStrings())  # tf2's Python interface has no other list of frames
+        names = set(self._buffer._getFrameStrings())  # tf2's Python interface has no public list of frames
         model, known = self._model, self._known
         fresh = {}
         for name in names - model.frame_ids.keys() - {model.planning_frame}:
@@ -46,14 +46,14 @@ class TfFrames:
         return known
 
     def base(self) -> Transform | None:
-        """Returns where tf last saw the root link of a robot with a planar or floating virtual joint; None: nowhere."""
+        """Returns the last tf pose of the root link below a planar or floating virtual joint, or None."""
         joint = self._model.base
         if self._buffer is None or joint is None:
             return None
         return self._lookup(joint.parent_frame, joint.child_link)
 
     def _lookup(self, base: str, name: str) -> Transform | None:
-        """Returns the last known transform of a frame; None where no chain of transforms leads to it."""
+        """Returns the last known transform of a frame, or None if the frames are not connected."""
         try:
             found = self._buffer.lookup_transform_core(base, name, rospy.Time(0)).transform
             t, q = found.translation, found.rotation
