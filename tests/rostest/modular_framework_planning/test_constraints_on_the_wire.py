@@ -177,7 +177,7 @@ OLD_KIND = in_box(
         (Constraints(visibility_constraints=[VisibilityConstraint()]), CODES.INVALID_GOAL_CONSTRAINTS, "visibility"),
         (Constraints(position_constraints=[EMPTY]), CODES.INVALID_GOAL_CONSTRAINTS, "is empty"),
         (Constraints(position_constraints=[NO_POSE]), CODES.INVALID_GOAL_CONSTRAINTS, "0 poses"),
-        (Constraints(position_constraints=[OLD_KIND]), CODES.INVALID_GOAL_CONSTRAINTS, "type 9; allowed are 1 box"),
+        (Constraints(position_constraints=[OLD_KIND]), CODES.INVALID_GOAL_CONSTRAINTS, "type 9; allowed types: 1 box"),
         (
             Constraints(position_constraints=[in_box(NAN, 0, 1, (0.1, 0.1, 0.1))]),
             CODES.INVALID_GOAL_CONSTRAINTS,

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Conversions between ROS messages and the planner's own types; nothing below this package imports a message."""
+"""Conversions between ROS messages and the planner's own types; packages below import no messages."""

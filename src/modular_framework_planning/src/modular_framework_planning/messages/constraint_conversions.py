@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads moveit_msgs/Constraints; invalid ones are errors, never replaced by guesses."""
+"""Reader for moveit_msgs/Constraints; invalid constraints are errors and never replaced by guesses."""
 
 from __future__ import annotations
 
@@ -47,20 +47,20 @@ def constraints_from_message(
     """Reads a Constraints message.
 
     Args:
-        scene: gives frames their poses; those on the robot keep moving with it.
-        message: a moveit_msgs/Constraints.
-        where: what the message belongs to, for error texts.
-        code: result code for constraints that have no meaning.
-        tip: link that constraints without a link_name are for.
+        scene: Scene with the poses of frames; frames on the robot move with the robot.
+        message: moveit_msgs/Constraints.
+        where: Name of the message field, for error messages.
+        code: Error code for invalid constraints.
+        tip: Link for constraints without a link_name.
 
     Raises:
-        PlanningError: a visibility constraint, a name that does not exist, a number that is not finite, a tolerance
-            below 0, a rotation of no length, a region without a shape.
+        PlanningError: A visibility constraint, unknown name, non-finite number, negative tolerance, zero quaternion or
+            empty region.
     """
     if message.visibility_constraints:
         raise PlanningError(
             code,
-            f"{where}: {len(message.visibility_constraints)} visibility constraints; they are "
+            f"{where}: {len(message.visibility_constraints)} visibility constraints, which are "
             "not supported; use joint, position or orientation constraints",
         )
     reader = _Reader(scene, code, tip)
@@ -85,15 +85,22 @@ def constraints_from_message(
 def evaluated_one_by_one(
     scene: PlanningScene, message: Any, where: str, tip: str
 ) -> tuple[list[ConstraintResult], list[str]]:
-    """Returns what each constraint says of the scene's state, and why some are refused.
+    """Evaluates each constraint at the scene's state; an invalid constraint counts as violated at infinite distance.
 
-    A refused one, of any kind, is not satisfied and infinitely far off; the results are in the order of
-    `KinematicConstraints.evaluate`, visibility constraints last.
+    Args:
+        scene: Scene with the state.
+        message: moveit_msgs/Constraints.
+        where: Name of the message field, for error messages.
+        tip: Link for constraints without a link_name.
+
+    Returns:
+        The results in the order of `KinematicConstraints.evaluate`, visibility constraints last, and a message for each
+        invalid constraint.
     """
     results, faults = [], []
     for kind in ("joint", "position", "orientation", "visibility"):
-        for number, item in enumerate(getattr(message, f"{kind}_constraints")):
-            source = f"{where}.{kind}_constraints[{number}]"
+        for index, item in enumerate(getattr(message, f"{kind}_constraints")):
+            source = f"{where}.{kind}_constraints[{index}]"
             try:
                 alone = constraints_from_message(scene, Constraints(**{f"{kind}_constraints": [item]}), where, tip=tip)
                 results += alone.evaluate(scene.positions)
@@ -106,15 +113,15 @@ def evaluated_one_by_one(
 
 
 def result_messages(results: Sequence[ConstraintResult]) -> list[ConstraintEvalResult]:
-    """Writes one message a constraint, in the order of `KinematicConstraints.evaluate`."""
+    """Returns one message per constraint, in the order of the results."""
     return [ConstraintEvalResult(result=item.satisfied, distance=item.distance) for item in results]
 
 
 def frame_on_robot(scene: PlanningScene, name: str) -> FrameOnRobot:
-    """Returns a frame as something that moves with the robot (links, attached objects) or stays (all others).
+    """Returns a frame that moves with the robot (link, attached object) or is fixed (any other frame).
 
     Raises:
-        UnknownNameError: no such frame.
+        UnknownNameError: The frame does not exist.
     """
     name = name.removeprefix("/")
     pose = scene.frame_transform(name)
@@ -127,7 +134,7 @@ def frame_on_robot(scene: PlanningScene, name: str) -> FrameOnRobot:
 
 
 def holding_link(scene: PlanningScene, name: str) -> str:
-    """Returns the link a frame is fixed to: the link of that name, or the one that holds the object; else empty."""
+    """Returns the link that a frame is fixed to: the link itself, or the link that holds the object; else empty."""
     if scene.model.has_link(name):
         return name
     if name in scene.objects:
@@ -155,12 +162,12 @@ class _Reader:
 
     def _tolerance(self, where: str, name: str, value: float) -> float:
         if not value >= 0.0:
-            raise PlanningError(self._code, f"{where}: {name} is {value}; it must be 0 or more")
+            raise PlanningError(self._code, f"{where}: {name} is {value}; give a number of at least 0")
         return float(value)
 
     def _weight(self, where: str, value: float) -> float:
         self._finite(where, weight=value)
-        return float(value) if value > np.finfo(float).eps else 1.0  # as in MoveIt: a weight left at 0 counts as 1
+        return float(value) if value > np.finfo(float).eps else 1.0  # as in MoveIt, an unset weight counts as 1
 
     def joint(self, message: Any, where: str) -> JointConstraint:
         """Reads a JointConstraint."""
@@ -168,17 +175,17 @@ class _Reader:
         if message.joint_name not in model.index:
             raise UnknownNameError(self._code, f"{where}: joint", message.joint_name, model.joint_names)
         self._finite(where, position=message.position)
-        number = model.index[message.joint_name]
-        target = min(max(message.position, model.lower[number]), model.upper[number])
+        index = model.index[message.joint_name]
+        target = min(max(message.position, model.lower[index]), model.upper[index])
         if abs(target - message.position) > GOAL_BOUNDS_TOLERANCE:
-            target = message.position  # the user of the constraint reports that it cannot be satisfied
+            target = message.position  # callers report that this constraint cannot be satisfied
         return JointConstraint(
             message.joint_name,
-            number,
+            index,
             float(target),
             self._tolerance(where, "tolerance_below", message.tolerance_below),
             self._tolerance(where, "tolerance_above", message.tolerance_above),
-            model.is_continuous(number),
+            model.is_continuous(index),
             self._weight(where, message.weight),
         )
 
@@ -212,24 +219,24 @@ class _Reader:
             if len(shapes) != len(poses):
                 raise PlanningError(
                     self._code,
-                    f"{where}: {len(shapes)} {kind} shapes and {len(poses)} poses; one pose a shape is needed",
+                    f"{where}: {len(shapes)} {kind} shapes and {len(poses)} poses; give one pose per shape",
                 )
-            for number, (shape, pose) in enumerate(zip(shapes, poses, strict=True)):
-                source = f"{where} {kind} {number}"
+            for index, (shape, pose) in enumerate(zip(shapes, poses, strict=True)):
+                source = f"{where} {kind} {index}"
                 regions.append((self._solid(shape, source), self._region_pose(shape, pose, source)))
         if not regions:
             raise PlanningError(self._code, f"{where} is empty; give at least one primitive or mesh with its pose")
         return tuple(regions)
 
     def _region_pose(self, shape: Any, pose: Any, where: str) -> Transform:
-        """Reads a region's pose; an unset rotation is the identity, as in MoveIt, without a warning for a sphere."""
+        """Reads a region's pose; as in MoveIt, an unset rotation is the identity (without warning for spheres)."""
         p, q = pose.position, pose.orientation
         rotation = (q.x, q.y, q.z, q.w)
-        is_ball = getattr(shape, "type", 0) == SolidPrimitive.SPHERE
+        is_sphere = getattr(shape, "type", 0) == SolidPrimitive.SPHERE
         try:
             return make_transform(
                 (p.x, p.y, p.z),
-                IDENTITY_XYZW if is_ball and not any(rotation) else quaternion_or_identity(rotation, where),
+                IDENTITY_XYZW if is_sphere and not any(rotation) else quaternion_or_identity(rotation, where),
                 where,
             )
         except GeometryError as error:
@@ -240,10 +247,10 @@ class _Reader:
             if hasattr(shape, "vertices"):
                 return HullSolid(np.array([(p.x, p.y, p.z) for p in shape.vertices], dtype=float))
             if shape.type not in PRIMITIVES:
-                raise GeometryError(f"type {shape.type}; allowed are 1 box, 2 sphere, 3 cylinder, 4 cone")
+                raise GeometryError(f"type {shape.type}; allowed types: 1 box, 2 sphere, 3 cylinder, 4 cone")
             build, count = PRIMITIVES[shape.type]
             if len(shape.dimensions) < count:
-                raise GeometryError(f"type {shape.type} with {len(shape.dimensions)} dimensions; {count} are needed")
+                raise GeometryError(f"type {shape.type} with {len(shape.dimensions)} dimensions; give {count}")
             return build(*(float(value) for value in shape.dimensions[:count]))
         except GeometryError as error:
             raise PlanningError(self._code, f"{where}: {error.reason}") from error
@@ -260,7 +267,7 @@ class _Reader:
         if message.parameterization not in known:
             raise PlanningError(
                 self._code,
-                f"{where}: parameterization {message.parameterization}; allowed are "
+                f"{where}: parameterization {message.parameterization}; allowed values: "
                 + ", ".join(f"{item.value} {item.name}" for item in Parameterization),
             )
         tolerances = [

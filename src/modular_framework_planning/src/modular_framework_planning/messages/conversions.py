@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Conversions between messages and the planner's own types: states, goals and trajectories."""
+"""Conversions of states, goals and trajectories between messages and the planner's own types."""
 
 from __future__ import annotations
 
@@ -35,15 +35,21 @@ BODY_TYPES = {LINK: 0, WORLD: 1, ATTACHED: 2}
 
 
 def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[float], where: str) -> dict[str, float]:
-    """Pairs names and positions; fixed joints are left out.
+    """Returns positions by joint name, without fixed joints.
+
+    Args:
+        model: Robot model.
+        names: Joint names.
+        positions: Position of each joint [rad or m].
+        where: Name of the message field, for error messages.
 
     Raises:
-        PlanningError: lengths differ, a joint does not exist, or a value is not finite.
+        PlanningError: The lengths differ, a joint is unknown, or a value is not finite.
     """
     if len(names) != len(positions):
         raise PlanningError(
             ErrorCode.INVALID_ROBOT_STATE,
-            f"{where}: {len(names)} joint names and {len(positions)} positions; one position per name is needed",
+            f"{where}: {len(names)} joint names and {len(positions)} positions; give one position per name",
         )
     values = {}
     for name, position in zip(names, positions, strict=True):
@@ -53,7 +59,7 @@ def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[fl
             raise UnknownNameError(ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint", name, model.joint_names)
         if not np.isfinite(position):
             raise PlanningError(
-                ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint '{name}' is {position}; a finite number is needed"
+                ErrorCode.INVALID_ROBOT_STATE, f"{where}: joint '{name}' is {position}; give a finite number"
             )
         values[name] = float(position)
     return values
@@ -62,8 +68,13 @@ def joint_values(model: RobotModel, names: Sequence[str], positions: Sequence[fl
 def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robot state") -> PlanningScene:
     """Returns the scene with the robot in the state of a message.
 
-    Joints that are not named stay as they are, and so does a planar or floating base. A state that names joints and is
-    not a diff replaces the attached objects; otherwise those of the message are added.
+    Unnamed joints and an unnamed planar or floating base keep their positions. A state that names joints and is not a
+    diff replaces the attached objects; any other state adds its attached objects.
+
+    Args:
+        scene: Scene.
+        state: State message.
+        where: Name of the message field, for error messages.
     """
     if names_joints(state):
         values = joint_values(scene.model, state.joint_state.name, state.joint_state.position, where)
@@ -79,13 +90,20 @@ def scene_with_state(scene: PlanningScene, state: RobotState, where: str = "robo
 def state_message(
     scene: PlanningScene, positions: Array | None = None, with_attached: bool = True, with_geometry: bool = True
 ) -> RobotState:
-    """Writes joint positions (the scene's by default), where the base is, and attached objects."""
+    """Returns a state message with joint positions, base pose and attached objects.
+
+    Args:
+        scene: Scene.
+        positions: Joint positions of the whole robot [rad or m]; None for the scene's positions.
+        with_attached: Whether attached objects are included.
+        with_geometry: Whether the shapes of attached objects are included.
+    """
     message, model = RobotState(), scene.model
     values = scene.positions if positions is None else positions
     message.joint_state.header.frame_id = model.planning_frame
-    for number in single_joints(model, model.joint_names):
-        message.joint_state.name.append(model.joint_names[number])
-        message.joint_state.position.append(float(values[number]))
+    for index in single_joints(model, model.joint_names):
+        message.joint_state.name.append(model.joint_names[index])
+        message.joint_state.position.append(float(values[index]))
     message.multi_dof_joint_state = multi_dof_message(model, values)
     if with_attached:
         message.attached_collision_objects = [
@@ -97,12 +115,17 @@ def state_message(
 def goals_from_constraints(
     scene: PlanningScene, constraints: Sequence[Any], tip: str
 ) -> tuple[JointGoal | PoseGoal | ConstraintGoal, ...]:
-    """Reads goal_constraints; each entry is one alternative.
+    """Reads goal_constraints, a list of alternatives.
+
+    Args:
+        scene: Scene.
+        constraints: Messages of type moveit_msgs/Constraints.
+        tip: Link for constraints without a link_name.
 
     Raises:
-        PlanningError: an entry is empty or has no meaning.
+        PlanningError: An entry is empty or invalid.
     """
-    return tuple(_goal(scene, item, tip, f"goal_constraints[{number}]") for number, item in enumerate(constraints))
+    return tuple(_goal(scene, item, tip, f"goal_constraints[{index}]") for index, item in enumerate(constraints))
 
 
 def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | PoseGoal | ConstraintGoal:
@@ -131,20 +154,26 @@ def _goal(scene: PlanningScene, item: Any, tip: str, where: str) -> JointGoal | 
 def _without_passive_joints(
     scene: PlanningScene, constraints: KinematicConstraints, where: str
 ) -> KinematicConstraints:
-    """Returns the constraints without joints that nothing moves; says so where these are not where they should be."""
+    """Returns the constraints without passive joints; a violated constraint on a passive joint is logged."""
     passive = [item for item in constraints.joints if item.name in scene.model.passive_joints]
     for item in passive:
         result = item.evaluate(None, scene.positions)
         if not result.satisfied:
-            LOGGER.warning("%s: %s; it is passive, nothing moves it, and it stays there", where, result.text)
+            LOGGER.warning("%s: %s; the joint is passive and stays there", where, result.text)
     if not passive:
         return constraints
-    moved = [item for item in constraints.joints if item not in passive]
-    return KinematicConstraints(scene.model, moved, constraints.positions, constraints.orientations, constraints.name)
+    active = [item for item in constraints.joints if item not in passive]
+    return KinematicConstraints(scene.model, active, constraints.positions, constraints.orientations, constraints.name)
 
 
 def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
-    """Raises PlanningError unless the constraints are empty: a response that ignored them would be wrong."""
+    """Raises PlanningError if constraints are given where they are not supported.
+
+    Args:
+        where: Name of the message field, for error messages.
+        constraints: moveit_msgs/Constraints.
+        code: Error code.
+    """
     if any(
         (
             constraints.joint_constraints,
@@ -157,22 +186,22 @@ def refuse_constraints(where: str, constraints: Any, code: ErrorCode) -> None:
 
 
 def trajectory_message(trajectory: Trajectory, model: RobotModel) -> RobotTrajectory:
-    """Writes a trajectory with positions, velocities and accelerations; that of the base as a multi-DOF trajectory."""
+    """Returns a trajectory message; the motion of a planar or floating base is a multi-DOF trajectory."""
     message = RobotTrajectory()
     message.joint_trajectory.header.frame_id = model.planning_frame
     message.multi_dof_joint_trajectory = multi_dof_trajectory(model, trajectory)
     columns = single_joints(model, trajectory.joint_names)
-    message.joint_trajectory.joint_names = [trajectory.joint_names[number] for number in columns]
+    message.joint_trajectory.joint_names = [trajectory.joint_names[column] for column in columns]
     if not columns:
         return message
     message.joint_trajectory.points = [
         JointTrajectoryPoint(
             positions=row.tolist(),
-            velocities=speed.tolist(),
-            accelerations=change.tolist(),
-            time_from_start=genpy.Duration.from_sec(float(stamp)),
+            velocities=velocity.tolist(),
+            accelerations=acceleration.tolist(),
+            time_from_start=genpy.Duration.from_sec(float(time)),
         )
-        for stamp, row, speed, change in zip(
+        for time, row, velocity, acceleration in zip(
             trajectory.times,
             trajectory.positions[:, columns],
             trajectory.velocities[:, columns],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns a planned trajectory into the goals of single controllers: checked, split by joints, at another speed."""
+"""Conversion of a planned trajectory into goals of single controllers."""
 
 from __future__ import annotations
 
@@ -25,37 +25,38 @@ class MotionPart:
 
     @property
     def duration_s(self) -> float:
-        """Time of its last point."""
+        """Time of the last point [s]."""
         return float(self.trajectory.points[-1].time_from_start.to_sec())
 
 
 def check_trajectory(motion: JointTrajectory) -> None:
-    """Refuses trajectories no controller could follow; raises PlanningError."""
+    """Checks that a trajectory is well-formed; raises PlanningError."""
     count = len(motion.joint_names)
     if motion.points and not count:
         raise PlanningError(
             ErrorCode.INVALID_MOTION_PLAN,
-            f"trajectory: {len(motion.points)} points but no joint_names; name the joint of each position",
+            f"trajectory: {len(motion.points)} points, but joint_names is empty; name the joint of each position",
         )
-    before = -1.0
-    for number, point in enumerate(motion.points):
-        stamp = point.time_from_start.to_sec()
+    previous_s = -1.0
+    for index, point in enumerate(motion.points):
+        time_s = point.time_from_start.to_sec()
         if len(point.positions) != count or not np.isfinite(point.positions).all():
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
-                f"trajectory point {number}: {len(point.positions)} positions for {count} joints, all must be finite",
+                f"trajectory point {index}: {len(point.positions)} positions for {count} joints; "
+                "give one finite position per joint",
             )
-        if stamp <= before:
+        if time_s <= previous_s:
             raise PlanningError(
                 ErrorCode.INVALID_MOTION_PLAN,
-                f"trajectory point {number} at {stamp} s does not come "
-                f"after the one before at {before} s; times must strictly increase",
+                f"trajectory point {index} at {time_s} s does not come "
+                f"after the previous point at {previous_s} s; times must strictly increase",
             )
-        before = stamp
+        previous_s = time_s
 
 
 def split(motion: JointTrajectory, controllers: Sequence[ControllerSpec]) -> list[MotionPart]:
-    """Returns the part of every controller; joints none of them moves are left out."""
+    """Returns the part of the motion for each controller; joints without a controller are left out."""
     parts = []
     for spec in controllers:
         columns = [i for i, joint in enumerate(motion.joint_names) if joint in spec.joints]
@@ -80,7 +81,7 @@ def _columns(motion: JointTrajectory, columns: Collection[int]) -> JointTrajecto
 
 
 def at_speed(motion: JointTrajectory, factor: float) -> JointTrajectory:
-    """Returns the same motion, `factor` times as fast."""
+    """Returns the motion at `factor` times its speed."""
     if factor == 1.0:
         return motion
     faster = JointTrajectory(header=motion.header, joint_names=motion.joint_names)
@@ -98,15 +99,15 @@ def at_speed(motion: JointTrajectory, factor: float) -> JointTrajectory:
 
 
 def trajectory_goal(part: MotionPart) -> FollowJointTrajectoryGoal:
-    """Returns the goal of a trajectory controller, with the tolerances its configuration sets."""
+    """Returns the goal for a trajectory controller, with the controller's configured tolerances."""
     spec = part.controller
-    moved = set(part.trajectory.joint_names)
+    joints = set(part.trajectory.joint_names)
     goal = FollowJointTrajectoryGoal(trajectory=part.trajectory)
     goal.path_tolerance, goal.goal_tolerance = (
         [
             JointTolerance(item.joint, item.position, item.velocity, item.acceleration)
             for item in items
-            if item.joint in moved
+            if item.joint in joints
         ]
         for items in (spec.path_tolerances, spec.goal_tolerances)
     )
@@ -115,7 +116,7 @@ def trajectory_goal(part: MotionPart) -> FollowJointTrajectoryGoal:
 
 
 def gripper_goal(part: MotionPart) -> GripperCommandGoal:
-    """Returns the goal of a gripper: the last point's position, and its effort or else the configured one."""
+    """Returns the goal for a gripper: position and effort of the last point, or else the configured effort."""
     names, last = part.trajectory.joint_names, part.trajectory.points[-1]
     columns = [i for i, name in enumerate(names) if name in part.controller.command_joints] or [0]
     goal: Any = GripperCommandGoal()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the goals of pickup and place into manoeuvres; a fault in a message is an error that names the field."""
+"""Reader for pickup and place goals, which become manoeuvres; errors name the field of the message."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ class Hand:
     """The end effector.
 
     Attributes:
-        link: what it is fixed to; poses of grasps are poses of this link.
-        links: its own.
-        joints: its own, which postures may name; mimics: those that follow one of them, which they may name too.
+        link: Parent link of the end effector; grasp poses are poses of this link.
+        links: Links of the end effector.
+        joints: Joints of the end effector.
+        mimics: Mimic joints whose leaders are in `joints`.
     """
 
     link: str
@@ -39,10 +40,16 @@ class Hand:
 
 
 def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Translation:
-    """Reads a GripperTranslation; a direction in a frame fixed to the link turns with it.
+    """Reads a GripperTranslation; a direction in a frame fixed to the link rotates with the link.
+
+    Args:
+        scene: Scene with the poses of frames.
+        message: moveit_msgs/GripperTranslation.
+        link: Link that the translation moves.
+        where: Name of the message field, for error messages.
 
     Raises:
-        PlanningError: an unknown frame, a direction without length, or distances that are none.
+        PlanningError: The frame is unknown, the direction is zero, or a distance is invalid.
     """
     vector = message.direction.vector
     direction = np.array([vector.x, vector.y, vector.z], dtype=float)
@@ -52,7 +59,7 @@ def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Tr
         raise PlanningError(
             ErrorCode.INVALID_GOAL_CONSTRAINTS,
             f"{where}: direction {direction.tolist()}, "
-            f"desired_distance {desired}, min_distance {minimum}; finite numbers are needed, distances "
+            f"desired_distance {desired}, min_distance {minimum}; give finite numbers, and distances "
             "of at least 0",
         )
     desired = max(desired, minimum)
@@ -61,30 +68,35 @@ def translation(scene: PlanningScene, message: Any, link: str, where: str) -> Tr
         if desired > 0.0:
             raise PlanningError(
                 ErrorCode.INVALID_GOAL_CONSTRAINTS,
-                f"{where}: the direction is zero but {desired} m are asked for; give a direction",
+                f"{where}: the direction is zero, but the desired distance is {desired} m; give a direction",
             )
         return Translation(np.array([0.0, 0.0, 1.0]), False, 0.0, 0.0)
     frame = message.direction.header.frame_id.removeprefix("/")
-    turn = scene.frame_transform(frame).rotation
-    in_link = scene.model.has_link(frame) and _rigid(scene, frame, link)
+    rotation = scene.frame_transform(frame).rotation
+    in_link = scene.model.has_link(frame) and _is_rigid(scene, frame, link)
     if in_link:
-        turn = scene.frame_transform(link).rotation.T @ turn
-    return Translation(turn @ direction / length, in_link, desired, minimum)
+        rotation = scene.frame_transform(link).rotation.T @ rotation
+    return Translation(rotation @ direction / length, in_link, desired, minimum)
 
 
-def _rigid(scene: PlanningScene, first: str, second: str) -> bool:
+def _is_rigid(scene: PlanningScene, first: str, second: str) -> bool:
     frames, ids = scene.model.pin_model.frames, scene.model.frame_ids
     joint = frames[ids[first]].parentJoint
     return joint == frames[ids[second]].parentJoint and joint != 0
 
 
 def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
-    """Reads a posture of the fingers: the last point of the trajectory; none where it names no joint.
+    """Reads a posture of the fingers from the last point of a trajectory; empty if no joint is named.
 
-    A joint that mimics another counts only where that one is not named: the other one moves it, as in MoveIt.
+    As in MoveIt, a mimic joint only counts if its leader is not named.
+
+    Args:
+        message: trajectory_msgs/JointTrajectory.
+        hand: End effector.
+        where: Name of the message field, for error messages.
 
     Raises:
-        PlanningError: a joint is not the end effector's, or there is no finite position for each joint.
+        PlanningError: A joint does not belong to the end effector, or a position is missing or not finite.
     """
     if not message.joint_names:
         return {}
@@ -100,14 +112,21 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
         raise PlanningError(
             ErrorCode.INVALID_GOAL_CONSTRAINTS,
             f"{where}: {len(points)} points, the last with "
-            f"{len(values)} positions for {len(message.joint_names)} joints; one finite position for "
-            "each joint is needed",
+            f"{len(values)} positions for {len(message.joint_names)} joints; give one finite position "
+            "per joint",
         )
     return with_leaders(dict(zip(message.joint_names, map(float, values), strict=True)), hand.mimics)
 
 
 def _allowance(hand: Hand, target: str, goal: Any, touched: Sequence[str]) -> SceneChange:
-    """Allowed collisions: hand and object, hand and named links, object and support; on request hand and support."""
+    """Returns the change that allows contact of the hand with the object and other bodies, and object with support.
+
+    Args:
+        hand: End effector.
+        target: Name of the object.
+        goal: Goal of pickup or place.
+        touched: Names of further bodies that the hand may touch.
+    """
     surface, others = goal.support_surface_name, [target, *goal.allowed_touch_objects, *touched]
     if surface and goal.allow_gripper_support_collision:
         others.append(surface)
@@ -121,11 +140,17 @@ def _allowance(hand: Hand, target: str, goal: Any, touched: Sequence[str]) -> Sc
 
 def _require_quality(value: float, where: str) -> None:
     if not np.isfinite(value):
-        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where} is {value}; a finite number is needed")
+        raise PlanningError(ErrorCode.INVALID_GOAL_CONSTRAINTS, f"{where} is {value}; give a finite number")
 
 
 def attaching(target: str, link: str, touch_links: Sequence[str]) -> SceneChange:
-    """Returns the change that fixes a world object to a link, where both are now."""
+    """Returns the change that attaches a world object to a link at the current relative pose.
+
+    Args:
+        target: Name of the object.
+        link: Name of the link.
+        touch_links: Links that the object may touch.
+    """
 
     def change(scene: PlanningScene) -> PlanningScene:
         body = scene.find_object(target)
@@ -140,7 +165,18 @@ def attaching(target: str, link: str, touch_links: Sequence[str]) -> SceneChange
 
 
 def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, where: str) -> Manoeuvre:
-    """Reads one Grasp of a PickupGoal; raises PlanningError."""
+    """Reads one Grasp of a PickupGoal.
+
+    Args:
+        scene: Scene with the poses of frames.
+        goal: moveit_msgs/PickupGoal.
+        grasp: moveit_msgs/Grasp.
+        hand: End effector.
+        where: Name of the message field, for error messages.
+
+    Raises:
+        PlanningError: The grasp is invalid.
+    """
     _require_quality(grasp.grasp_quality, f"{where}.grasp_quality")
     touch = list(goal.attached_object_touch_links) or [*hand.links, hand.link]
     return Manoeuvre(
@@ -159,7 +195,19 @@ def grasp_manoeuvre(scene: PlanningScene, goal: Any, grasp: Any, hand: Hand, whe
 def place_manoeuvre(
     scene: PlanningScene, goal: Any, location: Any, hand: Hand, held: AttachedObject, where: str
 ) -> Manoeuvre:
-    """Reads one PlaceLocation of a PlaceGoal; raises PlanningError."""
+    """Reads one PlaceLocation of a PlaceGoal.
+
+    Args:
+        scene: Scene with the poses of frames.
+        goal: moveit_msgs/PlaceGoal.
+        location: moveit_msgs/PlaceLocation.
+        hand: End effector.
+        held: Object to place.
+        where: Name of the message field, for error messages.
+
+    Raises:
+        PlanningError: The location is invalid.
+    """
     _require_quality(location.quality, f"{where}.quality")
     pose = stamped_in_scene(scene, location.place_pose, f"{where}.place_pose")
     return Manoeuvre(
@@ -168,7 +216,7 @@ def place_manoeuvre(
         translation(scene, location.pre_place_approach, hand.link, f"{where}.pre_place_approach"),
         translation(scene, location.post_place_retreat, hand.link, f"{where}.post_place_retreat"),
         _allowance(hand, held.name, goal, location.allowed_touch_objects),
-        lambda now: now.with_detached(held.name),
+        lambda current: current.with_detached(held.name),
         {},
         posture(location.post_place_posture, hand, f"{where}.post_place_posture"),
         middle="release",
@@ -176,20 +224,25 @@ def place_manoeuvre(
 
 
 def _link_pose(scene: PlanningScene, object_pose: Transform, held: AttachedObject, link: str) -> Transform:
-    """Returns where the link is when the held object has this pose."""
+    """Returns the pose of the link when the held object has this pose."""
     links = scene.model.link_transforms(scene.positions)
     object_in_link = links[link].inverse() * links[held.link] * held.body.pose
     return object_pose * object_in_link.inverse()
 
 
 def held_object(scene: PlanningScene, name: str, hand: Hand) -> AttachedObject:
-    """Returns the attached object of that name, or the only one the hand holds where the name is empty.
+    """Returns the named object held by the hand; for an empty name, the only object that the hand holds.
+
+    Args:
+        scene: Scene.
+        name: Name of the object; may be empty.
+        hand: End effector.
 
     Raises:
-        PlanningError: it is not attached, not to this hand, or the hand holds none or several.
+        PlanningError: The hand does not hold the object, or holds no or several objects and the name is empty.
     """
-    own = {hand.link, *hand.links}
-    held: Mapping[str, AttachedObject] = {key: item for key, item in scene.attached.items() if item.link in own}
+    hand_links = {hand.link, *hand.links}
+    held: Mapping[str, AttachedObject] = {key: item for key, item in scene.attached.items() if item.link in hand_links}
     if name:
         if name not in held:
             raise UnknownNameError(ErrorCode.INVALID_OBJECT_NAME, f"object attached to {hand.link}:", name, held)
@@ -198,6 +251,6 @@ def held_object(scene: PlanningScene, name: str, hand: Hand) -> AttachedObject:
         raise PlanningError(
             ErrorCode.INVALID_OBJECT_NAME,
             f"attached_object_name is empty and the end effector at "
-            f"'{hand.link}' holds {len(held)} objects ({', '.join(held) or 'none'}); name one",
+            f"'{hand.link}' holds {len(held)} objects ({', '.join(held) or 'none'}); name one object",
         )
     return next(iter(held.values()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Converts a planar or floating base between messages (one transform) and position vectors (its variables)."""
+"""Conversion of a planar or floating base between messages (a transform) and position vectors (variables)."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 
 def names_joints(state: RobotState) -> bool:
-    """Whether a state gives the position of any joint."""
+    """Returns whether a state has a position of any joint."""
     return bool(state.joint_state.name or state.multi_dof_joint_state.joint_names)
 
 
 def transform_of(message: TransformMessage, where: str) -> Transform:
-    """Reads a transform; one whose rotation is not filled in has none. Raises GeometryError."""
+    """Reads a transform; an unset rotation is the identity. Raises GeometryError."""
     t, q = message.translation, message.rotation
     return make_transform((t.x, t.y, t.z), quaternion_or_identity((q.x, q.y, q.z, q.w), where), where)
 
 
 def transform_message(transform: Transform) -> TransformMessage:
-    """Writes a transform."""
+    """Returns a transform as a message."""
     pose = pose_message(transform)
     message = TransformMessage(rotation=pose.orientation)
     message.translation.x, message.translation.y, message.translation.z = (
@@ -45,22 +45,22 @@ def transform_message(transform: Transform) -> TransformMessage:
 
 
 def with_multi_dof(scene: PlanningScene, state: MultiDOFJointState, where: str) -> PlanningScene:
-    """Returns the scene with the base where a message puts it; a fixed joint that is named changes nothing.
+    """Returns the scene with the base at the pose in a message; fixed joints in the message are ignored.
 
     Args:
-        scene: gives the header's frame its pose; an empty one is the planning frame.
-        state: transforms of joints.
-        where: what the message belongs to, for error texts.
+        scene: Scene with the poses of frames.
+        state: Transforms of joints; an empty header frame is the planning frame.
+        where: Name of the message field, for error messages.
 
     Raises:
-        PlanningError: numbers of names and transforms differ, a joint does not exist or has one variable only, a
-            transform is none, or the frame is not known.
+        PlanningError: The counts of names and transforms differ, a joint is unknown or has one variable only, a
+            transform is invalid, or the frame is unknown.
     """
     if len(state.joint_names) != len(state.transforms):
         raise PlanningError(
             ErrorCode.INVALID_ROBOT_STATE,
             f"{where}: multi_dof_joint_state with {len(state.joint_names)} joint names and {len(state.transforms)} "
-            "transforms; one transform per name is needed",
+            "transforms; give one transform per name",
         )
     model = scene.model
     for name, message in zip(state.joint_names, state.transforms, strict=True):
@@ -79,22 +79,22 @@ def with_multi_dof(scene: PlanningScene, state: MultiDOFJointState, where: str) 
 
 
 def _is_fixed(model: RobotModel, name: str) -> bool:
-    """Whether a fixed joint of the URDF or SRDF has that name."""
+    """Returns whether the name belongs to a fixed joint of the URDF or a virtual joint of the SRDF."""
     virtual = (joint.name for joint in model.semantics.virtual_joints)
     return model.document.joint_kinds.get(name) == "fixed" or name in virtual
 
 
 def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, code: ErrorCode) -> list[Any]:
-    """Replaces joint constraints on the quaternion of a floating base by ones on its angles.
+    """Replaces joint constraints on the quaternion of a floating base by constraints on the base's angles.
 
     Args:
-        scene: its present angles decide between equal ones.
-        constraints: moveit_msgs/JointConstraint, as MoveIt's clients write them from a state.
-        where: what they belong to, for error texts.
-        code: result code for constraints that have no meaning.
+        scene: Scene; its current angles decide between equivalent angles.
+        constraints: Messages of type moveit_msgs/JointConstraint, as MoveIt's clients write them from a state.
+        where: Name of the message field, for error messages.
+        code: Error code for invalid constraints.
 
     Raises:
-        PlanningError: some of the quaternion's four numbers are missing, or it is none.
+        PlanningError: A component of the quaternion is missing, or the quaternion is invalid.
     """
     base, model = scene.model.base, scene.model
     given = {item.joint_name: item for item in constraints if base is not None and item.joint_name in base.quaternion}
@@ -103,17 +103,18 @@ def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, co
     if len(given) != len(base.quaternion):
         raise PlanningError(
             code,
-            f"{where}: joint constraints on {', '.join(given)} alone; give all of {', '.join(base.quaternion)}, or "
+            f"{where}: joint constraints on {', '.join(given)} only; give all of {', '.join(base.quaternion)}, or "
             f"{', '.join(base.angles)} [rad]",
         )
     try:
-        turn = make_transform((0.0, 0.0, 0.0), [given[name].position for name in base.quaternion], where)
+        rotation = make_transform((0.0, 0.0, 0.0), [given[name].position for name in base.quaternion], where)
     except GeometryError as error:
         raise PlanningError(code, error.reason) from error
-    values = base.values(turn, scene.positions[model.base_indices])
-    slack = 2.0 * min(min(item.tolerance_above, item.tolerance_below) for item in given.values())  # half angles
+    values = base.values(rotation, scene.positions[model.base_indices])
+    # a quaternion contains half angles
+    tolerance = 2.0 * min(min(item.tolerance_above, item.tolerance_below) for item in given.values())
     angles = [
-        JointConstraint(name, float(value), slack, slack, 1.0)
+        JointConstraint(name, float(value), tolerance, tolerance, 1.0)
         for name, value in zip(base.variables, values, strict=True)
         if name in base.angles
     ]
@@ -121,24 +122,24 @@ def with_angles(scene: PlanningScene, constraints: Sequence[Any], where: str, co
 
 
 def goal_values(model: RobotModel, joints: Sequence[str], positions: Array) -> dict[str, float]:
-    """Returns a goal by joint as every move_group reads it: the rotation of a floating base as a quaternion.
+    """Returns goal positions by joint name, with the rotation of a floating base as a quaternion, as in MoveIt.
 
     Args:
-        model: the robot.
-        joints: of the group.
-        positions: of the whole robot [rad or m].
+        model: Robot model.
+        joints: Joints of the group.
+        positions: Joint positions of the whole robot [rad or m].
     """
     goal = {name: float(positions[model.index[name]]) for name in joints}
     base = model.base
     if base is None or not base.quaternion or base.variables[0] not in goal:
         return goal
-    turn = pose_message(model.base_transform(positions)).orientation
-    numbers = dict(zip(base.quaternion, (turn.x, turn.y, turn.z, turn.w), strict=True))
-    return {name: value for name, value in goal.items() if name not in base.angles} | numbers
+    q = pose_message(model.base_transform(positions)).orientation
+    quaternion = dict(zip(base.quaternion, (q.x, q.y, q.z, q.w), strict=True))
+    return {name: value for name, value in goal.items() if name not in base.angles} | quaternion
 
 
 def multi_dof_message(model: RobotModel, positions: Array) -> MultiDOFJointState:
-    """Writes where the base is in the planning frame; without names where the robot has a fixed base."""
+    """Returns the base's pose in the planning frame; the message of a fixed-base robot names no joint."""
     message = MultiDOFJointState()
     message.header.frame_id = model.planning_frame
     if model.base is not None:
@@ -148,15 +149,15 @@ def multi_dof_message(model: RobotModel, positions: Array) -> MultiDOFJointState
 
 
 def single_joints(model: RobotModel, names: Sequence[str]) -> list[int]:
-    """Returns the columns of joints with one variable of their own; those of the base are left out."""
+    """Returns the columns of single-variable joints, which are all joints except the base."""
     base = frozenset(model.base.variables if model.base else ())
-    return [number for number, name in enumerate(names) if name not in base]
+    return [index for index, name in enumerate(names) if name not in base]
 
 
 def multi_dof_trajectory(model: RobotModel, trajectory: Trajectory) -> MultiDOFJointTrajectory:
-    """Writes the motion of the base: its poses, velocities and accelerations in the planning frame.
+    """Returns poses, velocities and accelerations of the base in the planning frame.
 
-    It has no points where the base does not belong to the trajectory's joints.
+    The message has no points if the trajectory does not move the base.
     """
     message = MultiDOFJointTrajectory()
     message.header.frame_id = model.planning_frame
@@ -165,17 +166,17 @@ def multi_dof_trajectory(model: RobotModel, trajectory: Trajectory) -> MultiDOFJ
         return message
     columns = [names.index(name) for name in model.base.variables]
     message.joint_names = [model.base.name]
-    for number, stamp in enumerate(trajectory.times):
-        values, rates, changes = (
-            rows[number, columns] for rows in (trajectory.positions, trajectory.velocities, trajectory.accelerations)
+    for index, time in enumerate(trajectory.times):
+        positions, velocities, accelerations = (
+            rows[index, columns] for rows in (trajectory.positions, trajectory.velocities, trajectory.accelerations)
         )
-        velocity, acceleration = model.base.twists(values, rates, changes)
+        velocity, acceleration = model.base.twists(positions, velocities, accelerations)
         message.points.append(
             MultiDOFJointTrajectoryPoint(
-                transforms=[transform_message(model.base.transform(values))],
+                transforms=[transform_message(model.base.transform(positions))],
                 velocities=[_twist(velocity)],
                 accelerations=[_twist(acceleration)],
-                time_from_start=genpy.Duration.from_sec(float(stamp)),
+                time_from_start=genpy.Duration.from_sec(float(time)),
             )
         )
     return message

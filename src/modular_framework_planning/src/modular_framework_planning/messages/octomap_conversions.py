@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the octomap of a planning scene message into the scene, and writes it."""
+"""Conversion of the octomap between planning scene messages and scenes."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-CLEARED = "cleared"  # type of a map without data: the scene's octomap was cleared
+CLEARED = "cleared"  # type of a map without data, which means a cleared octomap
 
 
 def with_octomap_of(scene: PlanningScene, message: OctomapWithPose) -> PlanningScene:
-    """Returns the scene with the octomap of a message; without type and data there is nothing to change.
+    """Returns the scene with the octomap of a message.
 
-    A type without data clears the octomap.
+    A message with a type but no data clears the octomap; a message with neither changes nothing.
 
     Raises:
-        PlanningError: the tree's type, its data, the frame or the pose cannot be used.
+        PlanningError: The tree's type, data, frame or pose is invalid.
     """
     octomap = message.octomap
     if not octomap.data:
         return scene.with_octomap(None) if octomap.id else scene
     if octomap.id != TREE_TYPE:
-        raise GeometryError(f"world.octomap: tree of type '{octomap.id}'; allowed is '{TREE_TYPE}'")
+        raise GeometryError(f"world.octomap: tree of type '{octomap.id}'; the type must be '{TREE_TYPE}'")
     data = np.array(octomap.data, dtype=np.int8).tobytes()
     voxels = read_stream(data, float(octomap.resolution), bool(octomap.binary))
     p, q = message.origin.position, message.origin.orientation
@@ -39,7 +39,7 @@ def with_octomap_of(scene: PlanningScene, message: OctomapWithPose) -> PlanningS
 
 
 def voxels_of(scene: PlanningScene) -> VoxelMap | None:
-    """Returns the map of the scene's octomap."""
+    """Returns the voxel map of the scene's octomap, or None."""
     if scene.octomap is None:
         return None
     shape = scene.octomap.shapes[0][0]
@@ -47,7 +47,7 @@ def voxels_of(scene: PlanningScene) -> VoxelMap | None:
 
 
 def octomap_message(scene: PlanningScene) -> OctomapWithPose:
-    """Writes the scene's octomap with its probabilities; a scene without one says that it is cleared."""
+    """Returns the scene's octomap with probabilities; a scene without octomap gives a message of type CLEARED."""
     message = OctomapWithPose()
     message.header.frame_id = message.octomap.header.frame_id = scene.model.planning_frame
     message.origin.orientation.w = 1.0

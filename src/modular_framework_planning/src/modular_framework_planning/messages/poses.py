@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses as messages."""
+"""Conversion of poses between messages and transforms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def transform_from_pose(pose: Pose, where: str) -> Transform:
 
 
 def pose_message(transform: Transform) -> Pose:
-    """Writes a pose."""
+    """Returns a pose as a message."""
     position, quaternion = pose_of(transform)
     pose = Pose()
     pose.position.x, pose.position.y, pose.position.z = (float(v) for v in position)
@@ -25,5 +25,14 @@ def pose_message(transform: Transform) -> Pose:
 
 
 def stamped_in_scene(scene: PlanningScene, stamped: PoseStamped, where: str) -> Transform:
-    """Returns a stamped pose in the planning frame; raises PlanningError for an unknown frame or bad numbers."""
+    """Returns a stamped pose in the planning frame.
+
+    Args:
+        scene: Scene with the poses of frames.
+        stamped: Pose message.
+        where: Name of the message field, for error messages.
+
+    Raises:
+        PlanningError: The frame is unknown, or the pose is invalid.
+    """
     return scene.frame_transform(stamped.header.frame_id) * transform_from_pose(stamped.pose, where)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Applies planning scene messages to a scene snapshot and writes snapshots as messages."""
+"""Conversion of objects, attached objects, collision matrices and frames between messages and scenes."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def _primitive(message: Any, where: str) -> Shape:
         SolidPrimitive.CONE: (Cone, 2),
     }
     if message.type not in kinds:
-        raise GeometryError(f"{where}: primitive type {message.type}; allowed are 1 box, 2 sphere, 3 cylinder, 4 cone")
+        raise GeometryError(
+            f"{where}: primitive type {message.type}; allowed types: 1 box, 2 sphere, 3 cylinder, 4 cone"
+        )
     kind, count = kinds[message.type]
     if len(message.dimensions) < count:
-        raise GeometryError(
-            f"{where}: {kind.__name__.lower()} with {len(message.dimensions)} dimensions; {count} are needed"
-        )
+        raise GeometryError(f"{where}: {kind.__name__.lower()} with {len(message.dimensions)} dimensions; give {count}")
     try:
         return kind(*message.dimensions[:count])
     except GeometryError as error:
@@ -70,16 +70,16 @@ def _shapes(message: Any, where: str) -> tuple[tuple[Shape, Transform], ...]:
         ("plane", message.planes, message.plane_poses, lambda item, _: Plane(*item.coef)),
     ):
         if len(poses) > len(items):
-            raise GeometryError(f"{where}: {len(items)} {kind} shapes and {len(poses)} poses; one pose a shape")
-        for number, item in enumerate(items):
-            source = f"{where} {kind} {number}"
-            pose = _transform(poses[number], source) if number < len(poses) else pin.SE3.Identity()
+            raise GeometryError(f"{where}: {len(items)} {kind} shapes and {len(poses)} poses; give one pose per shape")
+        for index, item in enumerate(items):
+            source = f"{where} {kind} {index}"
+            pose = _transform(poses[index], source) if index < len(poses) else pin.SE3.Identity()
             result.append((build(item, source), pose))
     return tuple(result)
 
 
 def _object_pose(scene: PlanningScene, message: Any, where: str) -> Transform:
-    """Pose of the object's frame in the planning frame; a pose left at its defaults is that of the header's frame."""
+    """Returns the object's pose in the planning frame; an unset pose means the pose of the header's frame."""
     frame = scene.frame_transform(message.header.frame_id)
     return frame if _is_unset(message.pose) else frame * _transform(message.pose, where)
 
@@ -89,14 +89,14 @@ def _body(scene: PlanningScene, message: Any) -> core.CollisionObject:
     if len(message.subframe_names) != len(message.subframe_poses):
         raise GeometryError(
             f"{where}: {len(message.subframe_names)} subframe names and "
-            f"{len(message.subframe_poses)} poses; one pose a name"
+            f"{len(message.subframe_poses)} poses; give one pose per name"
         )
     subframes = {
         name: _transform(pose, f"{where} subframe '{name}'")
         for name, pose in zip(message.subframe_names, message.subframe_poses, strict=True)
     }
     pose, shapes = _object_pose(scene, message, where), _shapes(message, where)
-    if len(shapes) == 1 and _is_unset(message.pose):  # as in MoveIt: the only shape says where the object is
+    if len(shapes) == 1 and _is_unset(message.pose):  # as in MoveIt, the only shape sets the object's pose
         shape, pose_in_header = shapes[0]
         pose, shapes = pose * pose_in_header, ((shape, pin.SE3.Identity()),)
     return core.CollisionObject(message.id, pose, shapes, subframes)
@@ -105,7 +105,7 @@ def _body(scene: PlanningScene, message: Any) -> core.CollisionObject:
 def apply_collision_object(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
     """Returns the scene after ADD, APPEND, MOVE or REMOVE of a world object; raises PlanningError."""
     if message.id == OCTOMAP_ID:
-        raise GeometryError(f"collision object: id '{OCTOMAP_ID}' is kept for the octomap; use another id")
+        raise GeometryError(f"collision object: id '{OCTOMAP_ID}' is reserved for the octomap; use another id")
     if message.operation == CollisionObject.ADD:
         return scene.with_object(_body(scene, message))
     if message.operation == CollisionObject.APPEND:
@@ -113,24 +113,25 @@ def apply_collision_object(scene: PlanningScene, message: CollisionObject) -> Pl
     if message.operation == CollisionObject.REMOVE:
         if not message.id:
             return scene.without_objects()
-        return scene.without_object(message.id) if message.id in scene.objects else scene  # already gone: fine
+        return scene.without_object(message.id) if message.id in scene.objects else scene
     if message.operation == CollisionObject.MOVE:
-        return _moved(scene, message)
+        return _move(scene, message)
     raise GeometryError(
-        f"collision object '{message.id}': operation {message.operation}; allowed are 0 ADD, 1 REMOVE, 2 APPEND, 3 MOVE"
+        f"collision object '{message.id}': operation {message.operation}; "
+        "allowed operations: 0 ADD, 1 REMOVE, 2 APPEND, 3 MOVE"
     )
 
 
-def _moved(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
-    """Moves an object, and its shapes where the message has poses for them; its geometry, if any, does not count."""
+def _move(scene: PlanningScene, message: CollisionObject) -> PlanningScene:
+    """Moves an object and, if the message has shape poses, its shapes; geometry in the message is ignored."""
     where = f"collision object '{message.id}'"
     scene.find_object(message.id)
     pose = _object_pose(scene, message, where)
     shape_poses = [
-        _transform(item, f"{where} shape {number}")
-        for number, item in enumerate((*message.primitive_poses, *message.mesh_poses, *message.plane_poses))
+        _transform(item, f"{where} shape {index}")
+        for index, item in enumerate((*message.primitive_poses, *message.mesh_poses, *message.plane_poses))
     ]
-    if len(shape_poses) == 1 and _is_unset(message.pose):  # as in ADD: the only shape says where the object is
+    if len(shape_poses) == 1 and _is_unset(message.pose):  # as in ADD, the only shape sets the object's pose
         pose, shape_poses = pose * shape_poses[0], [pin.SE3.Identity()]
     return scene.with_object_moved(message.id, pose, shape_poses)
 
@@ -139,9 +140,11 @@ def apply_attached_object(scene: PlanningScene, message: AttachedCollisionObject
     """Returns the scene after attaching or detaching; raises PlanningError."""
     name, operation = message.object.id, message.object.operation
     if operation == CollisionObject.REMOVE:
-        return _detached(scene, name, message.link_name)
+        return _detach(scene, name, message.link_name)
     if operation not in (CollisionObject.ADD, CollisionObject.APPEND):
-        raise GeometryError(f"attached object '{name}': operation {operation}; allowed are 0 ADD, 1 REMOVE, 2 APPEND")
+        raise GeometryError(
+            f"attached object '{name}': operation {operation}; allowed operations: 0 ADD, 1 REMOVE, 2 APPEND"
+        )
     if message.link_name not in scene.model.frame_ids:
         raise UnknownNameError(
             ErrorCode.INVALID_LINK_NAME, f"attaching '{name}': link", message.link_name, scene.model.frame_ids
@@ -157,12 +160,18 @@ def apply_attached_object(scene: PlanningScene, message: AttachedCollisionObject
     return scene.with_attached(core.AttachedObject(in_link, message.link_name, frozenset(message.touch_links)))
 
 
-def _detached(scene: PlanningScene, name: str, link: str) -> PlanningScene:
-    """Puts one attached object, or all of a link (of the robot where no link is named), back into the world."""
+def _detach(scene: PlanningScene, name: str, link: str) -> PlanningScene:
+    """Moves attached objects back into the world.
+
+    Args:
+        scene: Scene.
+        name: Object to detach; empty for all objects of the link.
+        link: Link of the objects; empty for any link.
+    """
     if name in scene.attached and link not in ("", scene.attached[name].link):
         raise GeometryError(
-            f"detaching '{name}': it is attached to '{scene.attached[name].link}', not to '{link}'; "
-            "name that link or leave link_name empty"
+            f"detaching '{name}': the object is attached to '{scene.attached[name].link}', not to '{link}'; "
+            "name the right link or leave link_name empty"
         )
     names = [name] if name else [key for key, item in scene.attached.items() if link in ("", item.link)]
     for item in names:
@@ -171,17 +180,17 @@ def _detached(scene: PlanningScene, name: str, link: str) -> PlanningScene:
 
 
 def with_matrix_of(scene: PlanningScene, message: Any) -> PlanningScene:
-    """Returns the scene with the allowed collisions of a message; one that names no body changes nothing.
+    """Returns the scene with the allowed collisions of a message.
 
-    A message with nothing but defaults changes these defaults and leaves the rest as it is.
+    An empty message changes nothing; a message with defaults only changes these defaults.
 
     Raises:
-        GeometryError: the matrix is not square, or names and values of defaults differ in number.
+        GeometryError: The matrix is not square, or the counts of names and values of defaults differ.
     """
     if len(message.default_entry_names) != len(message.default_entry_values):
         raise GeometryError(
             f"allowed_collision_matrix: {len(message.default_entry_names)} default_entry_names and "
-            f"{len(message.default_entry_values)} default_entry_values; give one value for each name"
+            f"{len(message.default_entry_values)} default_entry_values; give one value per name"
         )
     defaults = dict(zip(message.default_entry_names, map(bool, message.default_entry_values), strict=True))
     if not message.entry_names:
@@ -202,7 +211,7 @@ def write_matrix(matrix: AllowedCollisionMatrix, message: Any) -> None:
 
 
 def fixed_frames_from(scene: PlanningScene, transforms: Sequence[Any]) -> dict[str, Transform]:
-    """Reads fixed_frame_transforms into poses in the planning frame; frames of the robot are left alone."""
+    """Returns the poses of fixed_frame_transforms in the planning frame, without frames of the robot."""
     frames = {}
     for item in transforms:
         t, q = item.transform.translation, item.transform.rotation
@@ -258,14 +267,20 @@ def _write_shape(message: CollisionObject, shape: Shape, pose: Any) -> None:
 def attached_to_message(
     scene: PlanningScene, item: core.AttachedObject, with_geometry: bool = True
 ) -> AttachedCollisionObject:
-    """Writes an attached object in the frame of its link."""
+    """Returns an attached object as a message in the frame of its link.
+
+    Args:
+        scene: Scene.
+        item: Attached object.
+        with_geometry: Whether shapes are included.
+    """
     message = AttachedCollisionObject(link_name=item.link, touch_links=sorted(item.touch_links))
     message.object = object_to_message(item.body, item.link, with_geometry)
     return message
 
 
 def colors_to_message(scene: PlanningScene) -> list[ObjectColor]:
-    """Writes the colours of objects."""
+    """Returns the colours of objects as messages."""
     result = []
     for name, (red, green, blue, alpha) in scene.colors.items():
         color = ObjectColor(id=name)
@@ -275,7 +290,7 @@ def colors_to_message(scene: PlanningScene) -> list[ObjectColor]:
 
 
 def frames_to_message(scene: PlanningScene) -> list[TransformStamped]:
-    """Writes the fixed frames."""
+    """Returns the fixed frames as messages."""
     result = []
     for name, transform in {scene.model.planning_frame: pin.SE3.Identity(), **scene.fixed_frames}.items():
         item = TransformStamped(child_frame_id=name)

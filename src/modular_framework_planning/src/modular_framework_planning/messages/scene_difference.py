@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the difference of two scene snapshots; applied to the first one it gives the second."""
+"""Diff messages between scene snapshots."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from modular_framework_planning.messages.scene_conversions import (
 from modular_framework_planning.messages.scene_messages import scene_message, write_padding
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 
-STATE_CHANGE = 1.0e-4  # [rad or m]; smaller changes of a joint are not published
+MIN_JOINT_CHANGE = 1.0e-4  # [rad or m]; smaller changes are not published
 
 
 def joints_moved(before: PlanningScene, after: PlanningScene) -> bool:
-    """Whether a joint changed by more than noise."""
-    return bool(np.abs(after.positions - before.positions).max(initial=0.0) > STATE_CHANGE)
+    """Returns whether a joint moved by more than MIN_JOINT_CHANGE."""
+    return bool(np.abs(after.positions - before.positions).max(initial=0.0) > MIN_JOINT_CHANGE)
 
 
 def difference_message(before: PlanningScene, after: PlanningScene) -> SceneMessage | None:
-    """Returns the diff that turns one scene into the other, or None when they are the same.
+    """Returns the diff that turns one scene into the other, or None for equal scenes.
 
-    A diff can add colours and fixed frames to a scene but not take them away, except for the colour of an object that
-    it removes: where one is gone, the answer is the whole scene.
+    A diff cannot remove fixed frames, nor colours except with their objects. If one of these disappears, the result is
+    the whole scene.
     """
-    there = after.objects.keys() | after.attached.keys()
-    removed = (before.objects.keys() | before.attached.keys()) - there  # with their colours
+    remaining = after.objects.keys() | after.attached.keys()
+    removed = (before.objects.keys() | before.attached.keys()) - remaining  # with their colours
     if before.colors.keys() - after.colors.keys() - removed or before.fixed_frames.keys() - after.fixed_frames.keys():
         return scene_message(after, 0)
     message = SceneMessage(is_diff=True, name=after.name, robot_model_name=after.model.name)
@@ -74,11 +74,11 @@ def _attached_changes(before: PlanningScene, after: PlanningScene) -> list[Attac
 
 
 def _world_changes(before: PlanningScene, after: PlanningScene) -> list[CollisionObject]:
-    """Changes of world objects, applied after those of attached objects, which add and remove world objects too."""
+    """Returns changes of world objects to apply after changes of attached objects, which also affect the world."""
     frame = after.model.planning_frame
     released = before.attached.keys() - after.attached.keys()
-    gone = (before.objects.keys() - after.attached.keys() | released) - after.objects.keys()
-    changes = [CollisionObject(id=name, operation=CollisionObject.REMOVE) for name in sorted(gone)]
+    removed = (before.objects.keys() - after.attached.keys() | released) - after.objects.keys()
+    changes = [CollisionObject(id=name, operation=CollisionObject.REMOVE) for name in sorted(removed)]
     for name, body in after.objects.items():
         old = before.objects.get(name)
         if old is body:

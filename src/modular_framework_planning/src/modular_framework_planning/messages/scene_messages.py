@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Applies a PlanningScene message to a snapshot atomically, and writes a message with the requested parts."""
+"""Conversion of whole PlanningScene messages to and from scene snapshots."""
 
 from __future__ import annotations
 
@@ -33,14 +33,13 @@ def apply_world(scene: PlanningScene, world: Any) -> PlanningScene:
 
 
 def apply_scene(scene: PlanningScene, message: SceneMessage) -> PlanningScene:
-    """Returns the scene after a diff, or the scene a full message describes.
+    """Returns the scene after a diff, or the scene of a full message.
 
-    A full message replaces objects, attached objects, octomap and colours; the allowed collisions, if it has none, are
-    those the robot began with. Joints and paddings it does not name, and known frames (those of tf among them, in which
-    its objects may be given) stay, as in MoveIt.
+    As in MoveIt, a full message replaces objects, attached objects, octomap and colours. Without allowed collisions,
+    the initial allowed collisions return. Unnamed joints, paddings and known frames (including tf frames) stay.
 
     Raises:
-        PlanningError: something in the message is not usable; the given scene is unchanged, as always.
+        PlanningError: The message is invalid.
     """
     if not message.is_diff:
         scene = (
@@ -66,33 +65,33 @@ def apply_scene(scene: PlanningScene, message: SceneMessage) -> PlanningScene:
 
 
 def scene_message(scene: PlanningScene, components: int) -> SceneMessage:
-    """Writes the parts of the scene that are asked for (bits of PlanningSceneComponents; 0 means all)."""
-    wanted = components or ALL_PARTS
+    """Returns a message with the requested parts of the scene (bits of PlanningSceneComponents, 0 for all)."""
+    requested = components or ALL_PARTS
     message = SceneMessage(is_diff=False)
-    if wanted & Parts.SCENE_SETTINGS:
+    if requested & Parts.SCENE_SETTINGS:
         message.name, message.robot_model_name = scene.name, scene.model.name
-    if wanted & (Parts.ROBOT_STATE | Parts.ROBOT_STATE_ATTACHED_OBJECTS):
-        message.robot_state = state_message(scene, None, bool(wanted & Parts.ROBOT_STATE_ATTACHED_OBJECTS))
-    geometry = bool(wanted & Parts.WORLD_OBJECT_GEOMETRY)
-    if geometry or wanted & Parts.WORLD_OBJECT_NAMES:
+    if requested & (Parts.ROBOT_STATE | Parts.ROBOT_STATE_ATTACHED_OBJECTS):
+        message.robot_state = state_message(scene, None, bool(requested & Parts.ROBOT_STATE_ATTACHED_OBJECTS))
+    geometry = bool(requested & Parts.WORLD_OBJECT_GEOMETRY)
+    if geometry or requested & Parts.WORLD_OBJECT_NAMES:
         message.world.collision_objects = [
             object_to_message(body, scene.model.planning_frame, geometry) for body in scene.objects.values()
         ]
-    if wanted & Parts.OCTOMAP:
+    if requested & Parts.OCTOMAP:
         message.world.octomap = octomap_message(scene)
-    if wanted & Parts.TRANSFORMS:
+    if requested & Parts.TRANSFORMS:
         message.fixed_frame_transforms = frames_to_message(scene)
-    if wanted & Parts.ALLOWED_COLLISION_MATRIX:
+    if requested & Parts.ALLOWED_COLLISION_MATRIX:
         write_matrix(scene.acm, message.allowed_collision_matrix)
-    if wanted & Parts.LINK_PADDING_AND_SCALING:
+    if requested & Parts.LINK_PADDING_AND_SCALING:
         write_padding(scene, message)
-    if wanted & Parts.OBJECT_COLORS:
+    if requested & Parts.OBJECT_COLORS:
         message.object_colors = colors_to_message(scene)
     return message
 
 
 def write_padding(scene: PlanningScene, message: SceneMessage) -> None:
-    """Fills padding and scale of every link that can collide."""
+    """Writes padding and scale of every link with collision geometry."""
     links = dict.fromkeys(item.link for item in scene.model.link_geometries)
     message.link_padding = [LinkPadding(link, scene.padding.links.get(link, 0.0)) for link in links]
     message.link_scale = [LinkScale(link, scene.padding.scales.get(link, 1.0)) for link in links]
