@@ -102,11 +102,11 @@ def test_equal_neighbours_are_pruned_into_one_leaf() -> None:
     [
         (b"abc", False, "multiple of the 5 bytes"),
         (b"abc", True, "multiple of the 2 bytes"),
-        (b"\x00\x00\x00\x00\x01", False, "ends early"),
-        (b"\xff\xff", True, "ends early"),
+        (b"\x00\x00\x00\x00\x01", False, "truncated"),
+        (b"\xff\xff", True, "truncated"),
         (b"\x00\x00\x00\x00\x00" * 2, False, "after the end"),
         (b"\x03\x00" * 17, True, "deeper than 16"),
-        (b"\x00\x00\x00\x00\x00", False, "allowed are 16000000"),
+        (b"\x00\x00\x00\x00\x00", False, "at most 16000000"),
         (b"\x00\x00\xc0\x7f\x00", False, "not finite"),
     ],
 )
@@ -118,7 +118,7 @@ def test_broken_streams_are_refused(data: bytes, binary: bool, text: str) -> Non
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        (b"PNG", "begins with 'PNG'"),
+        (b"PNG", "starts with 'PNG'"),
         (b"# Octomap OcTree file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n", "ColorOcTree"),
         (b"# Octomap OcTree file\nid OcTree\nsize 1\nres x\ndata\n", "numbers after"),
         (b"# Octomap OcTree file\nid OcTree\nsize 1\nres -1\ndata\n", "0.001"),

@@ -86,7 +86,7 @@ def test_millimetres_and_metres_and_padded_rows_are_read(big_endian: bool) -> No
         depth_array(b"", "rgb8", (1, 1), 3, False)
     with pytest.raises(GeometryError, match="need 8"):
         depth_array(b"1234", "16UC1", (2, 2), 4, False)
-    with pytest.raises(GeometryError, match="calibrated"):
+    with pytest.raises(GeometryError, match="calibrate the camera"):
         Pinhole(0.0, 0.0, 0.0, 0.0)
 
 
@@ -164,7 +164,7 @@ def test_what_lies_just_behind_a_body_is_its_shadow() -> None:
 def test_depth_noise_grows_with_the_square_of_the_distance() -> None:
     body = [(Sphere(0.1).geometry, pin.SE3(np.eye(3), np.array([0.0, 0.0, 2.9])))]
     mask = depth_self_filter(RegionCache(), body, np.zeros(3), 4.0, 0.03)
-    assert mask.balls[0, 3] == pytest.approx(0.1 + 0.03 + 4.0 * DEPTH_NOISE * 9.0)
+    assert mask.spheres[0, 3] == pytest.approx(0.1 + 0.03 + 4.0 * DEPTH_NOISE * 9.0)
 
 
 def test_links_and_objects_are_masked_and_planes_are_not(model: RobotModel) -> None:
@@ -223,10 +223,10 @@ def test_sensors_are_read_as_moveit_writes_them_and_faults_are_named() -> None:
     for fault, text in zip(
         faults,
         [
-            "allowed are occupancy",
+            "supported plugins: occupancy",
             "unknown key 'max_rang'",
             "type float",
-            "1 or more",
+            "at least 1",
             "point_cloud_topic is missing",
             "str",
         ],

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps of occupied and free voxels, as OctoMap keeps them."""
+"""Occupancy maps of voxels, compatible with OctoMap."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled loops over voxels: the voxels along rays, and the leaves in an octree's byte stream."""
+"""Compiled kernels for voxel maps: ray traversal, map updates, decoding of octree streams, and self filtering."""
 
 from __future__ import annotations  # noqa: I001 - numba_cache has to come before numba
 
@@ -11,14 +11,14 @@ from numba import njit
 
 Keys = NDArray[np.int64]
 Values = NDArray[np.float32]
-X_BITS = 0x249249249249  # bits 0, 3, 6, ...: where a Morton code of 3 x 16 bits holds x
+X_BITS = 0x249249249249  # bits 0, 3, 6, ..., the x bits of a Morton code of 3 x 16 bits
 EMPTY = -1
-HASH_FACTOR = 0x9E3779B97F4A7C15 - (1 << 64)  # 2**64 / golden ratio, as a signed number
+HASH_FACTOR = 0x9E3779B97F4A7C15 - (1 << 64)  # 2**64 / golden ratio, as a signed integer
 
 
 @njit(cache=True, nogil=True)
 def _insert(table: Keys, key: int) -> bool:
-    """Puts a key into an open-addressed table; returns whether it is new."""
+    """Inserts a key into an open-addressing hash table; returns whether the key is new."""
     mask = len(table) - 1
     slot = ((key * HASH_FACTOR) >> 20) & mask
     while table[slot] != EMPTY:
@@ -48,7 +48,13 @@ def _spread(value: int) -> int:
 
 @njit(cache=True, nogil=True)
 def cells_of_points(points: NDArray[np.float64], resolution: float, axis_center: int) -> Keys:
-    """Returns the Morton codes of the voxels that points (n, 3) lie in; points beyond the tree are left out."""
+    """Returns the Morton codes of the voxels that contain points; points outside the tree are left out.
+
+    Args:
+        points: Points, shape (n, 3) [m].
+        resolution: Edge length of a voxel [m].
+        axis_center: Index of the voxel that begins at coordinate 0.
+    """
     keys, count = np.empty(len(points), np.int64), 0
     for i in range(len(points)):
         key, inside = 0, True
@@ -65,24 +71,24 @@ def cells_of_points(points: NDArray[np.float64], resolution: float, axis_center:
 
 @njit(cache=True, nogil=True)
 def cells_on_rays(origin: NDArray[np.float64], ends: NDArray[np.float64]) -> Keys:
-    """Returns the voxels that rays go through, that of the origin included, those of the ends not.
+    """Returns the voxels along rays, including the voxel of the origin and without the voxels of the ends.
 
-    The walk is that of Amanatides and Woo, "A fast voxel traversal algorithm for ray tracing" (1987).
+    Source: Amanatides and Woo, "A fast voxel traversal algorithm for ray tracing" (1987).
 
     Args:
-        origin: where the rays begin (3,), in voxel units, 0 at the corner of voxel (0, 0, 0).
-        ends: where they end (n, 3), in voxel units; within 0..65535.
+        origin: Start of the rays, shape (3,), in voxel units with 0 at the corner of voxel (0, 0, 0).
+        ends: Ends of the rays, shape (n, 3), in voxel units, within 0..65535.
 
     Returns:
-        Morton codes, each once, in no order.
+        Distinct Morton codes, unordered.
     """
     table = np.full(1 << 16, EMPTY, np.int64)
     used = 0
     spread = np.empty(3, np.int64)
     steps = np.empty(3, np.int64)
-    left = np.empty(3, np.int64)
-    next_at = np.empty(3)
-    gaps = np.empty(3)
+    remaining = np.empty(3, np.int64)
+    next_border = np.empty(3)
+    border_spacing = np.empty(3)
     for ray in range(len(ends)):
         total = 0
         for axis in range(3):
@@ -90,42 +96,42 @@ def cells_on_rays(origin: NDArray[np.float64], ends: NDArray[np.float64]) -> Key
             length = ends[ray, axis] - origin[axis]
             spread[axis] = _spread(cell) << axis
             steps[axis] = 1 if last >= cell else -1
-            left[axis] = abs(last - cell)
-            total += left[axis]
-            gaps[axis] = 1.0 / abs(length) if length != 0.0 else np.inf
+            remaining[axis] = abs(last - cell)
+            total += remaining[axis]
+            border_spacing[axis] = 1.0 / abs(length) if length != 0.0 else np.inf
             border = cell + 1 if steps[axis] == 1 else cell
-            next_at[axis] = abs(border - origin[axis]) * gaps[axis] if left[axis] else np.inf
+            next_border[axis] = abs(border - origin[axis]) * border_spacing[axis] if remaining[axis] else np.inf
         for _ in range(total):
             if _insert(table, spread[0] | spread[1] | spread[2]):
                 used += 1
                 if 2 * used > len(table):
                     table = _grown(table)
-            axis = 0 if next_at[0] <= next_at[1] else 1
-            if next_at[2] < next_at[axis]:
+            axis = 0 if next_border[0] <= next_border[1] else 1
+            if next_border[2] < next_border[axis]:
                 axis = 2
             bits = X_BITS << axis
             if steps[axis] == 1:
                 spread[axis] = ((spread[axis] | ~bits) + 1) & bits
             else:
                 spread[axis] = (spread[axis] - 1) & bits
-            left[axis] -= 1
-            next_at[axis] = next_at[axis] + gaps[axis] if left[axis] else np.inf
+            remaining[axis] -= 1
+            next_border[axis] = next_border[axis] + border_spacing[axis] if remaining[axis] else np.inf
     return table[table != EMPTY]
 
 
 @njit(cache=True, nogil=True)
-def merged(
+def merge(
     keys: Keys, values: Values, new_keys: Keys, steps: Values, lowest: float, highest: float
 ) -> tuple[Keys, Values]:
-    """Adds steps to the values of keys and clamps the sums; a key that is not there yet begins at 0.
+    """Adds steps to the values of keys and clamps the sums; a new key starts at 0.
 
     Args:
-        keys: what there is (n,), ascending.
-        values: of the keys (n,).
-        new_keys: where something is added (m,), ascending.
-        steps: what is added (m,).
-        lowest: lower clamp.
-        highest: upper clamp.
+        keys: Known keys in ascending order, shape (n,).
+        values: Value of each known key, shape (n,).
+        new_keys: Updated keys in ascending order, shape (m,).
+        steps: Step of each updated key, shape (m,).
+        lowest: Lower clamp of the sums.
+        highest: Upper clamp of the sums.
     """
     all_keys, sums = np.empty(len(keys) + len(new_keys), np.int64), np.empty(len(keys) + len(new_keys), np.float32)
     old, new, size = 0, 0, 0
@@ -145,15 +151,15 @@ def merged(
 
 @njit(cache=True, nogil=True)
 def read_full(children: NDArray[np.uint8], levels: int) -> tuple[int, Keys, NDArray[np.int64], Keys]:
-    """Finds the leaves of a stream of (value, child bits) nodes in pre-order.
+    """Returns the leaves of a full stream, whose nodes (value, child bits) are in pre-order.
 
     Args:
-        children: the child bits of each node (n,).
-        levels: depth of the tree.
+        children: Child bits of each node, shape (n,).
+        levels: Depth of the tree.
 
     Returns:
-        How many nodes the tree has, or -1 where it is deeper than allowed or ends early; and of each leaf the first
-        Morton code, the depth and the number of its node.
+        The number of nodes, or -1 for a tree that is too deep or truncated; and for each leaf the first Morton code,
+        the depth and the index of its node.
     """
     count = len(children)
     starts, depths, nodes = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
@@ -179,15 +185,15 @@ def read_full(children: NDArray[np.uint8], levels: int) -> tuple[int, Keys, NDAr
 
 @njit(cache=True, nogil=True)
 def read_binary(codes: NDArray[np.uint16], levels: int) -> tuple[int, Keys, NDArray[np.int64], NDArray[np.bool_]]:
-    """Finds the leaves of a stream of nodes with two bits a child: 1 free, 2 occupied, 3 has children.
+    """Returns the leaves of a binary stream with two bits per child: 1 free, 2 occupied, 3 inner node.
 
     Args:
-        codes: the sixteen bits of each inner node in pre-order (n,).
-        levels: depth of the tree.
+        codes: Sixteen bits of each inner node in pre-order, shape (n,).
+        levels: Depth of the tree.
 
     Returns:
-        How many nodes were read, or -1 where the tree is deeper than allowed or ends early; and of each leaf the first
-        Morton code, the depth and whether it is occupied.
+        The number of inner nodes, or -1 for a tree that is too deep or truncated; and for each leaf the first Morton
+        code, the depth and whether the leaf is occupied.
     """
     count = len(codes)
     starts, depths = np.empty(8 * count, np.int64), np.empty(8 * count, np.int64)
@@ -213,42 +219,42 @@ def read_binary(codes: NDArray[np.uint16], levels: int) -> tuple[int, Keys, NDAr
 
 
 @njit(cache=True, nogil=True)
-def within_regions(
+def points_in_regions(
     points: NDArray[np.float64],
     origin: NDArray[np.float64],
     shadow: float,
-    balls: NDArray[np.float64],
+    spheres: NDArray[np.float64],
     planes: NDArray[np.float64],
     starts: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Returns which points lie in a convex region, or less than a shadow's length behind one as seen from the origin.
+    """Returns whether each point lies in a convex region or in a region's shadow as seen from the sensor.
 
     Args:
-        points: (n, 3) [m].
-        origin: where the sensor is (3,) [m].
-        shadow: length of the shadow [m]; 0 for none.
-        balls: centre and radius of a ball around each region (k, 4) [m].
-        planes: half-spaces a*x + b*y + c*z + d <= 0 of all regions (m, 4), unit normals.
-        starts: where the planes of each region begin (k + 1,).
+        points: Points, shape (n, 3) [m].
+        origin: Position of the sensor, shape (3,) [m].
+        shadow: Length of the shadow behind a region [m].
+        spheres: Centre and radius of each region's bounding sphere, shape (k, 4) [m].
+        planes: Half-spaces a*x + b*y + c*z + d <= 0 of all regions with unit normals, shape (m, 4).
+        starts: Index of each region's first plane, and the total; shape (k + 1,).
     """
     result = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         u, v, w = origin[0] - x, origin[1] - y, origin[2] - z
         distance = np.sqrt(u * u + v * v + w * w)
-        share = min(shadow, distance) / distance if distance > 0.0 else 0.0
-        u, v, w = u * share, v * share, w * share
+        fraction = min(shadow, distance) / distance if distance > 0.0 else 0.0
+        u, v, w = u * fraction, v * fraction, w * fraction
         square = u * u + v * v + w * w
-        for region in range(len(balls)):
-            p, q, r = x - balls[region, 0], y - balls[region, 1], z - balls[region, 2]
-            reach = balls[region, 3]
+        for region in range(len(spheres)):
+            p, q, r = x - spheres[region, 0], y - spheres[region, 1], z - spheres[region, 2]
+            reach = spheres[region, 3]
             gap = p * p + q * q + r * r
             if gap > (reach + shadow) ** 2:
                 continue
-            begin, end = _within_ball(square, p * u + q * v + r * w, gap - reach * reach)
-            for number in range(starts[region], starts[region + 1]):
-                a, b, c = planes[number, 0], planes[number, 1], planes[number, 2]
-                height = a * x + b * y + c * z + planes[number, 3]
+            begin, end = _range_in_sphere(square, p * u + q * v + r * w, gap - reach * reach)
+            for plane in range(starts[region], starts[region + 1]):
+                a, b, c = planes[plane, 0], planes[plane, 1], planes[plane, 2]
+                height = a * x + b * y + c * z + planes[plane, 3]
                 slope = a * u + b * v + c * w
                 if slope > 0.0:
                     end = min(end, -height / slope)
@@ -265,13 +271,13 @@ def within_regions(
 
 
 @njit(cache=True, nogil=True)
-def _within_ball(square: float, half: float, excess: float) -> tuple[float, float]:
-    """The piece (shares 0..1) of a line start + t * back that lies in a ball.
+def _range_in_sphere(square: float, half: float, excess: float) -> tuple[float, float]:
+    """Returns the range of t, within 0..1, in which the line start + t * direction lies in a sphere.
 
     Args:
-        square: back . back.
-        half: back . (start - centre).
-        excess: squared distance of start and centre less the squared radius.
+        square: direction . direction.
+        half: direction . (start - centre).
+        excess: Squared distance of start and centre minus the squared radius.
     """
     if square == 0.0:
         return (0.0, 1.0) if excess <= 0.0 else (1.0, 0.0)
@@ -284,7 +290,7 @@ def _within_ball(square: float, half: float, excess: float) -> tuple[float, floa
 
 @njit(cache=True, nogil=True)
 def distinct(keys: Keys) -> Keys:
-    """Returns the keys, each once, ascending."""
+    """Returns the distinct keys in ascending order."""
     table = np.full(1 << 12, EMPTY, np.int64)
     used = 0
     for key in keys:

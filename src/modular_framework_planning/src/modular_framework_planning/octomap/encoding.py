@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes voxel maps as OctoMap's byte streams and files, and reads them: what octomap_msgs and .bt files hold.
+"""Encoding of voxel maps as OctoMap's byte streams (octomap_msgs) and files (.bt, .ot).
 
-Two streams exist, both pre-order walks of the octree in which eight equal children are pruned into their parent:
-full: of each node its log odds (float32) and one bit a child that exists;
-binary: of each inner node two bits a child: 1 free leaf, 2 occupied leaf, 3 inner node, 0 unknown.
+Both streams list the nodes of the octree in pre-order; eight equal children are pruned into their parent.
+A full stream has for each node its log odds (float32) and one bit per existing child.
+A binary stream has for each inner node two bits per child: 1 free leaf, 2 occupied leaf, 3 inner node, 0 unknown.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ class _Nodes:
     """The nodes of the pruned octree over a map, in pre-order.
 
     Attributes:
-        values: log odds; of an inner node the largest of its children's (n,).
-        children: one bit a child that exists (n,); 0 for leaves.
-        codes: two bits a child (n,), as in the binary stream.
+        values: Log odds, for an inner node the maximum over its children; shape (n,).
+        children: One bit per existing child, 0 for leaves; shape (n,).
+        codes: Two bits per child as in the binary stream, shape (n,).
     """
 
     def __init__(self, keys: Keys, values: Values) -> None:
-        """Builds the layers from the voxels up; a layer holds numbers, values, child bits, codes, and who is a leaf."""
+        """Builds layers of keys, values, child bits, codes and leaf flags from the voxels upwards."""
         layers: list[tuple[Any, ...]] = [
             (
                 keys,
@@ -56,25 +56,25 @@ class _Nodes:
                 np.ones(len(keys), dtype=bool),
             )
         ]
-        kept = [np.ones(len(keys), dtype=bool)]
+        is_kept = [np.ones(len(keys), dtype=bool)]
         for _ in range(LEVELS):
-            numbers, values, bits, _, is_leaf = layers[-1]
-            parents, first = np.unique(numbers >> 3, return_index=True)
-            owner = np.repeat(np.arange(len(parents)), np.diff(np.append(first, len(numbers))))
-            child = (numbers & 7).astype(np.int64)
+            layer_keys, values, bits, _, is_leaf = layers[-1]
+            parents, first = np.unique(layer_keys >> 3, return_index=True)
+            parent_index = np.repeat(np.arange(len(parents)), np.diff(np.append(first, len(layer_keys))))
+            child = (layer_keys & 7).astype(np.int64)
             highest = np.maximum.reduceat(values, first)
-            same = (np.bincount(owner) == 8) & np.logical_and.reduceat(is_leaf, first)
-            same &= np.minimum.reduceat(values, first) == highest
+            is_pruned = (np.bincount(parent_index) == 8) & np.logical_and.reduceat(is_leaf, first)
+            is_pruned &= np.minimum.reduceat(values, first) == highest
             kinds = np.where(bits > 0, INNER, np.where(values > 0.0, OCCUPIED, FREE))
-            mask = np.bincount(owner, 1 << child).astype(np.uint8)
-            codes = np.bincount(owner, kinds << (2 * child)).astype(np.uint16)
-            mask[same], codes[same] = 0, 0
-            kept[-1] &= ~same[owner]
-            layers.append((parents, highest, mask, codes, same))
-            kept.append(np.ones(len(parents), dtype=bool))
+            mask = np.bincount(parent_index, 1 << child).astype(np.uint8)
+            codes = np.bincount(parent_index, kinds << (2 * child)).astype(np.uint16)
+            mask[is_pruned], codes[is_pruned] = 0, 0
+            is_kept[-1] &= ~is_pruned[parent_index]
+            layers.append((parents, highest, mask, codes, is_pruned))
+            is_kept.append(np.ones(len(parents), dtype=bool))
         order, parts = [], []
-        for level, ((numbers, *rest, _), keep) in enumerate(zip(layers, kept, strict=True)):
-            order.append(((numbers[keep] << (3 * level)) << 5) | (LEVELS - level))  # a parent before its first child
+        for level, ((layer_keys, *rest, _), keep) in enumerate(zip(layers, is_kept, strict=True)):
+            order.append(((layer_keys[keep] << (3 * level)) << 5) | (LEVELS - level))  # a parent before its first child
             parts.append([part[keep] for part in rest])
         indices = np.argsort(np.concatenate(order), kind="stable")
         self.values, self.children, self.codes = (
@@ -83,7 +83,7 @@ class _Nodes:
 
 
 def write_full(voxels: VoxelMap) -> bytes:
-    """Returns the full stream of a map; nothing for an empty map."""
+    """Returns the full stream of a map; empty for an empty map."""
     if not len(voxels.keys):
         return b""
     nodes = _Nodes(voxels.keys, voxels.values)
@@ -93,12 +93,12 @@ def write_full(voxels: VoxelMap) -> bytes:
 
 
 def write_binary(voxels: VoxelMap) -> bytes:
-    """Returns the binary stream of a map: free and occupied only; nothing for an empty map."""
+    """Returns the binary stream of a map, without probabilities; empty for an empty map."""
     return _binary_nodes(voxels)[0]
 
 
 def _binary_nodes(voxels: VoxelMap) -> tuple[bytes, int]:
-    """The binary stream and how many nodes the tree has."""
+    """Returns the binary stream and the number of nodes in the tree."""
     if not len(voxels.keys):
         return b"", 0
     nodes = _Nodes(voxels.keys, np.where(voxels.values > 0.0, HIGHEST, LOWEST).astype(np.float32))
@@ -106,21 +106,21 @@ def _binary_nodes(voxels: VoxelMap) -> tuple[bytes, int]:
 
 
 def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
-    """Returns the map of a stream.
+    """Decodes a stream into a map.
 
     Args:
-        data: the stream.
-        resolution: edge length of the smallest voxel [m].
-        binary: which of the two streams it is.
+        data: Byte stream.
+        resolution: Edge length of the smallest voxel [m].
+        binary: Whether the stream is binary instead of full.
 
     Raises:
-        GeometryError: the stream is not a whole tree, or has too many voxels.
+        GeometryError: The stream is not a complete tree, or has too many voxels.
     """
     if not data:
         return empty_map(resolution)
-    unit = 2 if binary else FULL_NODE.itemsize
-    if len(data) % unit:
-        raise _broken(f"{len(data)} bytes, which is no multiple of the {unit} bytes of a node")
+    node_bytes = 2 if binary else FULL_NODE.itemsize
+    if len(data) % node_bytes:
+        raise _broken(f"{len(data)} bytes, which is not a multiple of the {node_bytes} bytes of a node")
     if binary:
         codes = np.frombuffer(data, "<u2").astype(np.uint16)
         read, starts, depths, occupied = read_binary(codes, LEVELS)
@@ -129,10 +129,10 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
         nodes = np.frombuffer(data, FULL_NODE)
         read, starts, depths, indices = read_full(nodes["children"].copy(), LEVELS)
         values = nodes["value"][indices].astype(np.float32)
-    count = len(data) // unit
+    count = len(data) // node_bytes
     if read != count:
         raise _broken(
-            "a tree that ends early or is deeper than 16 levels"
+            "a tree that is truncated or deeper than 16 levels"
             if read < 0
             else f"{count - read} nodes after the end of the tree"
         )
@@ -143,7 +143,7 @@ def read_stream(data: bytes, resolution: float, binary: bool) -> VoxelMap:
 
 def _broken(got: str) -> GeometryError:
     return GeometryError(
-        f"octomap data: got {got}; expected the pre-order stream of one OcTree; send the data as octomap writes it"
+        f"octomap data: got {got}; expected the pre-order stream of one OcTree; send data written by octomap"
     )
 
 
@@ -153,8 +153,8 @@ def _expanded(resolution: float, starts: Keys, depths: NDArray[np.int64], values
     total = float(counts.astype(float).sum())
     if total > MAX_VOXELS:
         raise GeometryError(
-            f"octomap data: {total:.3g} voxels of {resolution} m; allowed are {MAX_VOXELS}; "
-            "send a map with larger voxels, or leave out wide free space"
+            f"octomap data: {total:.3g} voxels of {resolution} m; at most {MAX_VOXELS} are allowed; "
+            "send a map with larger voxels or less free space"
         )
     order = np.argsort(starts)
     starts, counts, values = starts[order], counts[order], values[order]
@@ -163,22 +163,22 @@ def _expanded(resolution: float, starts: Keys, depths: NDArray[np.int64], values
 
 
 def write_file(path: Path, voxels: VoxelMap) -> None:
-    """Writes a .bt file atomically: an existing file stays as it was if that fails.
+    """Writes a .bt file atomically; a failure leaves an existing file unchanged.
 
     Raises:
-        OSError: it cannot be written, or is there already and is no octomap.
+        OSError: The file cannot be written, or exists and is not an octomap.
     """
     if path.exists() and not (path.is_file() and _first_line(path) in (BINARY_HEADER, FULL_HEADER)):
-        raise OSError("it is there already and is no octomap, which alone is overwritten; give the path of a new file")
+        raise OSError("the file exists and is not an octomap; only octomaps are overwritten, so give a new path")
     data, nodes = _binary_nodes(voxels)
     header = BINARY_HEADER + f"\nid {TREE_TYPE}\nsize {nodes}\nres {voxels.resolution!r}\ndata\n".encode()
-    written = path.with_name(f".{uuid.uuid4().hex}.{path.name}")
+    temporary = path.with_name(f".{uuid.uuid4().hex}.{path.name}")
     try:
-        with written.open("xb") as file:
+        with temporary.open("xb") as file:
             file.write(header + data)
-        written.replace(path)
+        temporary.replace(path)
     finally:
-        written.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def _first_line(path: Path) -> bytes:
@@ -190,21 +190,21 @@ def read_file(path: Path) -> VoxelMap:
     """Reads a .bt or .ot file.
 
     Raises:
-        GeometryError: it cannot be read, or is no map of type OcTree.
+        GeometryError: The file cannot be read, or is not a map of type OcTree.
     """
     try:
         if not path.is_file() or path.stat().st_size > MAX_FILE_BYTES:
-            raise OSError(f"no regular file of at most {MAX_FILE_BYTES} bytes")
+            raise OSError(f"not a regular file of at most {MAX_FILE_BYTES} bytes")
         content = path.read_bytes()
     except OSError as error:
         raise GeometryError(
-            f"octomap file {path}: cannot be read ({error}); give the path of a .bt or .ot file that this node may read"
+            f"octomap file {path}: cannot be read ({error}); give the path of a readable .bt or .ot file"
         ) from error
     head, separator, data = content.partition(b"\ndata\n")
     first = head.split(b"\n", 1)[0].rstrip()
     if first not in (BINARY_HEADER, FULL_HEADER) or not separator or len(head) > MAX_HEADER_BYTES:
         raise GeometryError(
-            f"octomap file {path}: begins with '{first[:40].decode(errors='replace')}'; expected "
+            f"octomap file {path}: starts with '{first[:40].decode(errors='replace')}'; expected "
             f"'{BINARY_HEADER.decode()}' or '{FULL_HEADER.decode()}', a header and a line 'data'"
         )
     words = [line.split() for line in head.decode(errors="replace").splitlines() if not line.startswith("#")]
@@ -214,5 +214,5 @@ def read_file(path: Path) -> VoxelMap:
     except (KeyError, ValueError) as error:
         raise GeometryError(f"octomap file {path}: header {fields}; expected numbers after 'res' and 'size'") from error
     if fields.get("id") != TREE_TYPE:
-        raise GeometryError(f"octomap file {path}: tree of type '{fields.get('id')}'; allowed is '{TREE_TYPE}'")
+        raise GeometryError(f"octomap file {path}: tree of type '{fields.get('id')}'; the type must be '{TREE_TYPE}'")
     return read_stream(data if size else b"", resolution, first == BINARY_HEADER)

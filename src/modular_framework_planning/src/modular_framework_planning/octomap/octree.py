@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shape of an octomap: the geometry of a voxel map in a scene and in collision checks."""
+"""The shape of an octomap, for scenes and collision checks."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from modular_framework_planning.octomap.voxel_map import VoxelMap
 
 @dataclass(frozen=True, eq=False)
 class Octree(Shape):
-    """The occupied voxels of a map: axis-aligned cubes."""
+    """The occupied voxels of a map as axis-aligned cubes."""
 
     voxels: VoxelMap
 
     @cached_property
     def centers(self) -> Array:
-        """Centres of the occupied voxels (n, 3) [m]."""
+        """Centres of the occupied voxels, shape (n, 3) [m]."""
         return self.voxels.occupied_centers()
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Converts depth images and point clouds to points, and separates those within range from those beyond it."""
+"""Conversion of depth images and point clouds to points within and beyond the sensor's range."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modular_framework_planning.errors import GeometryError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_ros.point_clouds import PointCloudError, point_array
 
-DEPTH_TYPES = {"16UC1": ("u2", 0.001), "32FC1": ("f4", 1.0), "mono16": ("u2", 0.001)}  # item type, unit [m]
+DEPTH_TYPES = {"16UC1": ("u2", 0.001), "32FC1": ("f4", 1.0), "mono16": ("u2", 0.001)}  # pixel type, unit [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +27,8 @@ class Pinhole:
     def __post_init__(self) -> None:
         if not np.isfinite([self.fx, self.fy, self.cx, self.cy]).all() or min(self.fx, self.fy) <= 0.0:
             raise GeometryError(
-                f"camera_info: K gives fx, fy, cx, cy = {self.fx}, {self.fy}, {self.cx}, {self.cy}; "
-                "focal lengths above 0 and finite numbers are needed; is the camera calibrated?"
+                f"camera_info: K has fx, fy, cx, cy = {self.fx}, {self.fy}, {self.cx}, {self.cy}; "
+                "all must be finite and focal lengths above 0; calibrate the camera"
             )
 
 
@@ -37,9 +37,9 @@ class SeenPoints:
     """Points in the sensor's frame.
 
     Attributes:
-        ends: where rays ended within range (n, 3) [m].
-        pixels: of a depth image, the number of the pixel of each end in the flat image (n,).
-        beyond: points at the end of the range on rays that went on (m, 3) [m].
+        ends: Ends of rays within range, shape (n, 3) [m].
+        beyond: Points at maximum range on rays that ended beyond, shape (m, 3) [m].
+        pixels: For a depth image, the flat pixel index of each end, shape (n,).
     """
 
     ends: Array
@@ -48,34 +48,42 @@ class SeenPoints:
 
 
 def depth_array(data: bytes, encoding: str, shape: tuple[int, int], row_bytes: int, big_endian: bool) -> Array:
-    """Returns a depth image (rows, columns) [m].
+    """Decodes a depth image, shape (rows, columns) [m].
+
+    Args:
+        data: Pixel data.
+        encoding: Encoding of sensor_msgs/Image.
+        shape: Height and width [pixel].
+        row_bytes: Bytes per row.
+        big_endian: Whether pixels are big-endian.
 
     Raises:
-        GeometryError: another encoding, or too few bytes.
+        GeometryError: The encoding is not supported, or the data is too short.
     """
     if encoding not in DEPTH_TYPES:
-        raise GeometryError(f"depth image: encoding '{encoding}'; allowed are {', '.join(DEPTH_TYPES)}")
+        raise GeometryError(f"depth image: encoding '{encoding}'; supported encodings: {', '.join(DEPTH_TYPES)}")
     kind, unit = DEPTH_TYPES[encoding]
-    item = np.dtype(kind).newbyteorder(">" if big_endian else "<")
+    pixel = np.dtype(kind).newbyteorder(">" if big_endian else "<")
     height, width = shape
-    if row_bytes < width * item.itemsize or len(data) < height * row_bytes:
+    if row_bytes < width * pixel.itemsize or len(data) < height * row_bytes:
         raise GeometryError(
             f"depth image: {len(data)} bytes in rows of {row_bytes}; {width} x {height} pixels of "
-            f"'{encoding}' need {width * height * item.itemsize}"
+            f"'{encoding}' need {width * height * pixel.itemsize}"
         )
-    rows = np.ndarray((height, width), item, data, strides=(row_bytes, item.itemsize))
+    rows = np.ndarray((height, width), pixel, data, strides=(row_bytes, pixel.itemsize))
     return rows.astype(np.float64) * unit
 
 
 def points_of_depth(depth: Array, camera: Pinhole, near: float, far: float, skip: tuple[int, int]) -> SeenPoints:
-    """Projects a depth image.
+    """Projects a depth image to points.
 
     Args:
-        depth: distance along the optical axis (rows, columns) [m]; 0, negative and NaN: no reading, inf: beyond range.
-        camera: its camera.
-        near: readings nearer than this are not used [m].
-        far: readings further than this are beyond range [m].
-        skip: rows and columns left out at each border.
+        depth: Distance along the optical axis, shape (rows, columns) [m]. Values up to 0 and NaN mean no measurement,
+            infinity means beyond range.
+        camera: Intrinsic parameters of the camera.
+        near: Minimum valid depth [m].
+        far: Maximum range [m].
+        skip: Numbers of rows and columns left out at each border.
     """
     vertical, horizontal = skip
     rows = np.arange(vertical, max(vertical, depth.shape[0] - vertical))
@@ -94,10 +102,10 @@ def points_of_depth(depth: Array, camera: Pinhole, near: float, far: float, skip
 
 
 def cloud_array(message: Any) -> Array:
-    """Returns the points of a sensor_msgs/PointCloud2 (rows, columns, 3) [m].
+    """Returns the points of a sensor_msgs/PointCloud2, shape (rows, columns, 3) [m].
 
     Raises:
-        GeometryError: x, y or z is missing or no floating-point number, or there are too few bytes.
+        GeometryError: A field x, y or z is missing or not a floating-point number, or the data is too short.
     """
     try:
         return point_array(message)
@@ -106,9 +114,12 @@ def cloud_array(message: Any) -> Array:
 
 
 def points_of_cloud(cloud: Array, max_range: float, subsample: int) -> SeenPoints:
-    """Returns every `subsample`-th point of every `subsample`-th row; those further than max_range [m] are beyond.
+    """Returns the subsampled points of a cloud, without points that are not finite.
 
-    Points with a coordinate that is not finite are left out.
+    Args:
+        cloud: Points, shape (rows, columns, 3) [m].
+        max_range: Maximum range [m].
+        subsample: Step between used rows and between used columns.
     """
     points = cloud[::subsample, ::subsample].reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=1)]

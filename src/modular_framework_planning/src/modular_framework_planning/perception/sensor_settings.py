@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the sensors that feed the octomap, in the layout of MoveIt's sensors_3d.yaml (or sensor_plugins.yaml)."""
+"""Settings of the octomap's sensors, in the layout of MoveIt's sensors_3d.yaml (or sensor_plugins.yaml)."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any
 
 from modular_framework_planning.errors import ModelError
 
-IGNORED_KEYS = ("sensor_plugin", "sensor_type", "name")  # known to MoveIt's own readers, of no use here
+IGNORED_KEYS = ("sensor_plugin", "sensor_type", "name")  # keys for MoveIt's plugin loader
 
 COUNTS = ("point_subsample", "queue_size")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpdaterSettings:
-    """Settings of every octomap updater; keys and defaults are MoveIt's.
+    """Settings of all octomap updaters, with MoveIt's keys and defaults.
 
     Attributes:
-        max_update_rate: messages processed a second at most [Hz]; 0 for all.
-        filtered_cloud_topic: where what is left without the robot and the objects is published, a cloud or a depth
-            image (16UC1, mm); empty for nowhere.
-        ns: namespace of that topic within the node's.
+        max_update_rate: Maximum rate of processed messages [Hz]; 0 for no limit.
+        filtered_cloud_topic: Topic for the data without robot and known objects, a cloud or a depth image (16UC1, mm);
+            empty to disable.
+        ns: Namespace of this topic within the node's namespace.
     """
 
     max_update_rate: float = 0.0
@@ -32,13 +32,14 @@ class UpdaterSettings:
 
 @dataclass(frozen=True, slots=True)
 class PointCloudSettings(UpdaterSettings):
-    """A PointCloudOctomapUpdater.
+    """Settings of a PointCloudOctomapUpdater.
 
     Attributes:
-        point_cloud_topic: sensor_msgs/PointCloud2.
-        max_range: points further away only clear [m].
-        point_subsample: every n-th point of every n-th row is used.
-        padding_offset, padding_scale: how much larger the robot and the objects are taken [m and 1].
+        point_cloud_topic: Topic of type sensor_msgs/PointCloud2.
+        max_range: Maximum range [m]; farther points only clear voxels.
+        point_subsample: Step between used rows and between used columns.
+        padding_offset: Padding of robot and known objects [m].
+        padding_scale: Scale of robot and known objects.
     """
 
     point_cloud_topic: str
@@ -50,16 +51,18 @@ class PointCloudSettings(UpdaterSettings):
 
 @dataclass(frozen=True, slots=True)
 class DepthImageSettings(UpdaterSettings):
-    """A DepthImageOctomapUpdater.
+    """Settings of a DepthImageOctomapUpdater.
 
     Attributes:
-        image_topic: sensor_msgs/Image; camera_info is expected beside it.
-        queue_size: images that may wait.
-        near_clipping_plane_distance, far_clipping_plane_distance: readings outside are left out, or only clear [m].
-        shadow_threshold: a reading this little behind the robot or an object belongs to it [m].
-        padding_scale: how many times the camera's depth noise is added to the padding [1].
-        padding_offset: padding of the robot and of objects [m].
-        skip_vertical_pixels, skip_horizontal_pixels: border that is left out on each side [pixel].
+        image_topic: Topic of type sensor_msgs/Image; camera_info must be in the same namespace.
+        queue_size: Maximum number of waiting images.
+        near_clipping_plane_distance: Minimum valid depth [m].
+        far_clipping_plane_distance: Maximum range [m]; farther measurements only clear voxels.
+        shadow_threshold: Maximum distance behind robot or object of a measurement that still belongs to it [m].
+        padding_scale: Factor of the camera's depth noise in the padding.
+        padding_offset: Padding of robot and known objects [m].
+        skip_vertical_pixels: Number of rows left out at the top and at the bottom.
+        skip_horizontal_pixels: Number of columns left out on the left and on the right.
     """
 
     image_topic: str = "depth"
@@ -81,32 +84,32 @@ PLUGINS: Mapping[str, type[PointCloudSettings] | type[DepthImageSettings]] = {
 
 
 def read_sensors(entries: Any, max_range: float | None) -> tuple[list[SensorSettings], list[str]]:
-    """Reads a list of sensors.
+    """Reads the parameter `sensors`.
 
     Args:
-        entries: the parameter `sensors`; entries that are empty, or whose plugin begins with "~", are switched off.
-        max_range: range of clouds that name none [m].
+        entries: Value of the parameter; entries that are empty or have a plugin starting with "~" are disabled.
+        max_range: Default range of point clouds [m].
 
     Returns:
-        The sensors that can be used, and a sentence for each entry that cannot.
+        The valid sensors, and a message for each invalid entry.
     """
     if not isinstance(entries, list | tuple):
-        return [], [f"sensors: got a {type(entries).__name__}; a list of sensors is needed"]
+        return [], [f"sensors: got a {type(entries).__name__}; give a list of sensors"]
     sensors, faults = [], []
-    for number, entry in enumerate(entries):
+    for index, entry in enumerate(entries):
         if not entry or (isinstance(entry, dict) and str(entry.get("sensor_plugin", "")).startswith("~")):
             continue
         try:
             sensors.append(_read_sensor(entry, max_range))
         except ModelError as error:
-            faults.append(f"sensors[{number}]: {error.reason}")
+            faults.append(f"sensors[{index}]: {error.reason}")
     return sensors, faults
 
 
 def _read_sensor(entry: Any, max_range: float | None) -> SensorSettings:
     if not isinstance(entry, dict) or entry.get("sensor_plugin") not in PLUGINS:
         got = entry.get("sensor_plugin") if isinstance(entry, dict) else type(entry).__name__
-        raise ModelError(f"sensor_plugin is '{got}'; allowed are {', '.join(PLUGINS)}")
+        raise ModelError(f"sensor_plugin is '{got}'; supported plugins: {', '.join(PLUGINS)}")
     kind = PLUGINS[entry["sensor_plugin"]]
     known = {item.name: item.type for item in fields(kind)}
     values: dict[str, Any] = {} if max_range is None or kind is DepthImageSettings else {"max_range": max_range}
@@ -114,19 +117,19 @@ def _read_sensor(entry: Any, max_range: float | None) -> SensorSettings:
         if key in IGNORED_KEYS:
             continue
         if key not in known:
-            raise ModelError(f"unknown key '{key}'; allowed are {', '.join(known)}")
-        values[key] = _converted(key, value, {"str": str, "int": int, "float": float}[str(known[key])])
+            raise ModelError(f"unknown key '{key}'; allowed keys: {', '.join(known)}")
+        values[key] = _convert(key, value, {"str": str, "int": int, "float": float}[str(known[key])])
     if kind is PointCloudSettings and not values.get("point_cloud_topic"):
         raise ModelError("point_cloud_topic is missing; name the topic of the cloud")
     return kind(**values)
 
 
-def _converted(key: str, value: Any, kind: type) -> Any:
+def _convert(key: str, value: Any, kind: type) -> Any:
     try:
         result = kind(value)
     except (TypeError, ValueError) as error:
-        raise ModelError(f"{key} is {value!r}; a value of type {kind.__name__} is needed") from error
-    least = 1 if key in COUNTS else 0
-    if kind is not str and not result >= least:
-        raise ModelError(f"{key} is {value!r}; a number of {least} or more is needed")
+        raise ModelError(f"{key} is {value!r}; give a value of type {kind.__name__}") from error
+    minimum = 1 if key in COUNTS else 0
+    if kind is not str and not result >= minimum:
+        raise ModelError(f"{key} is {value!r}; give a number of at least {minimum}")
     return result
