@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Grasps and releases: approach, fingers, retreat."""
+"""Planning of grasps and releases."""

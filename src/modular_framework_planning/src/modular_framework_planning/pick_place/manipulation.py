@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans a grasp or a release: motion to the approach, straight approach, fingers, straight retreat.
+"""Planning of a grasp or release: motion to the approach, straight approach, finger motion, straight retreat.
 
-Picking and placing differ in the motion of the fingers, the effect on the scene, and the allowed collisions.
+Picking and placing differ in the finger motion, the effect on the scene, and the allowed collisions.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from modular_framework_planning.robot_model.robot_model import JointGroup
 from modular_framework_planning.trajectory_processing.line_timing import time_line
 from modular_framework_planning.trajectory_processing.trajectory import Trajectory
 
-CHECK_STEP = 0.004  # [rad or m] between checked states
-DISTANCE_SLACK_M = 1.0e-6
+CHECK_STEP = 0.004  # [rad or m]; distance between checked states
+DISTANCE_TOLERANCE_M = 1.0e-6
 
 Posture = Mapping[str, float]
 
 
 def allowing(scene: PlanningScene, links: Iterable[str], others: Iterable[str]) -> PlanningScene:
-    """Returns the scene in which each of the links (or bodies) may touch each of the others."""
+    """Returns the scene with contact allowed between each of the links (or bodies) and each of the others."""
     acm, names = scene.acm, list(others)
     for link in links:
         for other in names:
@@ -56,8 +56,10 @@ class Translation:
     """A straight motion of the tip.
 
     Attributes:
-        direction: of unit length, shape (3,); in the tip's own frame if `in_tip`, else in the planning frame.
-        desired_distance_m, min_distance_m: how far it should go, and how far it has to.
+        direction: Unit vector, shape (3,).
+        in_tip: Whether the direction is in the tip's frame instead of the planning frame.
+        desired_distance_m: Desired distance.
+        min_distance_m: Minimum distance.
     """
 
     direction: Array
@@ -66,22 +68,26 @@ class Translation:
     min_distance_m: float
 
     def ending_at(self, pose: Transform, distance_m: float) -> Transform:
-        """Returns the pose this far along the direction; a negative distance is before it."""
+        """Returns the pose moved along the direction by a distance, which may be negative."""
         step = (pose.rotation @ self.direction if self.in_tip else self.direction) * distance_m
         return pin.SE3(pose.rotation, pose.translation + step)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Manoeuvre:
-    """One way to grasp or to release.
+    """A candidate grasp or release.
 
     Attributes:
-        tip_pose: of the end effector's link while the fingers move, in the planning frame.
-        allow: what may touch on the two lines and while the fingers move.
-        effect: what becomes of the object when the fingers have moved: attached, or put into the world.
-        fingers_before, fingers_after: positions of the gripper's joints; none: they stay.
-        closing_in: continue along the approach until just before a contact.
-        middle: name of the stage in which the fingers move.
+        name: Name of the candidate.
+        tip_pose: Pose of the end effector's parent link during the finger motion, in the planning frame.
+        approach: Motion to the tip pose.
+        retreat: Motion after the finger motion.
+        allow: Scene change that allows contacts during approach, finger motion and retreat.
+        effect: Scene change after the finger motion, which attaches or detaches the object.
+        fingers_before: Finger positions before the approach, by joint name [rad or m]; empty for no motion.
+        fingers_after: Finger positions after the finger motion, by joint name [rad or m]; empty for no motion.
+        closing_in: Whether the approach continues until just before a contact.
+        middle: Name of the stage with the finger motion.
     """
 
     name: str
@@ -98,12 +104,15 @@ class Manoeuvre:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """One motion of a manoeuvre: a timed one of the arm, or one of the fingers.
+    """One motion of a manoeuvre, either of the arm or of the fingers.
 
     Attributes:
-        scene: the real scene as it should be when the stage begins.
-        change: what the stage allows for itself, to watch the motion with.
-        effect: what the real scene becomes afterwards; None: it stays.
+        name: Name of the stage.
+        scene: Expected real scene at the start of the stage.
+        change: Scene change for this stage only, used while monitoring the motion.
+        motion: Trajectory of the arm, or None.
+        fingers: Goal positions of the fingers, by joint name [rad or m].
+        effect: Permanent change of the real scene after the stage, or None.
     """
 
     name: str
@@ -116,7 +125,15 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """The group that moves, and its limits [rad/s, rad/s^2]."""
+    """The planning group of the arm.
+
+    Attributes:
+        group: Planning group.
+        link: Parent link of the end effector.
+        solver: Inverse kinematics of the group.
+        velocity: Velocity limits, shape (joints,) [rad/s or m/s].
+        acceleration: Acceleration limits, shape (joints,) [rad/s^2 or m/s^2].
+    """
 
     group: JointGroup
     link: str
@@ -126,7 +143,7 @@ class Arm:
 
 
 class ManoeuvrePlanner:
-    """Plans manoeuvres one after the other within one deadline. Not thread-safe."""
+    """Plans manoeuvres in sequence within one deadline; not thread-safe."""
 
     def __init__(
         self,
@@ -137,15 +154,15 @@ class ManoeuvrePlanner:
         settings: PickPlaceSettings,
         new_checker: CollisionCheckerFactory = DEFAULT_CHECKER,
     ) -> None:
-        """Stores what all manoeuvres share.
+        """Stores the parts that all manoeuvres share.
 
         Args:
-            arm: the group that moves.
-            plan: plans the way to the approach.
-            request: a template of that plan: scene, planner, time allowed, path constraints.
-            contact_tolerance_m: depth at which a held object may already touch something.
-            settings: how finely lines are solved and how many postures are tried.
-            new_checker: makes the collision checkers.
+            arm: Planning group of the arm.
+            plan: Function that plans the motion to the approach.
+            request: Template request with scene, planner, allowed time and path constraints.
+            contact_tolerance_m: Maximum depth of tolerated initial contacts of a held object.
+            settings: Settings of pick and place.
+            new_checker: Factory of collision checkers.
         """
         self._arm, self._plan, self._template = arm, plan, request
         self._tolerance_m, self._settings = contact_tolerance_m, settings
@@ -155,14 +172,18 @@ class ManoeuvrePlanner:
 
     @property
     def remaining_s(self) -> float:
-        """Time that is left."""
+        """Time until the deadline [s]."""
         return self._deadline_s - time.monotonic()
 
     def plan(self, manoeuvre: Manoeuvre, allowed_time_s: float) -> tuple[Stage, ...]:
-        """Returns the stages of one manoeuvre; the plan of the motion to its approach may take `allowed_time_s`.
+        """Returns the stages of one manoeuvre.
+
+        Args:
+            manoeuvre: Candidate grasp or release.
+            allowed_time_s: Time limit for planning the motion to the approach [s].
 
         Raises:
-            PlanningError: which stage cannot be done, and why.
+            PlanningError: A stage is infeasible; the reason names the stage.
         """
         scene = self._template.scene
         open_scene = manoeuvre.allow(self._with_fingers(scene, manoeuvre.fingers_before))
@@ -171,19 +192,19 @@ class ManoeuvrePlanner:
             try:
                 approach, retreat = self._lines(manoeuvre, open_scene, values)
             except _LineTooShort as error:
-                if failure is None or error.share > failure[0]:
-                    failure = (error.share, error)
+                if failure is None or error.fraction > failure[0]:
+                    failure = (error.fraction, error)
                 continue
             to_approach = self._plan_to_approach(manoeuvre, approach[0], allowed_time_s)
             return self._stages(manoeuvre, open_scene, to_approach, approach, retreat)
-        assert failure is not None, "there is at least one posture, or _reachable has raised"
+        assert failure is not None, "_reachable raises if no arm configuration is free"
         raise failure[1]
 
     def _with_fingers(self, scene: PlanningScene, fingers: Posture) -> PlanningScene:
         return scene.with_positions(scene.model.merge(scene.positions, fingers)) if fingers else scene
 
     def _checkers(self, scene: PlanningScene) -> tuple[CollisionChecker, MotionChecker]:
-        """Builds the checkers of a scene; shallow contacts that a held object has there may stay."""
+        """Builds the checkers of a scene; existing shallow contacts of a held object are tolerated."""
         indices = self._arm.group.indices
         checker = self._new_checker(scene, indices)
         shallow = [
@@ -196,20 +217,20 @@ class ManoeuvrePlanner:
         return checker, MotionChecker(checker, indices, scene.positions)
 
     def _objection(self, scene: PlanningScene) -> Objection:
-        """Refuses contacts and broken path constraints."""
+        """Returns a check of a step that finds violated path constraints, then collisions."""
         checker, motion = self._checkers(scene)
-        touches = collision_objection(checker, motion, CHECK_STEP)
+        collides = collision_objection(checker, motion, CHECK_STEP)
 
         def objection(before: Array, after: Array) -> str:
             full = motion.full_positions(after)
             if self._constraints is not None and not self._constraints.satisfied(full):
                 return f"path constraints: {self._constraints.describe(full)}"
-            return touches(before, after)
+            return collides(before, after)
 
         return objection
 
     def _reachable(self, manoeuvre: Manoeuvre, scene: PlanningScene) -> list[Array]:
-        """Returns free postures of the arm at the grasp, nearest first; raises PlanningError."""
+        """Returns collision-free arm configurations at the grasp, nearest first; raises PlanningError."""
         arm = self._arm
         found = arm.solver.solutions(arm.link, manoeuvre.tip_pose, scene.positions)
         if not found:
@@ -220,27 +241,27 @@ class ManoeuvrePlanner:
             )
         at_nearest = scene.with_positions(found[0])
         checker, motion = self._checkers(at_nearest)
-        free = first_free(
+        collision_free = first_free(
             [item[arm.group.indices] for item in found],
             motion.state_is_free,
             self._settings.max_attempted_states_per_pose,
         )
-        if not free:
+        if not collision_free:
             raise PlanningError(
                 ErrorCode.GOAL_IN_COLLISION,
                 f"{manoeuvre.name}: reach: all {len(found)} inverse "
-                "kinematics solutions collide; the nearest: "
+                "kinematics solutions collide; nearest solution: "
                 f"{describe_contacts(checker.contacts(found[0], include_fixed=False))}",
             )
-        return free
+        return collision_free
 
     def _lines(self, manoeuvre: Manoeuvre, scene: PlanningScene, values: Array) -> tuple[Array, Array]:
-        """Returns the rows of the approach and of the retreat; raises _LineTooShort."""
+        """Returns the joint vectors of the approach and of the retreat, shape (n, joints); raises _LineTooShort."""
         arm, pose = self._arm, manoeuvre.tip_pose
-        at_grasp = scene.with_positions(self._at(scene, values))
+        at_grasp = scene.with_positions(self._full_positions(scene, values))
         translation, name = manoeuvre.approach, manoeuvre.name
         back = self._line(at_grasp, translation.ending_at(pose, -translation.desired_distance_m))
-        approach = _enough(f"{name}: approach (looked at from the grasp backwards)", back, translation)[::-1]
+        approach = _long_enough(f"{name}: approach (checked backwards from the grasp)", back, translation)[::-1]
         if manoeuvre.closing_in:
             untouched = self._with_fingers(self._template.scene, manoeuvre.fingers_before)
             further = self._line(
@@ -248,23 +269,23 @@ class ManoeuvrePlanner:
                 translation.ending_at(pose, translation.desired_distance_m),
             )
             approach = np.vstack([approach, further.rows[1:]])
-            at_grasp = scene.with_positions(self._at(scene, approach[-1]))
+            at_grasp = scene.with_positions(self._full_positions(scene, approach[-1]))
             pose = at_grasp.frame_transform(arm.link)
-        held = self._after(manoeuvre, at_grasp)
-        leave = self._line(held, manoeuvre.retreat.ending_at(pose, manoeuvre.retreat.desired_distance_m))
-        return approach, _enough(f"{name}: retreat", leave, manoeuvre.retreat)
+        held = self._after_fingers(manoeuvre, at_grasp)
+        retreat = self._line(held, manoeuvre.retreat.ending_at(pose, manoeuvre.retreat.desired_distance_m))
+        return approach, _long_enough(f"{name}: retreat", retreat, manoeuvre.retreat)
 
-    def _after(self, manoeuvre: Manoeuvre, at_grasp: PlanningScene) -> PlanningScene:
-        """Returns the scene when the fingers have moved."""
+    def _after_fingers(self, manoeuvre: Manoeuvre, at_grasp: PlanningScene) -> PlanningScene:
+        """Returns the scene after the finger motion."""
         return manoeuvre.allow(manoeuvre.effect(self._with_fingers(at_grasp, manoeuvre.fingers_after)))
 
-    def _at(self, scene: PlanningScene, values: Array) -> Array:
+    def _full_positions(self, scene: PlanningScene, values: Array) -> Array:
         positions = scene.positions.copy()
         positions[self._arm.group.indices] = values
         return positions
 
     def _line(self, scene: PlanningScene, end: Transform) -> StraightLine:
-        """Follows a line from where the robot is in the scene."""
+        """Solves a straight line from the robot's pose in the scene."""
         return straight_line(
             self._arm.solver,
             self._arm.link,
@@ -275,25 +296,41 @@ class ManoeuvrePlanner:
         )
 
     def _plan_to_approach(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
-        """Plans from where the robot is to the start of the approach, with nothing allowed to touch."""
+        """Plans from the robot's state to the start of the approach, without allowed contacts.
+
+        Args:
+            manoeuvre: Candidate grasp or release.
+            values: Joint vector at the start of the approach, shape (joints,) [rad or m].
+            allowed_time_s: Time limit [s].
+        """
         group, template = self._arm.group, self._template
         allowed_s = min(self.remaining_s, allowed_time_s)
         if allowed_s <= 0.0:
-            raise PlanningError(ErrorCode.TIMED_OUT, f"{manoeuvre.name}: no time is left to plan the way to it")
+            raise PlanningError(
+                ErrorCode.TIMED_OUT, f"{manoeuvre.name}: no time remains to plan the motion to the approach"
+            )
         goal = JointGoal(dict(zip(group.joints, values.tolist(), strict=True)))
         try:
             return self._plan(replace(template, goals=(goal,), allowed_time_s=allowed_s)).trajectory
         except PlanningError as error:
-            raise PlanningError(error.code, f"{manoeuvre.name}: way to the approach: {error.reason}") from error
+            raise PlanningError(error.code, f"{manoeuvre.name}: motion to the approach: {error.reason}") from error
 
     def _stages(
         self, manoeuvre: Manoeuvre, open_scene: PlanningScene, to_approach: Trajectory, approach: Array, retreat: Array
     ) -> tuple[Stage, ...]:
-        """Times the lines and puts everything in order; a line without length is left out."""
+        """Returns the stages in order, with timed lines; lines of zero length are left out.
+
+        Args:
+            manoeuvre: Candidate grasp or release.
+            open_scene: Scene with the fingers before the approach and all contacts allowed.
+            to_approach: Motion to the approach.
+            approach: Joint vectors of the approach, shape (n, joints) [rad or m].
+            retreat: Joint vectors of the retreat, shape (m, joints) [rad or m].
+        """
         allow, before = manoeuvre.allow, manoeuvre.fingers_before
-        ready = open_scene.with_positions(self._at(open_scene, approach[0]))
-        at_grasp = open_scene.with_positions(self._at(open_scene, approach[-1]))
-        held = self._after(manoeuvre, at_grasp)
+        ready = open_scene.with_positions(self._full_positions(open_scene, approach[0]))
+        at_grasp = open_scene.with_positions(self._full_positions(open_scene, approach[-1]))
+        held = self._after_fingers(manoeuvre, at_grasp)
         stages = [Stage("plan", self._template.scene, _unchanged, to_approach)]
         if before:
             stages.append(Stage("pre_grasp", ready, allow, fingers=before))
@@ -305,7 +342,7 @@ class ManoeuvrePlanner:
         return tuple(stages)
 
     def _timed(self, scene: PlanningScene, rows: Array) -> Trajectory:
-        """Times a line that begins where the robot is in the scene."""
+        """Times a line that starts at the robot's state in the scene."""
         _, motion = self._checkers(scene)
         return time_line(
             self._arm.group.joints,
@@ -325,20 +362,26 @@ def _unchanged(scene: PlanningScene) -> PlanningScene:
 
 
 class _LineTooShort(PlanningError):
-    """A line ended before its least distance."""
+    """A line ended before the minimum distance."""
 
-    def __init__(self, reason: str, share: float) -> None:
+    def __init__(self, reason: str, fraction: float) -> None:
         super().__init__(ErrorCode.PLANNING_FAILED, reason)
-        self.share = share
+        self.fraction = fraction
 
 
-def _enough(what: str, line: StraightLine, translation: Translation) -> Array:
-    """Returns the rows of a line that went far enough; raises _LineTooShort."""
+def _long_enough(where: str, line: StraightLine, translation: Translation) -> Array:
+    """Returns the joint vectors of a line; raises _LineTooShort if the line is shorter than the minimum distance.
+
+    Args:
+        where: Name of the stage, for error messages.
+        line: Solved line.
+        translation: Required translation.
+    """
     distance = line.fraction * translation.desired_distance_m
-    if distance < translation.min_distance_m - DISTANCE_SLACK_M:
+    if distance < translation.min_distance_m - DISTANCE_TOLERANCE_M:
         raise _LineTooShort(
-            f"{what}: only {distance:.3f} m of {translation.desired_distance_m:.3f} m, at least "
-            f"{translation.min_distance_m:.3f} m are asked for; {line.stop}",
+            f"{where}: only {distance:.3f} m of {translation.desired_distance_m:.3f} m; at least "
+            f"{translation.min_distance_m:.3f} m are required; {line.stop}",
             line.fraction,
         )
     return line.rows

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings of grasps and releases, under MoveIt's names."""
+"""Settings of pick and place, under MoveIt's names."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class PickPlaceSettings:
     """Parameters below ~pick_place.
 
     Attributes:
-        max_attempted_states_per_pose: postures of the arm that are tried for one grasp or place.
-        cartesian_motion_step_size: between the poses that are solved on a straight line [m].
+        max_attempted_states_per_pose: Maximum number of arm configurations tried per grasp or place location.
+        cartesian_motion_step_size: Distance between poses solved on a straight line [m].
     """
 
     max_attempted_states_per_pose: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interactive markers that set the goal in RViz, one at the tip and one at a base that moves, and their menu."""
+"""The interactive markers for the goal in RViz, at the tip and at a moving base, and their menu."""
 
 from __future__ import annotations
 
@@ -26,34 +26,40 @@ AXES = {"x": Quaternion(HALF, 0, 0, HALF), "y": Quaternion(0, HALF, 0, HALF), "z
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A list of entries of which one is ticked."""
+    """A submenu with one checked entry.
+
+    Attributes:
+        title: Title of the submenu.
+        entries: Titles of the entries.
+        select: Function called with the title of the chosen entry.
+    """
 
     title: str
     entries: Sequence[str]
     select: Callable[[str], None]
 
 
-SIX_WAYS = tuple(
-    (f"{name}_{axis}", mode, turn)
-    for axis, turn in AXES.items()
+SIX_DOF_CONTROLS = tuple(
+    (f"{name}_{axis}", mode, orientation)
+    for axis, orientation in AXES.items()
     for name, mode in (
         ("move", InteractiveMarkerControl.MOVE_AXIS),
         ("rotate", InteractiveMarkerControl.ROTATE_AXIS),
     )
 )
-ON_THE_GROUND = (  # RViz's plane and turn are about the x axis of a control
+PLANAR_CONTROLS = (  # in RViz, the x axis of a control is the normal of its plane and its rotation axis
     ("move_x", InteractiveMarkerControl.MOVE_AXIS, Quaternion(0, 0, 0, 1)),
     ("move_y", InteractiveMarkerControl.MOVE_AXIS, AXES["z"]),
     ("move_plane", InteractiveMarkerControl.MOVE_PLANE, AXES["y"]),
     ("rotate_z", InteractiveMarkerControl.ROTATE_AXIS, AXES["y"]),
 )
-Ways = tuple[tuple[str, int, Quaternion], ...]
+Controls = tuple[tuple[str, int, Quaternion], ...]
 
 
 class GoalMarker:
-    """Interactive markers, each with the ways in which it can be dragged and all with one menu.
+    """Interactive markers with individual controls and a common menu.
 
-    Viewers see changes of markers at the next `apply`, all at once.
+    Changes of markers become visible together at the next `apply`.
 
     Publishes and subscribes: <topic>/update, <topic>/update_full, <topic>/feedback (interactive_markers).
     """
@@ -62,25 +68,25 @@ class GoalMarker:
         """Opens the topics.
 
         Args:
-            topic: first part of the names of the topics.
-            on_drag: called with the marker's name and its pose in the frame it was shown in.
+            topic: Prefix of the topic names.
+            on_drag: Function called with a marker's name and new pose, in the frame of `show`.
         """
         self._server = InteractiveMarkerServer(topic)
         self._menu = MenuHandler()
         self._on_drag = on_drag
 
     def fill_menu(self, commands: Sequence[tuple[str, Callable[[], None]]], choices: Sequence[Choice]) -> None:
-        """Sets what the menu offers, in place of what it offered before; the first entry of each choice is ticked."""
+        """Replaces the menu; the first entry of each choice is checked."""
         self._menu = MenuHandler()
         for title, command in commands:
             self._menu.insert(title, callback=lambda _, run=command: run())
         for choice in choices:
             parent = self._menu.insert(choice.title)
             handles: dict[int, str] = {}
-            for number, entry in enumerate(choice.entries):
-                handle = self._menu.insert(entry, parent=parent, callback=self._ticker(choice, handles))
+            for index, entry in enumerate(choice.entries):
+                handle = self._menu.insert(entry, parent=parent, callback=self._selector(choice, handles))
                 handles[handle] = entry
-                self._menu.setCheckState(handle, MenuHandler.CHECKED if number == 0 else MenuHandler.UNCHECKED)
+                self._menu.setCheckState(handle, MenuHandler.CHECKED if index == 0 else MenuHandler.UNCHECKED)
 
         for name in self._shown():
             self._menu.apply(self._server, name)
@@ -89,10 +95,10 @@ class GoalMarker:
     def _shown(self) -> list[str]:
         return [name for name in (GOAL, BASE) if self._server.get(name) is not None]
 
-    def _ticker(self, choice: Choice, handles: dict[int, str]) -> Callable[[Any], None]:
+    def _selector(self, choice: Choice, handles: dict[int, str]) -> Callable[[Any], None]:
         menu = self._menu
 
-        def tick(feedback: Any) -> None:
+        def select(feedback: Any) -> None:
             for handle in handles:
                 menu.setCheckState(
                     handle, MenuHandler.CHECKED if handle == feedback.menu_entry_id else MenuHandler.UNCHECKED
@@ -101,30 +107,39 @@ class GoalMarker:
             self._server.applyChanges()
             choice.select(handles[feedback.menu_entry_id])
 
-        return tick
+        return select
 
-    def show(self, name: str, frame: str, pose: Pose, scale_m: float, ways: Ways = SIX_WAYS) -> None:
-        """Shows a marker, or moves it to another pose and resets it, at the next `apply`."""
+    def show(self, name: str, frame: str, pose: Pose, scale_m: float, controls: Controls = SIX_DOF_CONTROLS) -> None:
+        """Shows or replaces a marker at the next `apply`.
+
+        Args:
+            name: Name of the marker.
+            frame: Frame of the pose.
+            pose: Pose of the marker.
+            scale_m: Size of the marker.
+            controls: Name, interaction mode and orientation of each control.
+        """
         marker = InteractiveMarker(name=name, description="", pose=pose, scale=scale_m)
         marker.header.frame_id = frame
-        ball = Marker(type=Marker.SPHERE)
-        ball.scale.x = ball.scale.y = ball.scale.z = 0.25 * scale_m
-        ball.color.r, ball.color.g, ball.color.b, ball.color.a = 0.2, 0.6, 1.0, 0.6
+        sphere = Marker(type=Marker.SPHERE)
+        sphere.scale.x = sphere.scale.y = sphere.scale.z = 0.25 * scale_m
+        sphere.color.r, sphere.color.g, sphere.color.b, sphere.color.a = 0.2, 0.6, 1.0, 0.6
         marker.controls.append(
-            InteractiveMarkerControl(name="menu", interaction_mode=InteractiveMarkerControl.MENU, markers=[ball])
+            InteractiveMarkerControl(name="menu", interaction_mode=InteractiveMarkerControl.MENU, markers=[sphere])
         )
         marker.controls += [
-            InteractiveMarkerControl(name=way, orientation=turn, interaction_mode=mode) for way, mode, turn in ways
+            InteractiveMarkerControl(name=control, orientation=orientation, interaction_mode=mode)
+            for control, mode, orientation in controls
         ]
         self._server.insert(marker, self._on_feedback)
         self._menu.apply(self._server, name)
 
     def hide(self, name: str) -> None:
-        """Takes a marker away at the next `apply`; one that is not shown is no error."""
+        """Removes a marker at the next `apply`; has no effect on a hidden marker."""
         self._server.erase(name)
 
     def move(self, name: str, pose: Pose) -> None:
-        """Puts a marker elsewhere at the next `apply`; one that is not shown stays so."""
+        """Moves a marker at the next `apply`; has no effect on a hidden marker."""
         if name in self._shown():
             self._server.setPose(name, pose)
 
@@ -134,11 +149,11 @@ class GoalMarker:
 
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
         if feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
-            self._server.applyChanges()  # other viewers see where it was dragged to
+            self._server.applyChanges()  # shows the dragged pose to other viewers
         if feedback.event_type != InteractiveMarkerFeedback.POSE_UPDATE:
             return
         p, q = feedback.pose.position, feedback.pose.orientation
         if not all(math.isfinite(value) for value in (p.x, p.y, p.z, q.x, q.y, q.z, q.w)):
-            rospy.logwarn_throttle(5.0, "interactive goal: a dragged pose with a number that is not finite is ignored")
+            rospy.logwarn_throttle(5.0, "interactive goal: ignored a dragged pose that is not finite")
             return
         self._on_drag(feedback.marker_name, feedback.pose)

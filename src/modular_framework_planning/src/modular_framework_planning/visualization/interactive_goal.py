@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An interactive goal in RViz: drag it, see whether it is reachable, plan and execute; needs stock displays only."""
+"""An interactive goal in RViz with stock displays: drag the goal, see whether it is valid, plan and execute."""
 
 from __future__ import annotations
 
@@ -26,7 +26,14 @@ from modular_framework_planning.move_group.robot_parameters import load_robot_mo
 from modular_framework_planning.planning_scene.planning_scene import empty_scene
 from modular_framework_planning.robot_model.multi_dof_joint import PLANAR
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
-from modular_framework_planning.visualization.goal_marker import BASE, GOAL, ON_THE_GROUND, SIX_WAYS, Choice, GoalMarker
+from modular_framework_planning.visualization.goal_marker import (
+    BASE,
+    GOAL,
+    PLANAR_CONTROLS,
+    SIX_DOF_CONTROLS,
+    Choice,
+    GoalMarker,
+)
 from modular_framework_planning.visualization.move_group_client import MotionOptions, MoveGroupClient
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.publishing import publish
@@ -36,26 +43,25 @@ START_COLOR = (0.2, 0.4, 0.9, 0.4)
 RANDOM_ATTEMPTS = 200
 TEXT_ABOVE_TIP_M = 0.45  # clear of the hand
 TEXT_WIDTH, TEXT_LINES = 60, 5
-DRAG_TIMEOUT_S = 2.0  # how long a plan waits for the goal that is being dragged
-BASE_SCALE = 3.0  # the marker of the base, of the size of that at the tip
-MOVED = 1.0e-3  # [rad or m] a change of the robot's state that the goal follows
-FOLLOW_PERIOD_S = 0.5  # of the goal that follows the robot
-JOB_END_S = 0.2  # after a job has reported its end, until the next one can start
+DRAG_TIMEOUT_S = 2.0  # maximum wait of a plan for a dragged goal
+BASE_SCALE = 3.0  # size of the base's marker relative to the tip's marker
+MIN_STATE_CHANGE = 1.0e-3  # [rad or m]; smaller motions of the robot do not move the goal
+FOLLOW_PERIOD_S = 0.5  # of updates of a goal that follows the robot
+JOB_END_S = 0.2  # maximum wait for a finished job to release the lock
 DEFAULT_PLANNER = "move_group's default"
 
 
 class InteractiveGoal:
-    """A marker at the tip to drag the goal with, ghosts of start and goal, and a menu.
+    """An interactive marker at the tip for the goal, ghosts of start and goal, and a menu.
 
-    A group with a planar or floating base has a second marker, which places the base. The goal follows the robot, and
-    has no ghost, until it is set and after a motion to it: at start-up the joints that move_group knows may not be
-    those of the robot yet.
+    A group with a planar or floating base has a second marker for the base. Until a goal is set, and again after each
+    execution, the goal follows the robot and has no ghost, because move_group may not know the robot's joints at start.
 
     Publishes: ~goal_ghost, ~start_ghost (visualization_msgs/MarkerArray, latched).
     Interactive marker: ~marker.
     Subscribes: /rviz/moveit/{plan, execute, stop, update_start_state, update_goal_state} (std_msgs/Empty) and
         /rviz/moveit/{update_custom_start_state, update_custom_goal_state} (moveit_msgs/RobotState), as MoveIt's panel.
-    Parameters: see `parameters/interactive_goal.yaml`.
+    Parameters: `parameters/interactive_goal.yaml`.
     """
 
     def __init__(self, model: RobotModel, client: MoveGroupClient) -> None:
@@ -63,19 +69,19 @@ class InteractiveGoal:
         self._groups = [group.name for group in model.groups.values() if group.is_chain]
         read = DeclaredParameters("modular_framework_planning", "interactive_goal").values
         group, self._scale_m, self._connection_timeout_s = read("~group", "~marker_scale", "~connection_timeout")
-        wanted = group or next(iter(self._groups), "")
-        if wanted not in self._groups:
+        group_name = group or next(iter(self._groups), "")
+        if group_name not in self._groups:
             raise ModelError(
-                f"{rospy.resolve_name('~group')} is '{wanted}'; groups with a tip to drag: "
+                f"{rospy.resolve_name('~group')} is '{group_name}'; groups with a tip link: "
                 f"{', '.join(self._groups) or 'none'}"
             )
-        self._group: JointGroup = model.group(wanted)
+        self._group: JointGroup = model.group(group_name)
         self._options = MotionOptions(*read("~planning_time", "~velocity_scaling", "~acceleration_scaling"))
         self._marker = GoalMarker(rospy.resolve_name("~marker"), self._on_drag)
         self._ghosts = {
             name: rospy.Publisher(f"~{name}_ghost", MarkerArray, queue_size=1, latch=True) for name in ("goal", "start")
         }
-        self._scene = empty_scene(model)  # writes and reads states
+        self._scene = empty_scene(model)  # for conversions of states
         self._goal: Array = model.default_positions()
         self._goal_is_set = False
         self._goal_changing = threading.Lock()
@@ -103,16 +109,16 @@ class InteractiveGoal:
             ("update_goal_state", self.set_goal_to_current),
         ):
             rospy.Subscriber(f"/rviz/moveit/{topic}", Empty, lambda _, run=command: run(), queue_size=5)
-        for topic, take in (
-            ("update_custom_start_state", self._take_start),
-            ("update_custom_goal_state", self._take_goal),
+        for topic, setter in (
+            ("update_custom_start_state", self._set_start_state),
+            ("update_custom_goal_state", self._set_goal_state),
         ):
-            rospy.Subscriber(f"/rviz/moveit/{topic}", RobotState, self._on_state, callback_args=take, queue_size=5)
+            rospy.Subscriber(f"/rviz/moveit/{topic}", RobotState, self._on_state, callback_args=setter, queue_size=5)
         threading.Thread(target=self._follow_drags, daemon=True).start()
 
     # ---------------------------------------------------------------- commands of the menu
     def _fill_menu(self) -> None:
-        """Offers commands, the planners of the group and the groups."""
+        """Fills the menu with commands, the group's planners and the groups."""
         planners = [
             f"{pipeline}: {planner}" if pipeline else planner
             for pipeline, planner in self._client.planners(self._group.name)
@@ -134,35 +140,35 @@ class InteractiveGoal:
         self._marker.fill_menu(list(commands.items()), choices)
 
     def plan(self) -> None:
-        """Plans from the start to the goal."""
+        """Plans a motion from start to goal."""
         self._begin("planning", self._plan)
 
     def execute(self) -> None:
-        """Executes what was planned last."""
+        """Executes the last plan."""
         self._begin("executing", self._execute)
 
     def plan_and_execute(self) -> None:
-        """Plans from where the robot is, and moves it there."""
+        """Plans a motion from start to goal and executes it."""
         self._begin("planning", lambda: self._plan() and self._execute())
 
     def stop(self) -> None:
-        """Stops planning and motion."""
+        """Stops planning and execution."""
         self._client.stop()
 
     def set_random_goal(self) -> None:
-        """Takes a random valid goal."""
-        self._begin("looking for a valid goal", self._random_goal)
+        """Sets a random valid goal."""
+        self._begin("searching for a valid goal", self._random_goal)
 
     def set_goal_to_current(self) -> None:
-        """Puts the goal where the robot is."""
-        self._guarded(lambda: self._take_goal(self._client.state()))
+        """Sets the goal to the current state."""
+        self._guarded(lambda: self._set_goal_state(self._client.state()))
 
     def set_start_to_current(self) -> None:
-        """Keeps the current state as the start, even when the robot moves on."""
-        self._guarded(lambda: self._take_start(self._client.state()))
+        """Fixes the start at the current state, even if the robot moves later."""
+        self._guarded(lambda: self._set_start_state(self._client.state()))
 
     def follow_robot(self) -> None:
-        """Lets motions start where the robot is."""
+        """Makes motions start at the current state of the robot."""
         self._start = None
         publish(self._ghosts["start"], numbered([], self._model.planning_frame))
 
@@ -181,19 +187,19 @@ class InteractiveGoal:
         self._set_status(f"group: {name}")
 
     # ---------------------------------------------------------------- jobs, one at a time
-    def _begin(self, what: str, job: Callable[[], Any]) -> None:
+    def _begin(self, activity: str, job: Callable[[], Any]) -> None:
         if not self._job.acquire(timeout=JOB_END_S):
-            self._set_status(f"not {what}: busy; stop first")
+            self._set_status(f"not {activity}: busy; stop first")
             return
 
-        def work() -> None:
+        def run() -> None:
             try:
-                self._set_status(f"{what} ...")
+                self._set_status(f"{activity} ...")
                 self._guarded(job)
             finally:
                 self._job.release()
 
-        threading.Thread(target=work, daemon=True).start()
+        threading.Thread(target=run, daemon=True).start()
 
     def _guarded(self, job: Callable[[], Any]) -> None:
         try:
@@ -217,7 +223,7 @@ class InteractiveGoal:
 
     def _execute(self) -> None:
         if self._trajectory is None:
-            self._set_status("nothing is planned yet; choose Plan first")
+            self._set_status("nothing is planned; choose Plan first")
             return
         trajectory, self._trajectory = self._trajectory, None
         self._client.execute(trajectory)
@@ -233,7 +239,7 @@ class InteractiveGoal:
         for _ in range(RANDOM_ATTEMPTS):
             positions = self._goal.copy()
             positions[indices] = rng.uniform(low, high)
-            positions = self._model.with_mimics(positions, frozenset(int(number) for number in indices))
+            positions = self._model.with_mimics(positions, frozenset(int(index) for index in indices))
             if not self._client.problem_of(self._group.name, self._state_of(positions)):
                 self._set_goal(positions, VALID, "random goal")
                 self._move_markers()
@@ -242,7 +248,7 @@ class InteractiveGoal:
 
     # ---------------------------------------------------------------- the goal
     def _has_base(self) -> bool:
-        """Whether the group places the base."""
+        """Returns whether the group contains the base."""
         base = self._model.base
         return base is not None and base.variables[0] in self._group.joints
 
@@ -250,8 +256,8 @@ class InteractiveGoal:
         frame = self._model.planning_frame
         self._marker.show(GOAL, frame, self._tip_pose(), self._scale_m)
         if self._model.base is not None and self._has_base():
-            ways = ON_THE_GROUND if self._model.base.kind == PLANAR else SIX_WAYS
-            self._marker.show(BASE, frame, self._base_pose(), BASE_SCALE * self._scale_m, ways)
+            controls = PLANAR_CONTROLS if self._model.base.kind == PLANAR else SIX_DOF_CONTROLS
+            self._marker.show(BASE, frame, self._base_pose(), BASE_SCALE * self._scale_m, controls)
         else:
             self._marker.hide(BASE)
         self._marker.apply()
@@ -267,7 +273,7 @@ class InteractiveGoal:
             self._drag_changed.notify_all()
 
     def _follow_drags(self) -> None:
-        """Solves for the newest dragged pose; those that came meanwhile are left out."""
+        """Solves for the newest dragged pose and skips older poses."""
         while not rospy.is_shutdown():
             with self._drag_changed:
                 if self._dragged is None:
@@ -278,17 +284,17 @@ class InteractiveGoal:
                 self._guarded(self._follow_with_goal)
             if drag is not None:
                 marker, pose = drag
-                follow = self._place_base if marker == BASE else self._solve
-                self._guarded(lambda run=follow, wanted=pose: run(wanted))
+                handler = self._place_base if marker == BASE else self._solve
+                self._guarded(lambda run=handler, target=pose: run(target))
                 with self._drag_changed:
                     self._solving = False
                     self._drag_changed.notify_all()
 
     def _follow_with_goal(self) -> None:
-        """Puts the goal where the robot is, unless the goal was set."""
+        """Sets the goal to the current state, unless a goal was set."""
         positions = self._positions_of(self._client.state())
         with self._goal_changing:
-            if self._goal_is_set or np.allclose(positions, self._goal, rtol=0.0, atol=MOVED):
+            if self._goal_is_set or np.allclose(positions, self._goal, rtol=0.0, atol=MIN_STATE_CHANGE):
                 return
             self._goal = positions
         self._show_goal()
@@ -310,22 +316,22 @@ class InteractiveGoal:
         self._set_goal(self._goal, UNREACHABLE, "no inverse kinematics solution there")
 
     def _place_base(self, pose: Pose) -> None:
-        """Puts the base of the goal elsewhere; the other joints stay, so the tip goes with it."""
+        """Moves the base of the goal; the other joints stay, so that the tip moves with the base."""
         positions = self._model.with_base(self._goal, transform_from_pose(pose, "the marker of the base"))
         problem = self._client.problem_of(self._group.name, self._state_of(positions))
         self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
         self._move_markers()
 
-    def _on_state(self, message: RobotState, take: Callable[[RobotState], None]) -> None:
-        self._guarded(lambda: take(message))
+    def _on_state(self, message: RobotState, setter: Callable[[RobotState], None]) -> None:
+        self._guarded(lambda: setter(message))
 
-    def _take_goal(self, state: RobotState) -> None:
+    def _set_goal_state(self, state: RobotState) -> None:
         positions = self._positions_of(state)
         problem = self._client.problem_of(self._group.name, self._state_of(positions))
         self._set_goal(positions, COLLIDING if problem else VALID, problem or "goal is free")
         self._move_markers()
 
-    def _take_start(self, state: RobotState) -> None:
+    def _set_start_state(self, state: RobotState) -> None:
         positions = self._positions_of(state)
         self._start, self._trajectory = state, None
         ghost = robot_markers(self._model, positions, "start", START_COLOR)
@@ -337,7 +343,7 @@ class InteractiveGoal:
         self._set_status(status)
 
     def _set_status(self, status: str) -> None:
-        """Shows and logs what happened last."""
+        """Shows and logs the status."""
         if status != self._status:
             rospy.loginfo("interactive goal: %s", status)
         self._status = status
@@ -345,7 +351,7 @@ class InteractiveGoal:
 
     def _show_goal(self) -> None:
         markers: list[Marker] = []
-        if self._goal_is_set:  # else the robot itself stands there
+        if self._goal_is_set:  # otherwise the robot is at the goal
             markers = robot_markers(self._model, self._goal, "goal", self._goal_color)
         text = Marker(
             type=Marker.TEXT_VIEW_FACING,
@@ -368,18 +374,18 @@ class InteractiveGoal:
 
     def _positions_of(self, state: RobotState) -> Array:
         where, joints = "robot state", state.joint_state
-        placed = with_multi_dof(self._scene.with_positions(self._goal), state.multi_dof_joint_state, where)
-        return self._model.merge(placed.positions, joint_values(self._model, joints.name, joints.position, where))
+        scene = with_multi_dof(self._scene.with_positions(self._goal), state.multi_dof_joint_state, where)
+        return self._model.merge(scene.positions, joint_values(self._model, joints.name, joints.position, where))
 
     def _state_of(self, positions: Array) -> RobotState:
-        """A difference to the current state, so that held objects stay held."""
+        """Returns a diff to the current state, so that held objects stay attached."""
         state = state_message(self._scene, positions, with_attached=False)
         state.is_diff = True
         return state
 
 
 def main() -> int:
-    """Runs the node; returns its exit code."""
+    """Runs the node and returns the exit code."""
     rospy.init_node("interactive_goal")
     try:
         InteractiveGoal(load_robot_model(), MoveGroupClient()).connect()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Client of a move_group node for user interfaces; uses its public endpoints only, so that any move_group works."""
+"""Client of a move_group node for user interfaces; uses only public endpoints, so that any move_group works."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ EXECUTION_MARGIN_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class MotionOptions:
-    """Options of motion requests; 0 and empty leave the choice to move_group."""
+    """Options of motion requests; for 0 and empty, move_group's defaults apply."""
 
     allowed_time_s: float = 5.0
     velocity_scaling: float = 0.0
@@ -47,16 +47,18 @@ class MotionOptions:
 
 
 def planners_of_group(planner_ids: Sequence[str], group: str) -> list[str]:
-    """Returns a pipeline's planners for a group, read from the list as MoveIt's panel in RViz does.
+    """Returns a pipeline's planners for a group, as MoveIt's panel in RViz does.
 
-    They are those of entries `group[planner]` or, where the group has none, the entries for any group.
+    The planners are those of entries `group[planner]` or, without any, the entries for all groups.
     """
-    own = [name[len(group) + 1 : -1] for name in planner_ids if name.startswith(f"{group}[") and name.endswith("]")]
-    return own or [name for name in planner_ids if not name.endswith("]")]
+    group_planners = [
+        name[len(group) + 1 : -1] for name in planner_ids if name.startswith(f"{group}[") and name.endswith("]")
+    ]
+    return group_planners or [name for name in planner_ids if not name.endswith("]")]
 
 
 class MoveGroupClient:
-    """The requests of the interactive goal to move_group.
+    """Client for the requests of the interactive goal.
 
     Services: get_planning_scene, compute_ik, check_state_validity, query_planner_interface.
     Actions: move_group, execute_trajectory.
@@ -73,7 +75,7 @@ class MoveGroupClient:
         self._execute = SteadyActionClient(names.EXECUTE_ACTION, ExecuteTrajectoryAction)
 
     def connect(self, timeout_s: float) -> None:
-        """Waits for move_group; raises PlanningError naming what did not answer."""
+        """Waits for move_group; raises PlanningError naming a missing endpoint."""
         for service in (self._scene, self._ik, self._validity, self._planners):
             try:
                 service.wait_for_service(timeout_s)
@@ -98,7 +100,7 @@ class MoveGroupClient:
         return self._scene(parts).scene.robot_state
 
     def planners(self, group: str) -> list[tuple[str, str]]:
-        """Returns pairs of pipeline_id and planner_id that a group may ask for."""
+        """Returns pairs of pipeline_id and planner_id for a group."""
         return [
             (item.pipeline_id, planner)
             for item in self._planners().planner_interfaces
@@ -108,8 +110,16 @@ class MoveGroupClient:
     def solve_ik(
         self, group: str, link: str, target: PoseStamped, seed: RobotState, avoid_collisions: bool
     ) -> RobotState | None:
-        """Returns the state that brings a link to a pose, nearest to the seed; None where there is none."""
-        answer = self._ik(
+        """Returns the state nearest to the seed with a link at a pose, or None.
+
+        Args:
+            group: Planning group.
+            link: Link to place.
+            target: Target pose of the link.
+            seed: Seed state.
+            avoid_collisions: Whether the state must be collision-free.
+        """
+        response = self._ik(
             PositionIKRequest(
                 group_name=group,
                 ik_link_name=link,
@@ -118,20 +128,27 @@ class MoveGroupClient:
                 avoid_collisions=avoid_collisions,
             )
         )
-        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+        if response.error_code.val != MoveItErrorCodes.SUCCESS:
             return None
-        return answer.solution
+        return response.solution
 
     def problem_of(self, group: str, state: RobotState) -> str:
-        """Says why a state is not valid; empty where it is."""
-        answer = self._validity(state, group, Constraints())
-        if answer.valid:
+        """Returns the reason why a state is invalid; empty for a valid state."""
+        response = self._validity(state, group, Constraints())
+        if response.valid:
             return ""
-        touching = [f"{item.contact_body_1} touches {item.contact_body_2}" for item in answer.contacts[:3]]
+        touching = [f"{item.contact_body_1} touches {item.contact_body_2}" for item in response.contacts[:3]]
         return "; ".join(touching) or "out of bounds or not valid"
 
     def plan(self, group: str, start: RobotState, goal: Mapping[str, float], options: MotionOptions) -> Any:
-        """Plans without moving; returns the trajectory and its start; raises PlanningError with move_group's words."""
+        """Plans a motion and returns the trajectory; raises PlanningError with move_group's reason.
+
+        Args:
+            group: Planning group.
+            start: Start state.
+            goal: Goal positions by joint name [rad or m].
+            options: Options of the request.
+        """
         message = MoveGroupGoal()
         message.planning_options.plan_only = True
         message.planning_options.planning_scene_diff.is_diff = True
@@ -150,28 +167,33 @@ class MoveGroupClient:
                 ],
             )
         ]
-        result = self._ask(self._move, message, options.allowed_time_s + EXECUTION_MARGIN_S)
+        result = self._run_goal(self._move, message, options.allowed_time_s + EXECUTION_MARGIN_S)
         return result.planned_trajectory
 
     def execute(self, trajectory: Any) -> None:
-        """Executes a planned trajectory; raises PlanningError with move_group's words."""
+        """Executes a trajectory; raises PlanningError with move_group's reason."""
         points = trajectory.joint_trajectory.points
         duration_s = points[-1].time_from_start.to_sec() if points else 0.0
-        self._ask(self._execute, ExecuteTrajectoryGoal(trajectory=trajectory), 2.0 * duration_s + EXECUTION_MARGIN_S)
+        self._run_goal(
+            self._execute, ExecuteTrajectoryGoal(trajectory=trajectory), 2.0 * duration_s + EXECUTION_MARGIN_S
+        )
 
     def stop(self) -> None:
-        """Stops planning and motion."""
+        """Stops planning and execution."""
         self._events.publish(String("stop"))
         for client in (self._move, self._execute):
             if client.gh is not None:
                 client.cancel_goal()
 
     @staticmethod
-    def _ask(client: actionlib.SimpleActionClient, goal: Any, timeout_s: float) -> Any:
+    def _run_goal(client: actionlib.SimpleActionClient, goal: Any, timeout_s: float) -> Any:
         client.send_goal(goal)
         if not client.wait_for_result(rospy.Duration(timeout_s)):
             client.cancel_goal()
-            raise PlanningError(ErrorCode.TIMED_OUT, f"{client.action_client.ns}: no result within {timeout_s:.0f} s")
+            raise PlanningError(
+                ErrorCode.TIMED_OUT,
+                f"{client.action_client.ns}: no result within {timeout_s:.0f} s; the goal is cancelled",
+            )
         result = client.get_result()
         code = result.error_code.val if result else int(ErrorCode.FAILURE)
         if code != ErrorCode.SUCCESS:
