@@ -184,14 +184,7 @@ def _link_surfaces(model: RobotModel, groups: Grouping) -> tuple[Surfaces, tuple
 
 
 def _join_trees(spheres: list[Array], boxes: list[Array], children: list[Array], roots: Sequence[int]) -> int:
-    """Joins trees under new nodes and returns the new root.
-
-    Args:
-        spheres: Sphere of each node; extended.
-        boxes: Box of each node; extended.
-        children: Children of each node; extended.
-        roots: Roots of the trees to join.
-    """
+    """Joins trees under new nodes and returns the new root."""
     if len(roots) == 1:
         return roots[0]
     centres = np.array([spheres[root][:3] for root in roots])
@@ -241,13 +234,7 @@ def link_groups(model: RobotModel, groups: Grouping) -> tuple[Surfaces, BodyArra
 
 
 def _body_arrays(shapes: Sequence[BoundingGeometry], joints: Sequence[int], is_environment: bool) -> BodyArrays:
-    """Returns bodies without surfaces, posed at the origins of their joints' frames.
-
-    Args:
-        shapes: Bounding geometry of each body.
-        joints: Index of the joint that moves each body, -1 for the world.
-        is_environment: Whether the surfaces belong to SceneBodies.scene.
-    """
+    """Returns bodies without surfaces, posed at the origins of their joints' frames."""
     columns = np.array([shape.array_row for shape in shapes], dtype=float).reshape(-1, 9).T.copy()
     kinds, x, y, z, inflation, surface_excess, solid_excess, closed, radii = columns
     spheres = np.zeros((len(shapes), 4))
@@ -276,14 +263,7 @@ def _single_bodies(shapes: Sequence[BoundingGeometry], items: Sequence[PlacedGeo
 
 
 def _set_surfaces(arrays: BodyArrays, has_surface: NDArray[np.bool_], surfaces: Surfaces, roots: Sequence[int]) -> None:
-    """Assigns surfaces to bodies.
-
-    Args:
-        arrays: Arrays of the bodies; root nodes and bounding spheres are written.
-        has_surface: Whether a body gets a surface, shape (b,).
-        surfaces: Surfaces of these bodies.
-        roots: Root node of each body with a surface, in the order of the bodies.
-    """
+    """Assigns surfaces to bodies."""
     arrays.roots[has_surface] = roots
     arrays.spheres[has_surface] = surfaces.spheres[list(roots)]
     arrays.spheres[has_surface, 3] += arrays.inflation[has_surface]
@@ -308,14 +288,6 @@ def _need_surface(
 
     A solid of the world is checked in closed form against bodies with a (nearly) exact surface. Its triangles would
     not be used, and building a tree over triangles takes longer than many plans.
-
-    Args:
-        links: Links that occur in a pair.
-        arrays: Held objects and bodies of the world.
-        shapes: Bounding geometries of these bodies.
-        parts: Geometries of the scene.
-        others: Index of each of these bodies in `parts`.
-        pairs: Watched pairs.
     """
     is_world = np.array([parts[index].body.kind == WORLD for index in others.tolist()], dtype=bool)
     is_plain, is_inexact, is_needed = np.zeros((3, len(parts)), dtype=bool)

@@ -101,14 +101,7 @@ def compile_world(
 
 
 def _field(kinds: NDArray[np.int64], sizes: Array, poses: Array, reach: float) -> DistanceField:
-    """Returns an empty distance field.
-
-    Args:
-        kinds: Closed form of each solid, shape (n,).
-        sizes: Three parameters of each closed form, shape (n, 3).
-        poses: Poses of the solids in the planning frame, shape (n, 3, 4).
-        reach: Distance from the planning frame's origin to the sides of the field [m].
-    """
+    """Returns an empty distance field, `reach` [m] to every side of the planning frame's origin."""
     cells = (FIELD_CELLS if len(kinds) else 0,) * 3
     per_cell = min(len(kinds), NEAREST_SOLIDS)
     return DistanceField(

@@ -172,13 +172,7 @@ class ExactCollisionChecker:
         return -1, at_vertices
 
     def _decide(self, path: Array, at_vertices: NDArray[np.int64], undecided: NDArray[np.int64]) -> int:
-        """Runs the exact check on undecided pairs and returns the index of a touching sample, or -1.
-
-        Args:
-            path: Vertices of the path, shape (n, joints).
-            at_vertices: Sample index of each vertex, shape (n,).
-            undecided: Rows of sample and pair, shape (m, 2).
-        """
+        """Runs the exact check on undecided pairs and returns the index of a touching sample, or -1."""
         for index, pair in undecided.tolist():
             members = {int(self._moving[member]): member for member in self._compiled.members[pair]}
             touching = self._exact.touching_pair(sample_at(path, at_vertices, index), members)

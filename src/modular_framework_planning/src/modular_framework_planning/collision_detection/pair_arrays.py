@@ -203,14 +203,7 @@ def _distinct(
 def _table_keys(
     model: RobotModel, groups: Grouping, both: NDArray[np.int64], margins: Array
 ) -> dict[int, tuple[int, ...]]:
-    """Returns the table keys of pairs of link groups, by pair index; pairs without a table are left out.
-
-    Args:
-        model: Robot model.
-        groups: Groups of links.
-        both: Indices of the two bodies of each pair, shape (n, 2).
-        margins: Minimum distances, shape (n,) [m].
-    """
+    """Returns the table keys of pairs of link groups, by pair index; pairs without a table are left out."""
     _, bodies, _ = link_groups(model, groups)
     keys = {}
     for index in np.flatnonzero((both < len(groups)).all(axis=1) & (margins == 0.0)).tolist():
@@ -240,12 +233,7 @@ def _tables(
 ) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
     """Returns new tables, all cells unknown, and the joints of each table.
 
-    Tables are valid in every scene.
-
-    Args:
-        model: Robot model, part of the cache key.
-        groups: Groups of links, part of the cache key.
-        keys: Table keys, see _table_key.
+    Tables are valid in every scene; `model` and `groups` are only part of the cache key.
     """
     joints = np.array([(*key[2:], -1)[:2] for key in keys], dtype=np.int64).reshape(-1, 2)
     return np.full((len(keys), TABLE_CELLS, TABLE_CELLS), UNKNOWN, dtype=np.int8), joints

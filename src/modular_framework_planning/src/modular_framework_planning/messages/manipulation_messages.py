@@ -119,14 +119,7 @@ def posture(message: Any, hand: Hand, where: str) -> dict[str, float]:
 
 
 def _allowance(hand: Hand, target: str, goal: Any, touched: Sequence[str]) -> SceneChange:
-    """Returns the change that allows contact of the hand with the object and other bodies, and object with support.
-
-    Args:
-        hand: End effector.
-        target: Name of the object.
-        goal: Goal of pickup or place.
-        touched: Names of further bodies that the hand may touch.
-    """
+    """Returns the change that allows contact of the hand with the object and other bodies, and object with support."""
     surface, others = goal.support_surface_name, [target, *goal.allowed_touch_objects, *touched]
     if surface and goal.allow_gripper_support_collision:
         others.append(surface)

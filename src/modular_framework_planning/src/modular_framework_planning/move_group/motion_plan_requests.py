@@ -80,14 +80,7 @@ def read_request(
 def _path_constraints(
     pipeline: PlanningPipeline, scene: PlanningScene, message: Any, tip: str
 ) -> tuple[KinematicConstraints | None, AuxiliaryPoint | None]:
-    """Returns the path constraints, or the auxiliary point (of CIRC) given in the same field of the message.
-
-    Args:
-        pipeline: Requested pipeline.
-        scene: Planning scene.
-        message: moveit_msgs/MotionPlanRequest.
-        tip: Tip link of the group.
-    """
+    """Returns the path constraints, or the auxiliary point (of CIRC) given in the same field of the message."""
     path_constraints = message.path_constraints
     if path_constraints.name and path_constraints.name in pipeline.auxiliary_constraints:
         return None, auxiliary_point(scene, path_constraints)

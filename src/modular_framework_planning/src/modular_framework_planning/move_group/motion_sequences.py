@@ -82,13 +82,6 @@ def _plan(
 ) -> tuple[SequencePart, ...]:
     """Plans each motion from the end of the previous motion, then joins the motions.
 
-    Args:
-        context: Shared parts of the node.
-        items: Items of the message.
-        change: Scene change for this plan only.
-        cancelled: Returns whether the caller cancelled the request.
-        runs: Extended by the planner runs of all items, including a failed item.
-
     Raises:
         PlanningError: Planning of an item failed; the reason names the item.
     """

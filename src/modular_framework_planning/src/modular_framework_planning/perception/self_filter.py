@@ -137,13 +137,7 @@ def _region_of(geometry: Any) -> Region:
 
 
 def _round_planes(radius: float, half_length: float, slope: float) -> Array:
-    """Returns tangent planes of a cylinder or cone.
-
-    Args:
-        radius: Radius at half height [m].
-        half_length: Half of the height [m].
-        slope: Decrease of the radius per height, 0 for a cylinder.
-    """
+    """Returns tangent planes of a cylinder (slope 0) or cone, with `radius` at half height [m]."""
     angles = 2.0 * np.pi * np.arange(ROUND_SIDES) / ROUND_SIDES
     sides = np.column_stack(
         [np.cos(angles), np.sin(angles), np.full(ROUND_SIDES, slope), np.full(ROUND_SIDES, -radius)]

@@ -296,13 +296,7 @@ class ManoeuvrePlanner:
         )
 
     def _plan_to_approach(self, manoeuvre: Manoeuvre, values: Array, allowed_time_s: float) -> Trajectory:
-        """Plans from the robot's state to the start of the approach, without allowed contacts.
-
-        Args:
-            manoeuvre: Candidate grasp or release.
-            values: Joint vector at the start of the approach, shape (joints,) [rad or m].
-            allowed_time_s: Time limit [s].
-        """
+        """Plans from the robot's state to the start of the approach, without allowed contacts."""
         group, template = self._arm.group, self._template
         allowed_s = min(self.remaining_s, allowed_time_s)
         if allowed_s <= 0.0:
@@ -318,15 +312,7 @@ class ManoeuvrePlanner:
     def _stages(
         self, manoeuvre: Manoeuvre, open_scene: PlanningScene, to_approach: Trajectory, approach: Array, retreat: Array
     ) -> tuple[Stage, ...]:
-        """Returns the stages in order, with timed lines; lines of zero length are left out.
-
-        Args:
-            manoeuvre: Candidate grasp or release.
-            open_scene: Scene with the fingers before the approach and all contacts allowed.
-            to_approach: Motion to the approach.
-            approach: Joint vectors of the approach, shape (n, joints) [rad or m].
-            retreat: Joint vectors of the retreat, shape (m, joints) [rad or m].
-        """
+        """Returns the stages in order, with timed lines; lines of zero length are left out."""
         allow, before = manoeuvre.allow, manoeuvre.fingers_before
         ready = open_scene.with_positions(self._full_positions(open_scene, approach[0]))
         at_grasp = open_scene.with_positions(self._full_positions(open_scene, approach[-1]))
@@ -370,13 +356,7 @@ class _LineTooShort(PlanningError):
 
 
 def _long_enough(where: str, line: StraightLine, translation: Translation) -> Array:
-    """Returns the joint vectors of a line; raises _LineTooShort if the line is shorter than the minimum distance.
-
-    Args:
-        where: Name of the stage, for error messages.
-        line: Solved line.
-        translation: Required translation.
-    """
+    """Returns the joint vectors of a line; raises _LineTooShort if the line is shorter than the minimum distance."""
     distance = line.fraction * translation.desired_distance_m
     if distance < translation.min_distance_m - DISTANCE_TOLERANCE_M:
         raise _LineTooShort(

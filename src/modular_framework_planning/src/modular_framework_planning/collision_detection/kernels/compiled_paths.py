@@ -118,17 +118,7 @@ def write_row(rows, at_vertices, index, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _write_joint_ranges(vertices, at_vertices, low, high, first, last, joint_ranges):  # type: ignore[no-untyped-def]
-    """Writes minimum and maximum joint positions, shape (2, joints), between samples `low` and `high`.
-
-    Args:
-        vertices: Joint positions at the vertices, shape (n, joints).
-        at_vertices: Sample index of each vertex, shape (n,).
-        low: Index of the first sample.
-        high: Index of the last sample.
-        first: Joint positions at the first sample, shape (joints,).
-        last: Joint positions at the last sample, shape (joints,).
-        joint_ranges: Written ranges, shape (2, joints).
-    """
+    """Writes minimum and maximum joint positions, shape (2, joints), between samples `low` and `high`."""
     for joint in range(vertices.shape[1]):
         joint_ranges[0, joint], joint_ranges[1, joint] = min(first[joint], last[joint]), max(first[joint], last[joint])
     begin, end = _segment_of(at_vertices, low)[0] + 1, _segment_of(at_vertices, high)[0]

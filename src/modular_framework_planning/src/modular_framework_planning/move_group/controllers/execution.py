@@ -276,15 +276,7 @@ class TrajectoryExecution:
         cancelled: threading.Event,
         stop: threading.Event,
     ) -> None:
-        """Sends all parts and waits for their ends.
-
-        Args:
-            parts: Part of the motion for each controller.
-            manager: Controllers.
-            delay_s: Delay until the start time of the motion [s].
-            cancelled: Event of the client that stops the motion.
-            stop: Event of this node that stops the motion.
-        """
+        """Sends all parts and waits for their ends."""
         start = rospy.Time.now()
         running: list[tuple[MotionPart, RunningMotion]] = []
         try:

@@ -229,14 +229,7 @@ def numbered(markers: Sequence[Marker], frame: str) -> MarkerArray:
 
 
 def _hand_links(model: RobotModel, group: JointGroup, start: Array, end: Array) -> set[str]:
-    """Returns the links that do not move relative to the group's tip; all links if the group has no tip.
-
-    Args:
-        model: Robot model.
-        group: Planning group.
-        start: Joint positions of the whole robot at the start of a motion [rad or m].
-        end: Joint positions of the whole robot at the end of the motion [rad or m].
-    """
+    """Returns the links that do not move relative to the group's tip; all links if the group has no tip."""
     before, after = model.link_transforms(start), model.link_transforms(end)
     tip = group.tip_link
     if not tip:

@@ -130,11 +130,6 @@ class OctomapMonitor:
     def _replace(self, base: PlanningScene, voxels: VoxelMap, pose: Transform) -> bool:
         """Inserts an updated map into the current scene; bodies added meanwhile are freed in the map afterwards.
 
-        Args:
-            base: Scene that the map was made from.
-            voxels: Updated map.
-            pose: Pose of the map in the planning frame.
-
         Returns:
             False if the map has changed meanwhile; a map cleared meanwhile stays cleared and counts as success.
         """
