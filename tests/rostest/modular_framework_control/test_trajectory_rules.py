@@ -480,7 +480,7 @@ INF, NAN = math.inf, math.nan
         (
             faulty(points=[(1.0, [51.0, 0.0, 0.0], None)]),
             INVALID_GOAL,
-            "point 0: position of joint 'shoulder' is 51; its limits are -50 to 50; give a position within them",
+            "point 0: position of joint 'shoulder' is 51; its limits are -50 to 50; give a position within the limits",
         ),
         (
             faulty(points=[(1.0, HOME, [0.0, -95.0, 0.0])]),
@@ -490,7 +490,7 @@ INF, NAN = math.inf, math.nan
         (
             faulty(points=[(1.0, HOME, None), (1.1, [0.0, 20.0, 0.0], None)]),
             INVALID_GOAL,
-            "on the way to point 1 joint 'elbow' reaches the velocity 375; its limit is 90; give the point a later",
+            "on the way to point 1, joint 'elbow' reaches the velocity 375; its limit is 90; give the point a later",
         ),
         (faulty(points=[(1.0, [0.0], None)]), INVALID_GOAL, "point 0: has 1 positions; expected 3"),
         (faulty(points=[(1.0, [0.0] * 4, None)]), INVALID_GOAL, "point 0: has 4 positions; expected 3"),

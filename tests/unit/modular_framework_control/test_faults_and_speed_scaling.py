@@ -17,7 +17,7 @@ from modular_framework_control.hardware_interface.interfaces import COMMAND_INTE
 from modular_framework_control.hardware_interface.mock_robot_hw import MockRobotHW
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, TrajectoryPoint
-from modular_framework_control.trajectory.trajectory_clock import RISE_PER_S, TrajectoryClock
+from modular_framework_control.trajectory.trajectory_clock import RATE_RISE_PER_S, TrajectoryClock
 from modular_framework_control.trajectory.trajectory_goal import (
     TrajectoryErrorCode,
     TrajectoryGoal,
@@ -257,7 +257,7 @@ def test_a_paused_robot_stays_where_it_is_and_goes_on_smoothly(start: Callable[.
     velocities = np.diff(steps, axis=0) / loop.period_s
     fastest = 15.0 / 8.0
     assert np.abs(velocities).max() < fastest * 1.001
-    assert np.abs(np.diff(velocities, axis=0)).max() < fastest * RISE_PER_S * loop.period_s * 1.6
+    assert np.abs(np.diff(velocities, axis=0)).max() < fastest * RATE_RISE_PER_S * loop.period_s * 1.6
     assert goal_handle.status is GoalStatus.SUCCEEDED
     assert steps[-1] == pytest.approx([1.0, -1.0], abs=1e-9)
 
@@ -336,6 +336,6 @@ def test_a_clock_slows_at_once_speeds_up_gradually_and_never_runs_ahead() -> Non
         assert clock.rate == share
     handles[1].factor = 1.0
     clock.advance(0.1)
-    assert clock.rate == pytest.approx(0.2 + 0.1 * RISE_PER_S)
+    assert clock.rate == pytest.approx(0.2 + 0.1 * RATE_RISE_PER_S)
     clock.advance(5.0)
     assert clock.rate == 1.0 and clock.now_s < 5.0

@@ -214,7 +214,7 @@ def test_a_tolerance_of_a_joint_that_the_controller_does_not_have_is_left_out_wi
     goal_handle = send(loop, (0.5, (0.3, 0.1, 0.1)), goal_tolerance={"x": JointTolerance(1e-9)})
     loop.run(0.6)
     assert goal_handle.status is GoalStatus.SUCCEEDED
-    assert "goal_tolerance of joint 'x', which the controller does not have; it has: a, b, c" in caplog.text
+    assert "ignored: goal_tolerance of joint 'x'; joints of the controller: a, b, c" in caplog.text
 
 
 def test_a_first_point_before_the_beginning_lies_in_the_past_and_is_left_out(loop: Any) -> None:

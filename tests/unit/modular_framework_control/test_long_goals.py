@@ -25,7 +25,7 @@ from modular_framework_control.ros.conversions import trajectory_from_msg
 from modular_framework_control.ros.large_messages import ReceiveBuffer
 from modular_framework_control.ros.trajectory_messages import CompactJointTrajectory, CompactTrajectoryActionGoal
 from modular_framework_control.trajectory.joint_trajectory import (
-    ITEMS_AT_ONCE,
+    CHUNK_SIZE,
     InvalidTrajectoryError,
     Spline,
     TrajectoryPoints,
@@ -33,7 +33,7 @@ from modular_framework_control.trajectory.joint_trajectory import (
 )
 from modular_framework_control.trajectory.point_checks import check_points
 
-POINTS = 3 * ITEMS_AT_ONCE + 7
+POINTS = 3 * CHUNK_SIZE + 7
 RNG = np.random.default_rng(35)
 
 

@@ -186,7 +186,7 @@ def assert_next_goal_succeeds(loop: Any) -> None:
 @pytest.mark.parametrize(
     ("points", "words"),
     [
-        ([(0.05, (-1.5, 0.0), ())], "on the way to point 0 joint 'pan' reaches the velocity -30; its limit is 3.15"),
+        ([(0.05, (-1.5, 0.0), ())], "on the way to point 0, joint 'pan' reaches the velocity -30; its limit is 3.15"),
         ([(1.0, (0.5, 0.0), (30.0, 0.0))], "point 0: velocity of joint 'pan' is 30; its limit is 3.15"),
         ([(1.0, (0.5, 0.5), (1e6, -1e6))], "point 0: velocity of joint 'lift' is -1e+06; its limit is 3.15"),
         (
@@ -287,7 +287,7 @@ def test_a_preempting_goal_that_the_present_motion_makes_too_fast_is_refused_and
     loop.run(0.5)
     second = send(loop, (0.2, (0.0, 0.0), (0.0, 0.0)))
     assert second.status is GoalStatus.REJECTED
-    assert "on the way to point 0 joint 'pan' reaches the velocity -" in second.text
+    assert "on the way to point 0, joint 'pan' reaches the velocity -" in second.text
     loop.run(0.7)
     assert first.status is GoalStatus.SUCCEEDED
 
@@ -304,7 +304,7 @@ def test_a_joint_outside_its_range_may_come_back(make_loop: Callable[..., Any]) 
     loop.spawn("c")
     loop.robot_hw.joints[0].state.position = 6.4
     further = send(loop, (1.0, (6.5, 0.0), (0.0, 0.0)))
-    assert "joint 'pan' is 6.5; its limits are -6.28 to 6.28 (it stands outside, at 6.4)" in further.text
+    assert "joint 'pan' is 6.5; its limits are -6.28 to 6.28 (the joint is outside, at 6.4)" in further.text
     back = send(loop, (1.0, (6.0, 0.0), (0.0, 0.0)))
     loop.run(1.1)
     assert back.status is GoalStatus.SUCCEEDED and positions(loop)[0] == pytest.approx(6.0)

@@ -15,7 +15,7 @@ from scipy.interpolate import BPoly
 from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits
 from modular_framework_control.trajectory.joint_trajectory import JointTrajectory, Spline, Track, TrajectoryPoint
 from modular_framework_control.trajectory.motion_limits import MotionLimits, limit_violations
-from modular_framework_control.trajectory.stop_motion import COMMAND_S, FOLLOWING_LAG_S, StopMotion
+from modular_framework_control.trajectory.stop_motion import FOLLOWING_LAG_S, MAX_COMMAND_AGE_S, StopMotion
 
 FREE = MotionLimits.of([JointLimits()])
 BOUND = MotionLimits.of([JointLimits(-2.0, 2.0, 3.0, max_acceleration=20.0)])
@@ -46,14 +46,14 @@ def refusal(*points: TrajectoryPoint, limits: MotionLimits = BOUND, first: int =
         ((point(1.0, 0.0, -3.2),), "point 0: velocity of joint 'a' is -3.2; its limit is 3; give a lower velocity"),
         (
             (point(0.0, 0.0), point(0.1, 1.0)),
-            "on the way to point 1 joint 'a' reaches the velocity 10; its limit is 3; "
+            "on the way to point 1, joint 'a' reaches the velocity 10; its limit is 3; "
             "give the point a later time_from_start",
         ),
         (
             (point(0.0, 0.0), point(1.0, 1.0), point(1.2, -1.0)),
-            "on the way to point 2 joint 'a' reaches the velocity -10",
+            "on the way to point 2, joint 'a' reaches the velocity -10",
         ),
-        ((point(0.0, 1.9, 2.0), point(1.0, 1.9, -2.0)), "on the way to point 1 joint 'a' comes to 2.4; its limits are"),
+        ((point(0.0, 1.9, 2.0), point(1.0, 1.9, -2.0)), "on the way to point 1, joint 'a' reaches 2.4; its limits are"),
         ((point(0.0, -1e9, 1e6), point(1.0, 1e9, -1e6)), "point 0: position of joint 'a' is -1e+09"),
     ],
 )
@@ -96,14 +96,14 @@ def test_of_very_many_faults_only_a_few_are_reported_and_the_rest_counted() -> N
 
 def test_a_joint_that_stands_outside_its_range_may_come_back_but_not_go_further() -> None:
     assert refusal(point(0.0, 2.4), point(1.0, 1.0), here=2.4) == ""
-    assert "point 1: position of joint 'a' is 2.5; its limits are -2 to 2 (it stands outside, at 2.4)" in refusal(
+    assert "point 1: position of joint 'a' is 2.5; its limits are -2 to 2 (the joint is outside, at 2.4)" in refusal(
         point(0.0, 2.4), point(1.0, 2.5), here=2.4
     )
 
 
 def test_a_joint_that_may_not_move_at_all_is_said_to_have_a_wrong_limit() -> None:
     still = MotionLimits.of([JointLimits(max_velocity=0.0)])
-    assert "its limit is 0; with it the joint may not move at all: correct it in robot_description" in refusal(
+    assert "its limit is 0; this limit forbids any motion: correct it in robot_description" in refusal(
         point(0.0, 0.0), point(1.0, 0.5), limits=still
     )
     assert refusal(point(0.0, 0.5), point(1.0, 0.5), limits=still, here=0.5) == ""
@@ -148,7 +148,7 @@ def test_a_ramp_begins_where_the_joint_is_brakes_as_it_may_and_stays_in_its_rang
     track = StopMotion(duration_s, BOUND).tracks(np.array([[desired], [desired_velocity]]), actual, 5.0, rate)[0]
     rows = sampled(track, 5.0)
     way = np.abs(rows[:, 0] - position)
-    under_way = min(abs(velocity), 3.0) * FOLLOWING_LAG_S + 3.0 * COMMAND_S
+    under_way = min(abs(velocity), 3.0) * FOLLOWING_LAG_S + 3.0 * MAX_COMMAND_AGE_S
     assert abs(rows[0, 0] - position) <= under_way + 1e-9
     assert np.abs(rows[:, 1]).max() * rate <= 3.0 + 1e-9
     assert rows[:, 0].min() >= -2.0 - 1e-9 and rows[:, 0].max() <= 2.0 + 1e-9

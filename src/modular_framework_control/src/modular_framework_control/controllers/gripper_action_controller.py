@@ -22,7 +22,7 @@ from modular_framework_control.hardware_interface.joint_limits import limits_of
 from modular_framework_control.realtime.goal_handle import GoalStatus, RealtimeGoalHandle
 from modular_framework_control.realtime.mailbox import Mailbox
 from modular_framework_control.realtime.schedule import Schedule
-from modular_framework_control.trajectory.point_checks import LARGEST_VALUE
+from modular_framework_control.trajectory.point_checks import MAX_VALUE
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names, read_names, read_number
 
 
@@ -134,10 +134,7 @@ class GripperActionController(Controller):
                 f"got position {position}, max_effort {max_effort}; expected finite numbers (effort 0 = default)"
             )
         lowest, highest = self._limits.range_from(self._handle.position)
-        if (
-            position < max(lowest, -LARGEST_VALUE) - POINT_MARGIN
-            or position > min(highest, LARGEST_VALUE) + POINT_MARGIN
-        ):
+        if position < max(lowest, -MAX_VALUE) - POINT_MARGIN or position > min(highest, MAX_VALUE) + POINT_MARGIN:
             raise GripperGoalError(
                 f"position of joint '{self._handle.name}' is {position:.6g}; its limits are "
                 f"{self._limits.min_position:.6g} to {self._limits.max_position:.6g}; give a position within them"

@@ -26,8 +26,8 @@ from modular_framework_control.realtime.mailbox import Mailbox
 from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_control.trajectory.goal_validation import GoalRules, ValidatedGoal, validate_goal
 from modular_framework_control.trajectory.joint_trajectory import (
+    MIN_SEGMENT_S,
     POSITION,
-    SHORTEST_SEGMENT_S,
     VELOCITY,
     Array,
     Track,
@@ -149,11 +149,11 @@ class JointTrajectoryController(Controller):
         """
         if not self._running:
             raise ControllerError("the controller is not running; nothing is desired")
-        asked_s, known_from_s = self._clock.expected_at(time_s), self._plan.known_from_s
-        if known_from_s is not None and asked_s < known_from_s - SHORTEST_SEGMENT_S:
+        asked_s, stored_from_s = self._clock.expected_at(time_s), self._plan.stored_from_s
+        if stored_from_s is not None and asked_s < stored_from_s - MIN_SEGMENT_S:
             raise ControllerError(
                 f"got {time_s:.9g} s, which is before the motion under way began, by "
-                f"{known_from_s - asked_s:.6g} s of its trajectory; ask for a later time"
+                f"{stored_from_s - asked_s:.6g} s of its trajectory; ask for a later time"
             )
         return self._clock.slowed(self._plan.sample(asked_s))
 
@@ -202,7 +202,7 @@ class JointTrajectoryController(Controller):
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
         self._reject_waiting(text)
         self._read_actual()
-        if self._plan.known_from_s is not None:
+        if self._plan.stored_from_s is not None:
             self._command_rest()
 
     def _reject_waiting(self, text: str) -> None:
@@ -297,13 +297,13 @@ class JointTrajectoryController(Controller):
         now_s = self._clock.now_s
         origin_s = self._clock.at(goal.stamp_s) if goal.stamp_s != 0.0 else now_s
         end_s = origin_s + float(goal.spline.times_s[-1])
-        if end_s <= now_s + SHORTEST_SEGMENT_S:
+        if end_s <= now_s + MIN_SEGMENT_S:
             return (
                 f"all {len(goal.spline.times_s)} points lie in the past: the last one was due "
                 f"{now_s - end_s:.6g} s before the goal was taken up; give a later header stamp or time_from_start"
             )
         splice_s = max(now_s, origin_s)
-        if end_s <= splice_s + SHORTEST_SEGMENT_S:
+        if end_s <= splice_s + MIN_SEGMENT_S:
             splice_s = now_s
         joints = list(goal.joints)
         track = splice(

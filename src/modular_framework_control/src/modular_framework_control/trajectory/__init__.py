@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectories of joints: their curves, the check of goals, tolerances, limits, and how a motion is stopped."""
+"""Joint trajectories: interpolation, goal validation, tolerances, limits, and stop motions."""

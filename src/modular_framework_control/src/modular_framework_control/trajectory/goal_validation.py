@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks a goal of a trajectory controller and computes its curve.
+"""Validation of trajectory goals, and computation of their splines.
 
-This runs on the thread that received the goal, so that the control loop only has to check what depends on time.
+Validation runs on the thread that receives the goal, so that the control loop only checks time-dependent rules.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from modular_framework_control.trajectory.trajectory_goal import (
 
 @dataclass(frozen=True, slots=True)
 class ValidatedGoal:
-    """A checked goal.
+    """A validated goal.
 
     Attributes:
-        joints: indices of its joints among the controller's.
-        stamp_s: when it begins [s of the loop's time]; 0 for now.
-        spline: its curve; None for "stop".
-        tolerances: of its path and its end.
-        goal_handle: of an action goal; None for a command.
-        violations: of the limits of the joints; None for "stop".
+        joints: Indices of the goal's joints in the controller.
+        stamp_s: Start time [s of the control loop]; 0 for immediately.
+        spline: Interpolated trajectory; None for "stop".
+        tolerances: Path and goal tolerances.
+        goal_handle: Handle of an action goal; None for a command.
+        violations: Violations of joint limits; None for "stop".
     """
 
     joints: tuple[int, ...]
@@ -44,13 +44,13 @@ class ValidatedGoal:
 
 @dataclass(frozen=True, slots=True)
 class GoalRules:
-    """The rules that a goal is checked against.
+    """The rules for goals of a controller.
 
     Attributes:
-        joint_names: the controller's joints.
-        tolerances: the controller's, where the goal has none of its own.
-        limits: of the joints.
-        allow_partial: whether the goal may leave joints out.
+        joint_names: Joints of the controller.
+        tolerances: Default tolerances of the controller.
+        limits: Limits of the joints.
+        allow_partial: Whether a goal may leave joints out.
     """
 
     joint_names: tuple[str, ...]
@@ -62,17 +62,18 @@ class GoalRules:
 def validate_goal(
     goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None, rules: GoalRules, measured: Array
 ) -> ValidatedGoal:
-    """Checks a goal and computes its curve.
+    """Validates a goal and computes its spline.
+
+    Limit violations are only recorded, because points in the past do not count when the goal is accepted later.
 
     Args:
-        goal: as it was sent.
-        goal_handle: of an action goal; None for a command, which may be empty to say "stop".
-        rules: what it is checked against. Violations of limits are only noted, because they do not count at points that
-            are already past when the goal is accepted.
-        measured: positions of the controller's joints [rad|m], shape (joints,).
+        goal: Received goal.
+        goal_handle: Handle of an action goal; None for a command, which may be empty for "stop".
+        rules: Rules of the controller.
+        measured: Measured positions of the controller's joints, shape (joints,) [rad|m].
 
     Raises:
-        GoalRejectedError: it is malformed; says what is wrong with which point and joint.
+        GoalRejectedError: The goal is malformed; the message names point and joint.
     """
     trajectory, joint_names, tolerances = goal.trajectory, rules.joint_names, rules.tolerances
     if not trajectory.points and goal_handle is None:
@@ -85,15 +86,15 @@ def validate_goal(
         check_points(trajectory)
         if math.isnan(goal.goal_time_tolerance_s):
             raise InvalidTrajectoryError("goal_time_tolerance is not a number")
-        own = tolerances_of_goal(
+        goal_tolerances = tolerances_of_goal(
             tolerances, joint_names, joints, goal.path_tolerance, goal.goal_tolerance, goal.goal_time_tolerance_s
         )
     except InvalidTrajectoryError as error:
         raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, str(error)) from error
     if not trajectory.points:
-        return ValidatedGoal(joints, trajectory.stamp_s, None, own, goal_handle)
+        return ValidatedGoal(joints, trajectory.stamp_s, None, goal_tolerances, goal_handle)
     spline = Spline(trajectory)
     violations = limit_violations(
         spline, trajectory.joint_names, rules.limits.of_joints(joints), measured[list(joints)]
     )
-    return ValidatedGoal(joints, trajectory.stamp_s, spline, own, goal_handle, violations)
+    return ValidatedGoal(joints, trajectory.stamp_s, spline, goal_tolerances, goal_handle, violations)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint trajectories and the piecewise polynomials that connect their points.
+"""Joint trajectories and their interpolation by piecewise polynomials.
 
-Between two points the curve is linear, cubic or quintic, by what both of them give: positions; positions and
-velocities; positions, velocities and accelerations. The coefficients follow from the boundary conditions of each
-segment.
+A segment is linear, cubic or quintic if both of its points give positions; positions and velocities; or positions,
+velocities and accelerations. Its coefficients follow from these boundary conditions.
 """
 
 from __future__ import annotations
@@ -20,25 +19,25 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 POSITION, VELOCITY, ACCELERATION = 0, 1, 2
-SHORTEST_SEGMENT_S = 1e-6
-ITEMS_AT_ONCE = 256
+MIN_SEGMENT_S = 1e-6
+CHUNK_SIZE = 256
 PAUSE_S = 1e-4
-PAUSE_SHARE = 1.0
+PAUSE_FRACTION = 1.0
 
 
 class InvalidTrajectoryError(Exception):
-    """A trajectory that cannot be followed; the message lists everything that is wrong with it."""
+    """A trajectory that cannot be followed; the message lists all faults."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryPoint:
-    """One point as it was sent.
+    """A received point, not validated.
 
     Attributes:
-        time_s: time from the start of the trajectory [s].
-        positions: one per joint [rad|m].
-        velocities: one per joint [rad/s|m/s], or empty.
-        accelerations: one per joint [rad/s^2|m/s^2], or empty.
+        time_s: Time from the start of the trajectory.
+        positions: Position per joint [rad|m].
+        velocities: Velocity per joint [rad/s|m/s], or empty.
+        accelerations: Acceleration per joint [rad/s^2|m/s^2], or empty.
     """
 
     time_s: float
@@ -49,14 +48,13 @@ class TrajectoryPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrajectoryPoints:
-    """The points of a trajectory as they were sent, not checked.
+    """The received points of a trajectory, not validated.
 
     Attributes:
-        times_s: time of each point from the start of the trajectory [s], shape (points,).
-        values: positions, velocities and accelerations of each point, 0 where none were sent, shape
-            (points, 3, joints); values beyond the number of joint names are left out, and all values if points lack
-            positions for certain.
-        counts: numbers of positions, velocities and accelerations that were sent, shape (points, 3).
+        times_s: Time of each point from the start of the trajectory, shape (points,).
+        values: Positions, velocities and accelerations of each point, 0 if missing, shape (points, 3, joints). Values
+            beyond the number of joint names are left out; all values are left out if positions are missing for certain.
+        counts: Received numbers of positions, velocities and accelerations, shape (points, 3).
     """
 
     times_s: Array
@@ -69,12 +67,12 @@ class TrajectoryPoints:
 
 @dataclass(frozen=True, slots=True)
 class JointTrajectory:
-    """A trajectory as it was sent.
+    """A received trajectory, not validated.
 
     Attributes:
-        joint_names: the joints, in the order of the values of each point.
-        points: in the order of time; none means "stop".
-        stamp_s: when it starts [s of the controller's time]; 0 means at once.
+        joint_names: Joints, in the order of the values of each point.
+        points: Points in the order of time; empty for "stop".
+        stamp_s: Start time [s of the controller's time]; 0 for immediately.
     """
 
     joint_names: tuple[str, ...]
@@ -85,76 +83,89 @@ class JointTrajectory:
     def of_points(
         cls, joint_names: tuple[str, ...], points: Sequence[TrajectoryPoint], stamp_s: float = 0.0
     ) -> JointTrajectory:
-        """A trajectory of few points, given one by one."""
+        """Returns a trajectory of single points.
+
+        Args:
+            joint_names: Joints, in the order of the values of each point.
+            points: Points in the order of time.
+            stamp_s: Start time [s of the controller's time]; 0 for immediately.
+        """
         rows = [(point.positions, point.velocities, point.accelerations) for point in points]
         values = np.zeros((len(points), 3, len(joint_names)))
         for i, row in enumerate(rows):
             for kind, sent in enumerate(row):
-                kept = sent[: len(joint_names)]
-                values[i, kind, : len(kept)] = kept
+                values_used = sent[: len(joint_names)]
+                values[i, kind, : len(values_used)] = values_used
         times_s = np.array([point.time_s for point in points], float)
         counts = np.array([[len(sent) for sent in row] for row in rows], np.int32).reshape(-1, 3)
         return cls(joint_names, TrajectoryPoints(times_s, values, counts), stamp_s)
 
 
 def segment_coefficients(start: Array, end: Array, duration_s: Array | float, order: int) -> Array:
-    """Polynomial coefficients, lowest power first, of one segment, or of several at once, for all joints.
+    """Computes the polynomial coefficients of one or several segments.
 
     Args:
-        start: state (position, velocity, acceleration) at its beginning, shape (..., 3, joints).
-        end: state at its end, shape (..., 3, joints).
-        duration_s: length [s], positive; for several segments of shape (..., 1).
-        order: 1, 3 or 5: how many boundary conditions are used.
+        start: State (position, velocity, acceleration) at the start, shape (..., 3, joints).
+        end: State at the end, shape (..., 3, joints).
+        duration_s: Positive duration [s]; for several segments shape (..., 1).
+        order: Order of the polynomial, 1, 3 or 5.
 
     Returns:
-        Coefficients of shape (..., 6, joints).
+        Coefficients, lowest power first, shape (..., 6, joints).
     """
     p0, v0, a0 = (start[..., row, :] for row in (POSITION, VELOCITY, ACCELERATION))
     p1, v1, a1 = (end[..., row, :] for row in (POSITION, VELOCITY, ACCELERATION))
     t = duration_s
-    way = p1 - p0
-    none = np.zeros_like(p0)
+    distance = p1 - p0
+    zeros = np.zeros_like(p0)
     if order == 1:
-        rows = [p0, way / t, none, none, none, none]
+        rows = [p0, distance / t, zeros, zeros, zeros, zeros]
     elif order == 3:
-        rows = [p0, v0, (3.0 * way - t * (2.0 * v0 + v1)) / t**2, (t * (v0 + v1) - 2.0 * way) / t**3, none, none]
+        rows = [
+            p0,
+            v0,
+            (3.0 * distance - t * (2.0 * v0 + v1)) / t**2,
+            (t * (v0 + v1) - 2.0 * distance) / t**3,
+            zeros,
+            zeros,
+        ]
     else:
         rows = [
             p0,
             v0,
             0.5 * a0,
-            (20.0 * way - t * (8.0 * v1 + 12.0 * v0) - t**2 * (3.0 * a0 - a1)) / (2.0 * t**3),
-            (-30.0 * way + t * (14.0 * v1 + 16.0 * v0) + t**2 * (3.0 * a0 - 2.0 * a1)) / (2.0 * t**4),
-            (12.0 * way - 6.0 * t * (v0 + v1) + t**2 * (a1 - a0)) / (2.0 * t**5),
+            (20.0 * distance - t * (8.0 * v1 + 12.0 * v0) - t**2 * (3.0 * a0 - a1)) / (2.0 * t**3),
+            (-30.0 * distance + t * (14.0 * v1 + 16.0 * v0) + t**2 * (3.0 * a0 - 2.0 * a1)) / (2.0 * t**4),
+            (12.0 * distance - 6.0 * t * (v0 + v1) + t**2 * (a1 - a0)) / (2.0 * t**5),
         ]
     return np.stack(rows, axis=-2)
 
 
-def parts(count: int) -> Iterator[slice]:
-    """Divides `count` items among slices, with a pause between two.
+def chunks(count: int) -> Iterator[slice]:
+    """Yields slices of `count` items and pauses between them.
 
-    A slice is short enough for one call of NumPy, in which the control loop cannot have the interpreter. A thread with
-    real-time priority must pause: Linux stops real-time threads for 50 ms if they use a processor up for 0.95 s.
+    A slice is small enough for one NumPy call, during which the control loop cannot get the interpreter. The pauses are
+    for threads with real-time priority: Linux throttles them for 50 ms if they occupy a processor for 0.95 s.
     """
-    begun_s = time.monotonic()
-    for begin in range(0, count, ITEMS_AT_ONCE):
+    start_s = time.monotonic()
+    for begin in range(0, count, CHUNK_SIZE):
         if begin > 0:
-            time.sleep(PAUSE_S + PAUSE_SHARE * (time.monotonic() - begun_s))
-            begun_s = time.monotonic()
-        yield slice(begin, min(begin + ITEMS_AT_ONCE, count))
+            time.sleep(PAUSE_S + PAUSE_FRACTION * (time.monotonic() - start_s))
+            start_s = time.monotonic()
+        yield slice(begin, min(begin + CHUNK_SIZE, count))
 
 
 class Spline:
-    """A checked trajectory with the coefficients of all segments between its points.
+    """A validated trajectory with the coefficients of all segments.
 
     Args:
-        trajectory: at least one point, as `check_points` allows.
+        trajectory: Trajectory with at least one point that passed `check_points`.
 
     Attributes:
-        times_s: time of each point from the start [s], shape (points,).
-        states: what each point gives, missing values 0, shape (points, 3, joints).
-        orders: highest order each point allows: 1, 3 or 5, shape (points,).
-        coefficients: of the segment from point i to point i + 1, shape (points - 1, 6, joints).
+        times_s: Time of each point from the start, shape (points,).
+        states: Positions, velocities and accelerations of each point, 0 if missing; shape (points, 3, joints).
+        orders: Maximum polynomial order at each point, 1, 3 or 5; shape (points,).
+        coefficients: Coefficients of the segment from point i to point i + 1, shape (points - 1, 6, joints).
     """
 
     __slots__ = ("times_s", "states", "orders", "coefficients")
@@ -165,17 +176,17 @@ class Spline:
         self.states = points.values
         self.orders = np.where(points.counts[:, VELOCITY] == 0, 1, np.where(points.counts[:, ACCELERATION] == 0, 3, 5))
         self.coefficients = np.empty((len(points) - 1, 6, len(trajectory.joint_names)))
-        for part in parts(len(points) - 1):
-            self._compute_segments(part, slice(part.start + 1, part.stop + 1))
+        for chunk in chunks(len(points) - 1):
+            self._compute_segments(chunk, slice(chunk.start + 1, chunk.stop + 1))
 
     def _compute_segments(self, starts: slice, ends: slice) -> None:
         """Computes the coefficients of the segments between these points."""
         orders = np.minimum(self.orders[starts], self.orders[ends])
         durations_s = (self.times_s[ends] - self.times_s[starts])[:, np.newaxis]
         for order in (1, 3, 5):
-            chosen = orders == order
-            self.coefficients[starts][chosen] = segment_coefficients(
-                self.states[starts][chosen], self.states[ends][chosen], durations_s[chosen], order
+            mask = orders == order
+            self.coefficients[starts][mask] = segment_coefficients(
+                self.states[starts][mask], self.states[ends][mask], durations_s[mask], order
             )
 
 
@@ -183,18 +194,19 @@ class Spline:
 class Track:
     """The motion of some joints of a controller: consecutive segments, then rest at the last position.
 
-    The control loop makes tracks. So they copy nothing of a trajectory, which may be very long.
+    Tracks are created in the control loop and therefore only reference a trajectory, which may be very long.
 
     Attributes:
-        joints: indices of the joints in the controller.
-        start_s: start of the first segment [s of the controller's time].
-        ends_s: end of each segment [s after origin_s], shape (segments,).
-        first: coefficients of the first segment, shape (6, columns).
-        others: coefficients of the other segments, shape (segments - 1, 6, columns).
-        end_position: where it ends, shape (columns,).
-        origin_s: time of its time_from_start 0 [s].
-        offset: added to the positions of `others`, shape (columns,).
-        columns: those of `joints` in the arrays; None for all.
+        joints: Indices of the joints in the controller.
+        start_s: Start of the first segment [s of the controller's time].
+        ends_s: End of each segment [s after origin_s], shape (segments,).
+        first: Coefficients of the first segment, shape (6, columns).
+        others: Coefficients of the other segments, shape (segments - 1, 6, columns).
+        end_position: Final position, shape (columns,).
+        origin_s: Time of time_from_start 0.
+        offset: Offset of the positions of `others`, shape (columns,).
+        columns: Columns of `joints` in the arrays; None for all columns.
+        end_s: End of the last segment.
     """
 
     joints: list[int]
@@ -213,7 +225,13 @@ class Track:
 
     @classmethod
     def hold(cls, joints: Sequence[int], position: Array, time_s: float) -> Track:
-        """Rest at `position`, shape (joints,), from `time_s` on."""
+        """Returns a track that rests at a position.
+
+        Args:
+            joints: Indices of the joints in the controller.
+            position: Position, shape (joints,) [rad|m].
+            time_s: Start time.
+        """
         at_rest = np.zeros((6, len(joints)))
         at_rest[POSITION] = position
         return cls.one_segment(joints, time_s, time_s, at_rest, at_rest[POSITION])
@@ -222,13 +240,21 @@ class Track:
     def one_segment(
         cls, joints: Sequence[int], start_s: float, end_s: float, coefficients: Array, end_position: Array
     ) -> Track:
-        """One segment with coefficients of shape (6, joints), from `start_s` to `end_s` [s]."""
+        """Returns a track with one segment.
+
+        Args:
+            joints: Indices of the joints in the controller.
+            start_s: Start time.
+            end_s: End time.
+            coefficients: Polynomial coefficients, shape (6, joints).
+            end_position: Final position, shape (joints,) [rad|m].
+        """
         return cls(
             list(joints), start_s, np.array([end_s - start_s]), coefficients, coefficients[:0], end_position, start_s
         )
 
     def sample(self, time_s: float) -> Array:
-        """Position, velocity and acceleration at `time_s`, shape (3, joints)."""
+        """Returns position, velocity and acceleration at `time_s`, shape (3, joints)."""
         if time_s > self.end_s:
             state = np.zeros((3, len(self.end_position)))
             state[POSITION] = self.end_position
@@ -248,27 +274,27 @@ class Track:
         return state if self.columns is None else state[:, self.columns]
 
     def without(self, joints: Sequence[int]) -> Track | None:
-        """This track for its other joints; None when none is left."""
-        kept = [i for i, joint in enumerate(self.joints) if joint not in joints]
-        columns = kept if self.columns is None else [self.columns[i] for i in kept]
-        return replace(self, joints=[self.joints[i] for i in kept], columns=columns) if kept else None
+        """Returns the track without the given joints; None if no joint remains."""
+        remaining = [i for i, joint in enumerate(self.joints) if joint not in joints]
+        columns = remaining if self.columns is None else [self.columns[i] for i in remaining]
+        return replace(self, joints=[self.joints[i] for i in remaining], columns=columns) if remaining else None
 
 
 def splice(
     spline: Spline, joints: Sequence[int], origin_s: float, splice_s: float, state: Array, continuous: Sequence[bool]
 ) -> Track:
-    """Joins a new trajectory to the present motion: from `state` at `splice_s` to the first point after it, and on.
+    """Joins a new trajectory to the current motion.
 
-    When a point lies exactly at `splice_s` and agrees with `state` in position and velocity, the trajectory is followed
-    as sent; otherwise a segment of the order of the next point leads over to it.
+    The track starts at `state` and leads to the first point after `splice_s` with a segment of this point's order. If a
+    point at `splice_s` agrees with `state` in position and velocity, the trajectory's own segment is used instead.
 
     Args:
-        spline: the new trajectory; it ends at least SHORTEST_SEGMENT_S after `splice_s`.
-        joints: indices of its joints in the controller, in the order of its values.
-        origin_s: time of its time_from_start 0 [s].
-        splice_s: when it takes over [s].
-        state: desired state of its joints at `splice_s`, shape (3, joints).
-        continuous: which joints are continuous; they take the shorter direction.
+        spline: New trajectory, which ends at least MIN_SEGMENT_S after `splice_s`.
+        joints: Indices of the trajectory's joints in the controller.
+        origin_s: Time of time_from_start 0.
+        splice_s: Time of the transition.
+        state: Desired state of the joints at `splice_s`, shape (3, joints).
+        continuous: Whether each joint is continuous and takes the shorter direction.
     """
     first = int(np.searchsorted(spline.times_s, splice_s - origin_s, side="right"))
     offset = np.where(continuous, _whole_turns(state[POSITION], spline.states[first, POSITION]), 0.0)
@@ -285,9 +311,9 @@ def splice(
 
 
 def _whole_turns(position: Array, target: Array) -> Array:
-    """Returns the multiple of 2 pi that brings `target` nearest to `position`; half a turn keeps its direction.
+    """Returns the multiple of 2 pi that brings `target` nearest to `position`; a difference of pi keeps its sign.
 
-    Both of shape (joints,) [rad].
+    Both arrays have shape (joints,) [rad].
     """
     turns = (position - target) / (2.0 * math.pi)
     full_turns = np.where(np.abs(np.abs(turns) % 1.0 - 0.5) < 1e-9, np.trunc(turns), np.round(turns))
@@ -295,7 +321,7 @@ def _whole_turns(position: Array, target: Array) -> Array:
 
 
 def _agrees(spline: Spline, point: int, time_s: float, state: Array, offset: Array) -> bool:
-    """Whether `state` at `time_s` is where the trajectory's own segment from `point` begins."""
+    """Returns whether `state` at `time_s` is the start of the trajectory's own segment from `point`."""
     tolerance = 1e-6
     if abs(spline.times_s[point] - time_s) > 1e-9:
         return False

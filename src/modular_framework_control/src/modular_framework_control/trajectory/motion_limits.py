@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks a trajectory against the limits of its joints: positions and velocities, at its points and between them.
+"""Check of a trajectory against the position and velocity limits of its joints, at its points and between them.
 
-Between points the curve is sampled. A motion that is slightly too fast is accepted: the hardware enforces its limits,
-and the joint arrives a little late.
+Segments are sampled between points. Slightly excessive velocities are accepted, because the hardware enforces its
+limits and the joint only arrives a little late.
 """
 
 from __future__ import annotations
@@ -16,17 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modular_framework_control.hardware_interface.joint_limit_parameters import POINT_MARGIN, JointLimits
-from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track, parts
+from modular_framework_control.trajectory.joint_trajectory import POSITION, VELOCITY, Array, Spline, Track, chunks
 
-VELOCITY_SHARE = 1.05
-"""Largest velocity as a multiple of the limit: time parameterisations overshoot by that much between their points."""
+MAX_VELOCITY_FACTOR = 1.05
+"""Maximum velocity as a multiple of the limit; time parameterizations overshoot by this factor between points."""
 CURVE_MARGIN = 1e-2
-"""How far the curve between points may go beyond a position limit, and how far a joint may lag behind in the first
-segment [rad|m]."""
-_MOST_FAULTS = 8
-_NO_SPEED = "with it the joint may not move at all: correct it in robot_description or joint_limits"
+"""Tolerance for positions between points beyond a limit, and for the lag of a joint in the first segment [rad|m]."""
+_MAX_FAULTS = 8
+_ZERO_LIMIT = "this limit forbids any motion: correct it in robot_description or joint_limits"
 
-# Chebyshev nodes, whose largest sample is at most 2 % (velocity) below the largest value of a quintic segment.
+# At Chebyshev nodes, the maximum sample is at most 2 % (velocity) below the maximum of a quintic segment.
 _NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 33))
 _POSITION_BASIS = _NODES[:, np.newaxis] ** np.arange(6)
 _VELOCITY_BASIS = np.arange(6) * _NODES[:, np.newaxis] ** np.maximum(np.arange(6) - 1, 0)
@@ -41,23 +40,23 @@ class _Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """Limits of some joints; infinite where none is known.
+    """Limits of joints; infinite if unknown.
 
     Attributes:
-        lowest: smallest positions [rad|m], shape (joints,).
-        highest: largest positions [rad|m], shape (joints,).
-        fastest: largest velocities [rad/s|m/s], shape (joints,).
-        braking: largest decelerations [rad/s^2|m/s^2], shape (joints,).
+        min_positions: Minimum positions, shape (joints,) [rad|m].
+        max_positions: Maximum positions, shape (joints,) [rad|m].
+        max_velocities: Maximum velocities, shape (joints,) [rad/s|m/s].
+        max_decelerations: Maximum decelerations, shape (joints,) [rad/s^2|m/s^2].
     """
 
-    lowest: Array
-    highest: Array
-    fastest: Array
-    braking: Array
+    min_positions: Array
+    max_positions: Array
+    max_velocities: Array
+    max_decelerations: Array
 
     @classmethod
     def of(cls, limits: Sequence[JointLimits]) -> MotionLimits:
-        """The limits of joints, in their order."""
+        """Returns the limits of joints as arrays."""
         return cls(
             np.array([limit.min_position for limit in limits]),
             np.array([limit.max_position for limit in limits]),
@@ -66,40 +65,55 @@ class MotionLimits:
         )
 
     def of_joints(self, joints: Sequence[int]) -> MotionLimits:
-        """Those of some of the joints, by index."""
+        """Returns the limits of the joints with these indices."""
         chosen = list(joints)
-        return MotionLimits(self.lowest[chosen], self.highest[chosen], self.fastest[chosen], self.braking[chosen])
+        return MotionLimits(
+            self.min_positions[chosen],
+            self.max_positions[chosen],
+            self.max_velocities[chosen],
+            self.max_decelerations[chosen],
+        )
 
     def with_positions(self, positions: Array) -> MotionLimits:
-        """Returns the limits widened to these positions, shape (joints,), so that a joint outside may move back."""
+        """Returns the limits widened to include positions, shape (joints,), so that joints outside may move back."""
         return MotionLimits(
-            np.fmin(self.lowest, positions), np.fmax(self.highest, positions), self.fastest, self.braking
+            np.fmin(self.min_positions, positions),
+            np.fmax(self.max_positions, positions),
+            self.max_velocities,
+            self.max_decelerations,
         )
 
 
 class LimitViolations:
-    """All violations of limits by a trajectory. Points that are left out, and the segments before them, do not count.
+    """All limit violations of a trajectory.
 
     Args:
-        names: the joints of the trajectory.
-        limits: their limits.
-        measured: positions of the joints [rad|m], shape (joints,).
+        names: Joints of the trajectory.
+        limits: Limits of these joints.
+        measured: Measured positions of these joints, shape (joints,) [rad|m].
     """
 
     def __init__(self, names: Sequence[str], limits: MotionLimits, measured: Array) -> None:
         self._names = tuple(names)
         self._limits = limits
         self._measured = measured
-        self._found: list[tuple[_Kind, NDArray[np.int64], Array]] = []  # in each, points in ascending order
+        self._found: list[tuple[_Kind, NDArray[np.int64], Array]] = []  # each with points in ascending order
 
     def add(self, kind: _Kind, values: Array, beyond: NDArray[np.bool_], first_point: int) -> None:
-        """Adds the values, shape (points, joints), where `beyond` is true; the first row belongs to `first_point`."""
+        """Adds violations.
+
+        Args:
+            kind: Kind of the violations.
+            values: Values at consecutive points, shape (points, joints).
+            beyond: Whether each value violates a limit, shape (points, joints).
+            first_point: Index of the point of the first row.
+        """
         if beyond.any():
             indices: NDArray[np.int64] = np.argwhere(beyond) + (first_point, 0)
             self._found.append((kind, indices, values[beyond]))
 
     def merge(self) -> None:
-        """Joins the violations of each kind: the control loop, which asks for the text, has no time for many parts."""
+        """Joins the violations of each kind, so that the control loop can compute the text quickly."""
         kinds = {kind: [(indices, values) for other, indices, values in self._found if other is kind] for kind in _Kind}
         self._found = [
             (kind, np.concatenate([indices for indices, _ in found]), np.concatenate([values for _, values in found]))
@@ -108,11 +122,11 @@ class LimitViolations:
         ]
 
     def text(self, first: int = 0, first_segment: int = 1) -> str:
-        """Describes the violations in one text, of very many only the first few; "" if there are none.
+        """Returns a description of the first few violations, or "".
 
         Args:
-            first: the first point that counts.
-            first_segment: the first point whose segment before it counts.
+            first: Index of the first point that counts.
+            first_segment: Index of the end point of the first segment that counts.
         """
         described: list[str] = []
         count = 0
@@ -122,62 +136,80 @@ class LimitViolations:
             count += len(indices) - skipped
             described += [
                 self._described(kind, int(indices[i, 0]), int(indices[i, 1]), float(values[i]))
-                for i in range(skipped, min(len(indices), skipped + _MOST_FAULTS - len(described)))
+                for i in range(skipped, min(len(indices), skipped + _MAX_FAULTS - len(described)))
             ]
-        more = count - len(described)
-        return "; ".join(described) + (f"; and {more} more" if more else "")
+        omitted = count - len(described)
+        return "; ".join(described) + (f"; and {omitted} more" if omitted else "")
 
     def _described(self, kind: _Kind, point: int, joint: int, value: float) -> str:
-        name, allowed, fastest = self._names[joint], self._range(joint), self._limits.fastest[joint]
+        name, allowed, max_velocities = self._names[joint], self._range(joint), self._limits.max_velocities[joint]
         match kind:
             case _Kind.POINT_POSITION:
                 return (
-                    f"point {point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position within them"
+                    f"point {point}: position of joint '{name}' is {value:.6g}; {allowed}; give a position within the "
+                    "limits"
                 )
             case _Kind.POINT_VELOCITY:
-                return f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {fastest:.6g}; " + (
-                    "give a lower velocity" if fastest > 0.0 else _NO_SPEED
+                return (
+                    f"point {point}: velocity of joint '{name}' is {value:.6g}; its limit is {max_velocities:.6g}; "
+                    + ("give a lower velocity" if max_velocities > 0.0 else _ZERO_LIMIT)
                 )
             case _Kind.CURVE_POSITION:
                 return (
-                    f"on the way to point {point} joint '{name}' comes to {value:.6g}; {allowed}; give the points "
-                    " other velocities, or points in between"
+                    f"on the way to point {point}, joint '{name}' reaches {value:.6g}; {allowed}; change the "
+                    "velocities of the points, or add points between them"
                 )
             case _Kind.CURVE_VELOCITY:
                 return (
-                    f"on the way to point {point} joint '{name}' reaches the velocity {value:.6g}; its limit is "
-                    f"{fastest:.6g}; " + ("give the point a later time_from_start" if fastest > 0.0 else _NO_SPEED)
+                    f"on the way to point {point}, joint '{name}' reaches the velocity {value:.6g}; its limit is "
+                    f"{max_velocities:.6g}; "
+                    + ("give the point a later time_from_start" if max_velocities > 0.0 else _ZERO_LIMIT)
                 )
 
     def _range(self, joint: int) -> str:
-        lowest, highest, measured = self._limits.lowest[joint], self._limits.highest[joint], self._measured[joint]
-        outside = f" (it stands outside, at {measured:.6g})" if not lowest <= measured <= highest else ""
-        return f"its limits are {lowest:.6g} to {highest:.6g}{outside}"
+        min_positions, max_positions, measured = (
+            self._limits.min_positions[joint],
+            self._limits.max_positions[joint],
+            self._measured[joint],
+        )
+        outside = (
+            f" (the joint is outside, at {measured:.6g})" if not min_positions <= measured <= max_positions else ""
+        )
+        return f"its limits are {min_positions:.6g} to {max_positions:.6g}{outside}"
 
 
 def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits, measured: Array) -> LimitViolations:
-    """Finds the violations of limits by a trajectory, at its points and between them.
+    """Finds the limit violations of a trajectory, at its points and between them.
 
     Args:
-        spline: the trajectory.
-        names: its joints.
-        limits: their limits.
-        measured: positions of the joints [rad|m], shape (joints,); a joint outside its range may come back.
+        spline: Trajectory.
+        names: Joints of the trajectory.
+        limits: Limits of these joints.
+        measured: Measured positions, shape (joints,) [rad|m]; a joint outside its range may move back.
     """
     found = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
-    for part in parts(len(spline.times_s)):
-        positions, velocities = spline.states[part, POSITION], spline.states[part, VELOCITY]
-        beyond = (positions < limits.lowest - POINT_MARGIN) | (positions > limits.highest + POINT_MARGIN)
-        found.add(_Kind.POINT_POSITION, positions, beyond, part.start)
-        found.add(_Kind.POINT_VELOCITY, velocities, np.abs(velocities) > VELOCITY_SHARE * limits.fastest, part.start)
-    if np.isfinite(limits.fastest).any() or np.isfinite(limits.lowest).any() or np.isfinite(limits.highest).any():
+    for chunk in chunks(len(spline.times_s)):
+        positions, velocities = spline.states[chunk, POSITION], spline.states[chunk, VELOCITY]
+        beyond = (positions < limits.min_positions - POINT_MARGIN) | (positions > limits.max_positions + POINT_MARGIN)
+        found.add(_Kind.POINT_POSITION, positions, beyond, chunk.start)
+        found.add(
+            _Kind.POINT_VELOCITY,
+            velocities,
+            np.abs(velocities) > MAX_VELOCITY_FACTOR * limits.max_velocities,
+            chunk.start,
+        )
+    if (
+        np.isfinite(limits.max_velocities).any()
+        or np.isfinite(limits.min_positions).any()
+        or np.isfinite(limits.max_positions).any()
+    ):
         durations_s = np.diff(spline.times_s)
-        for part in parts(len(durations_s)):
-            ways = _SegmentExtremes(spline.coefficients[part], durations_s[part])
-            too_fast = np.abs(ways.velocities) > VELOCITY_SHARE * limits.fastest
-            found.add(_Kind.CURVE_VELOCITY, ways.velocities, too_fast, part.start + 1)
-            _add_positions(found, ways, limits, part.start + 1)
+        for chunk in chunks(len(durations_s)):
+            extremes = _SegmentExtremes(spline.coefficients[chunk], durations_s[chunk])
+            too_fast = np.abs(extremes.velocities) > MAX_VELOCITY_FACTOR * limits.max_velocities
+            found.add(_Kind.CURVE_VELOCITY, extremes.velocities, too_fast, chunk.start + 1)
+            _add_positions(found, extremes, limits, chunk.start + 1)
     found.merge()
     return found
 
@@ -185,59 +217,64 @@ def limit_violations(spline: Spline, names: Sequence[str], limits: MotionLimits,
 def first_segment_violations(
     track: Track, names: Sequence[str], limits: MotionLimits, measured: Array, point: int
 ) -> str:
-    """Describes the violations in the segment from the present motion to the first point; "" if there are none.
+    """Returns a description of the violations in the segment from the current motion to the first point, or "".
 
     Args:
-        track: the new motion, joined to the present one.
-        names: its joints.
-        limits: their limits.
-        measured: positions of the joints [rad|m], shape (joints,).
-        point: number of that point.
+        track: New motion, joined to the current motion.
+        names: Joints of the motion.
+        limits: Limits of these joints.
+        measured: Measured positions, shape (joints,) [rad|m].
+        point: Index of the first point.
     """
     found = LimitViolations(names, limits, measured)
     limits = limits.with_positions(measured)
     duration_s = track.origin_s + float(track.ends_s[0]) - track.start_s
-    ways = _SegmentExtremes(track.first[np.newaxis], np.array([duration_s]))
-    speeds = np.abs(ways.velocities)
-    late = (speeds - limits.fastest) * duration_s > CURVE_MARGIN
-    found.add(_Kind.CURVE_VELOCITY, ways.velocities, late & (speeds > VELOCITY_SHARE * limits.fastest), point)
-    _add_positions(found, ways, limits, point)
+    extremes = _SegmentExtremes(track.first[np.newaxis], np.array([duration_s]))
+    speeds = np.abs(extremes.velocities)
+    late = (speeds - limits.max_velocities) * duration_s > CURVE_MARGIN
+    found.add(
+        _Kind.CURVE_VELOCITY, extremes.velocities, late & (speeds > MAX_VELOCITY_FACTOR * limits.max_velocities), point
+    )
+    _add_positions(found, extremes, limits, point)
     return found.text(point, point)
 
 
-def _add_positions(found: LimitViolations, ways: _SegmentExtremes, limits: MotionLimits, first_point: int) -> None:
+def _add_positions(found: LimitViolations, extremes: _SegmentExtremes, limits: MotionLimits, first_point: int) -> None:
     found.add(
-        _Kind.CURVE_POSITION, ways.lowest, ways.overshoots & (ways.lowest < limits.lowest - CURVE_MARGIN), first_point
+        _Kind.CURVE_POSITION,
+        extremes.min_positions,
+        extremes.overshoots & (extremes.min_positions < limits.min_positions - CURVE_MARGIN),
+        first_point,
     )
     found.add(
         _Kind.CURVE_POSITION,
-        ways.highest,
-        ways.overshoots & (ways.highest > limits.highest + CURVE_MARGIN),
+        extremes.max_positions,
+        extremes.overshoots & (extremes.max_positions > limits.max_positions + CURVE_MARGIN),
         first_point,
     )
 
 
 class _SegmentExtremes:
-    """Extremes of positions and velocities in polynomial segments.
+    """Extreme positions and velocities in polynomial segments.
 
     Args:
-        coefficients: of shape (segments, 6, joints).
-        durations_s: of the segments [s], shape (segments,).
+        coefficients: Polynomial coefficients, shape (segments, 6, joints).
+        durations_s: Durations of the segments, shape (segments,).
 
     Attributes:
-        lowest, highest: positions, shape (segments, joints).
-        overshoots: whether one of them lies beyond both ends of the segment, shape (segments, joints).
-        velocities: those largest in size, shape (segments, joints).
+        min_positions, max_positions: Extreme positions, shape (segments, joints).
+        overshoots: Whether an extreme position lies beyond both ends of the segment, shape (segments, joints).
+        velocities: Velocities of maximum magnitude, shape (segments, joints).
     """
 
     def __init__(self, coefficients: Array, durations_s: Array) -> None:
         scaled = coefficients * durations_s[:, np.newaxis, np.newaxis] ** np.arange(6)[:, np.newaxis]
-        scaled = np.ascontiguousarray(scaled.transpose(2, 1, 0))  # one product a joint
+        scaled = np.ascontiguousarray(scaled.transpose(2, 1, 0))  # one matrix product per joint
         positions = _POSITION_BASIS @ scaled
-        self.lowest: Array = positions.min(axis=1).T
-        self.highest: Array = positions.max(axis=1).T
+        self.min_positions: Array = positions.min(axis=1).T
+        self.max_positions: Array = positions.max(axis=1).T
         begin, end = positions[:, 0].T, positions[:, -1].T
-        self.overshoots = (self.lowest < np.minimum(begin, end)) | (self.highest > np.maximum(begin, end))
+        self.overshoots = (self.min_positions < np.minimum(begin, end)) | (self.max_positions > np.maximum(begin, end))
         velocities = _VELOCITY_BASIS @ scaled
         upper, lower = velocities.max(axis=1).T, velocities.min(axis=1).T
         self.velocities: Array = np.where(upper > -lower, upper, lower) / durations_s[:, np.newaxis]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks the points of a trajectory before it is followed: joint names, sizes, numbers and times."""
+"""Validation of a received trajectory: joint names, sizes, values and times."""
 
 from __future__ import annotations
 
@@ -17,22 +17,21 @@ from modular_framework_control.trajectory.joint_trajectory import (
     InvalidTrajectoryError,
     JointTrajectory,
     TrajectoryPoints,
-    parts,
+    chunks,
 )
 
-# Coefficients of a segment as short as they come stay finite with values up to this.
-LARGEST_VALUE = 1e9
-_MOST_FAULTS_LISTED = 8
+MAX_VALUE = 1e9  # keeps the coefficients of the shortest segments finite
+_MAX_FAULTS_LISTED = 8
 _NOUNS = ("position", "velocity", "acceleration")
 
 
 def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool) -> str:
-    """Describes what is wrong with the joint names of a trajectory; "" if nothing is.
+    """Returns a description of the faults in the joint names of a trajectory, or "".
 
     Args:
-        names: as sent.
-        known: joints of the controller.
-        allow_partial: whether some of them may be missing.
+        names: Received joint names.
+        known: Joints of the controller.
+        allow_partial: Whether joints may be missing.
     """
     faults = [
         f"unknown joint '{name}' (index {i})" if name else f"the joint name at index {i} is empty"
@@ -41,7 +40,7 @@ def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool
     ]
     times_named = Counter(names)
     for name in (name for name in times_named if name in known and times_named[name] > 1):
-        indices = " and ".join(islice((str(i) for i, other in enumerate(names) if other == name), _MOST_FAULTS_LISTED))
+        indices = " and ".join(islice((str(i) for i, other in enumerate(names) if other == name), _MAX_FAULTS_LISTED))
         faults.append(f"joint '{name}' is named twice (indices {indices})")
     missing = [name for name in known if name not in names]
     if missing and not (allow_partial and names):
@@ -56,10 +55,10 @@ def joint_faults(names: Sequence[str], known: Sequence[str], allow_partial: bool
 
 
 def drop_surplus_values(trajectory: JointTrajectory) -> tuple[JointTrajectory, str]:
-    """Drops values of points beyond the number of named joints, which ros_controllers allows in goals for some joints.
+    """Drops values beyond the number of joint names, which ros_controllers accepts in goals for some joints.
 
     Returns:
-        The trajectory with one value a joint, and what was left out, or "".
+        The trajectory with one value per joint, and a warning or "".
     """
     count = len(trajectory.joint_names)
     points = trajectory.points
@@ -67,28 +66,28 @@ def drop_surplus_values(trajectory: JointTrajectory) -> tuple[JointTrajectory, s
     size = int(sent.max(initial=0))
     if size <= count or sent.min() < size:
         return trajectory, ""
-    kept = TrajectoryPoints(points.times_s, points.values, np.minimum(points.counts, count))
+    truncated = TrajectoryPoints(points.times_s, points.values, np.minimum(points.counts, count))
     return (
-        replace(trajectory, points=kept),
+        replace(trajectory, points=truncated),
         f"points have {size} values each, only the first {count} are used, for: "
-        f"{', '.join(trajectory.joint_names)}; send one value a joint",
+        f"{', '.join(trajectory.joint_names)}; send one value per joint",
     )
 
 
 def check_points(trajectory: JointTrajectory) -> None:
-    """Checks sizes, numbers and times of a trajectory.
+    """Checks sizes, values and times of a trajectory.
 
     Raises:
-        InvalidTrajectoryError: lists the faults: which point, which joint, what was got, what is allowed.
+        InvalidTrajectoryError: The trajectory is invalid; the message lists faults by point and joint.
     """
     faults = _Faults()
     points, names = trajectory.points, trajectory.joint_names
-    for part in parts(len(points)):
-        _check_values(faults, points, part, names)
+    for chunk in chunks(len(points)):
+        _check_values(faults, points, chunk, names)
     if points and not math.isfinite(points.times_s[0]):
         faults.add(1, iter([f"point 0: time_from_start is {points.times_s[0]:.9g} s; expected a time"]))
     early = np.flatnonzero(~(np.diff(points.times_s) > 0.0))
-    faults.add(len(early), (_early(points.times_s, int(number)) for number in early))
+    faults.add(len(early), (_time_fault(points.times_s, int(index)) for index in early))
     if not abs(trajectory.stamp_s) < float("inf"):
         faults.add(1, iter([f"header stamp is {trajectory.stamp_s}; expected a time, or 0 for now"]))
     if faults.count:
@@ -96,39 +95,43 @@ def check_points(trajectory: JointTrajectory) -> None:
 
 
 class _Faults:
-    """Describes the first of very many faults, and counts the others."""
+    """Describes the first faults and counts the others."""
 
     def __init__(self) -> None:
         self.count = 0
         self._listed: list[str] = []
 
     def add(self, count: int, texts: Iterator[str]) -> None:
-        """Adds `count` faults; `texts` describes them when asked."""
+        """Adds `count` faults; descriptions are only taken from `texts` as far as needed."""
         self.count += count
-        self._listed += islice(texts, _MOST_FAULTS_LISTED - len(self._listed))
+        self._listed += islice(texts, _MAX_FAULTS_LISTED - len(self._listed))
 
     def text(self) -> str:
-        """Joins the faults to one text."""
-        more = self.count - len(self._listed)
-        return "; ".join(self._listed) + (f"; and {more} more" if more else "")
+        """Returns the descriptions in one text."""
+        omitted = self.count - len(self._listed)
+        return "; ".join(self._listed) + (f"; and {omitted} more" if omitted else "")
 
 
-def _check_values(faults: _Faults, points: TrajectoryPoints, part: slice, names: Sequence[str]) -> None:
-    counts = points.counts[part]
-    missized = counts != len(names)
-    missized[:, 1:] &= counts[:, 1:] > 0
-    beyond = ~(np.abs(points.values[part]) <= LARGEST_VALUE) & ~missized[:, :, np.newaxis]
-    count = int(np.count_nonzero(missized)) + int(np.count_nonzero(beyond))
+def _check_values(faults: _Faults, points: TrajectoryPoints, chunk: slice, names: Sequence[str]) -> None:
+    counts = points.counts[chunk]
+    is_wrong_size = counts != len(names)
+    is_wrong_size[:, 1:] &= counts[:, 1:] > 0
+    beyond = ~(np.abs(points.values[chunk]) <= MAX_VALUE) & ~is_wrong_size[:, :, np.newaxis]
+    count = int(np.count_nonzero(is_wrong_size)) + int(np.count_nonzero(beyond))
     if count:
-        faults.add(count, _value_faults(points, part, missized, beyond, names))
+        faults.add(count, _value_faults(points, chunk, is_wrong_size, beyond, names))
 
 
 def _value_faults(
-    points: TrajectoryPoints, part: slice, missized: NDArray[np.bool_], beyond: NDArray[np.bool_], names: Sequence[str]
+    points: TrajectoryPoints,
+    chunk: slice,
+    is_wrong_size: NDArray[np.bool_],
+    beyond: NDArray[np.bool_],
+    names: Sequence[str],
 ) -> Iterator[str]:
-    for i, kind in np.argwhere(missized | beyond.any(axis=2)).tolist():
-        point, noun = part.start + i, _NOUNS[kind]
-        if missized[i, kind]:
+    for i, kind in np.argwhere(is_wrong_size | beyond.any(axis=2)).tolist():
+        point, noun = chunk.start + i, _NOUNS[kind]
+        if is_wrong_size[i, kind]:
             plural = noun.replace("y", "ie") + "s"
             yield (
                 f"point {point}: has {points.counts[point, kind]} {plural}; expected {len(names)}"
@@ -137,13 +140,13 @@ def _value_faults(
         for joint in np.flatnonzero(beyond[i, kind]).tolist():
             yield (
                 f"point {point}: {noun} of joint '{names[joint]}' (index {joint}) is "
-                f"{points.values[point, kind, joint]:.9g}; expected a finite number of at most {LARGEST_VALUE:.0e} "
+                f"{points.values[point, kind, joint]:.9g}; expected a finite number of at most {MAX_VALUE:.0e} "
                 "in size"
             )
 
 
-def _early(times_s: Array, number: int) -> str:
+def _time_fault(times_s: Array, index: int) -> str:
     return (
-        f"point {number + 1}: time_from_start {times_s[number + 1]:.9g} s does not come after {times_s[number]:.9g} s"
-        f" of point {number}; times must increase strictly"
+        f"point {index + 1}: time_from_start {times_s[index + 1]:.9g} s does not come after {times_s[index]:.9g} s"
+        f" of point {index}; times must increase strictly"
     )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the points of a serialised trajectory_msgs/JointTrajectory into arrays.
+"""Fast reader for the points of a serialized trajectory_msgs/JointTrajectory.
 
-A goal may have 100,000 points. To make a Python object of each would keep the control loop, which shares the
-interpreter, from its time for seconds; NumPy reads points that have the same sizes many at once.
+A goal may have 100,000 points. One Python object per point would block the control loop, which shares the interpreter,
+for seconds. NumPy reads many points of equal sizes at once.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from modular_framework_control.trajectory.joint_trajectory import TrajectoryPoints, parts
+from modular_framework_control.trajectory.joint_trajectory import TrajectoryPoints, chunks
 
 _U32 = struct.Struct("<I")
 _KINDS = ("positions", "velocities", "accelerations", "effort")
@@ -26,35 +26,35 @@ def read_points(data: Buffer, offset: int, joints: int) -> tuple[TrajectoryPoint
     """Reads an array of points.
 
     Args:
-        data: the serialised message.
-        offset: where the array begins, with the number of its points [bytes].
-        joints: number of joint names.
+        data: Serialized message.
+        offset: Offset of the array, which begins with the number of points [bytes].
+        joints: Number of joint names.
 
     Returns:
-        The points, and where the array ends [bytes].
+        The points, and the offset of the end of the array [bytes].
 
     Raises:
-        struct.error: the data end before the array does.
+        struct.error: The data is truncated.
     """
     (count,) = _U32.unpack_from(data, offset)
     offset += 4
     if count * _EMPTY_POINT_BYTES > len(data) - offset:
-        raise struct.error(f"{count} points do not fit into the {len(data) - offset} bytes that are left")
-    kept = joints if 8 * count * joints <= len(data) else 0  # otherwise a small message could ask for much memory
-    points = TrajectoryPoints(np.empty(count), np.zeros((count, 3, kept)), np.empty((count, 3), np.int32))
-    for part in parts(count):
-        begin = part.start
-        while begin < part.stop:
+        raise struct.error(f"{count} points do not fit into the remaining {len(data) - offset} bytes")
+    columns_used = joints if 8 * count * joints <= len(data) else 0  # a small message must not allocate much memory
+    points = TrajectoryPoints(np.empty(count), np.zeros((count, 3, columns_used)), np.empty((count, 3), np.int32))
+    for chunk in chunks(count):
+        begin = chunk.start
+        while begin < chunk.stop:
             sizes = _sizes_at(data, offset)
-            sent = _alike(data, offset, sizes, part.stop - begin)
-            _store(points, slice(begin, begin + len(sent)), sent, sizes, kept)
-            begin += len(sent)
-            offset += sent.nbytes
+            block = _equal_sized(data, offset, sizes, chunk.stop - begin)
+            _store(points, slice(begin, begin + len(block)), block, sizes, columns_used)
+            begin += len(block)
+            offset += block.nbytes
     return points, offset
 
 
 def _sizes_at(data: Buffer, offset: int) -> Sizes:
-    """Numbers of the four kinds of values of the point at `offset`."""
+    """Returns the counts of the four kinds of values of the point at `offset`."""
     sizes = []
     for _ in _KINDS:
         (size,) = _U32.unpack_from(data, offset)
@@ -63,28 +63,28 @@ def _sizes_at(data: Buffer, offset: int) -> Sizes:
     return sizes[0], sizes[1], sizes[2], sizes[3]
 
 
-def _alike(data: Buffer, offset: int, sizes: Sizes, at_most: int) -> np.ndarray:
-    """Views the points from `offset` on that have these sizes, at least one and at most `at_most`."""
-    fit = min(at_most, (len(data) - offset) // (_EMPTY_POINT_BYTES + 8 * sum(sizes)))
+def _equal_sized(data: Buffer, offset: int, sizes: Sizes, max_points: int) -> np.ndarray:
+    """Returns a view of the points from `offset` on that have these sizes, at most `at_most` points."""
+    fit = min(max_points, (len(data) - offset) // (_EMPTY_POINT_BYTES + 8 * sum(sizes)))
     if fit < 1:
         raise struct.error(f"the point at byte {offset} is longer than the message")
-    sent = np.frombuffer(data, _layout(sizes), fit, offset)
-    alike = np.all([sent[f"{kind} size"] == size for kind, size in zip(_KINDS, sizes, strict=True)], axis=0)
-    return sent if alike.all() else sent[: int(alike.argmin())]
+    block = np.frombuffer(data, _layout(sizes), fit, offset)
+    is_equal_sized = np.all([block[f"{kind} size"] == size for kind, size in zip(_KINDS, sizes, strict=True)], axis=0)
+    return block if is_equal_sized.all() else block[: int(is_equal_sized.argmin())]
 
 
 @lru_cache(maxsize=64)
 def _layout(sizes: Sizes) -> np.dtype[np.void]:
-    """The fields of a point."""
+    """Returns the memory layout of a point."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     for kind, size in zip(_KINDS, sizes, strict=True):
         fields += [(f"{kind} size", "<u4"), (kind, "<f8", (size,))]
     return np.dtype([*fields, ("secs", "<i4"), ("nsecs", "<i4")])
 
 
-def _store(points: TrajectoryPoints, where: slice, sent: np.ndarray, sizes: Sizes, kept: int) -> None:
-    points.times_s[where] = sent["secs"] + sent["nsecs"] / 1e9
-    points.counts[where] = np.minimum(sizes[:3], np.iinfo(np.int32).max)
+def _store(points: TrajectoryPoints, rows: slice, block: np.ndarray, sizes: Sizes, columns_used: int) -> None:
+    points.times_s[rows] = block["secs"] + block["nsecs"] / 1e9
+    points.counts[rows] = np.minimum(sizes[:3], np.iinfo(np.int32).max)
     for row, (kind, size) in enumerate(zip(_KINDS[:3], sizes[:3], strict=True)):
-        columns = min(size, kept)
-        points.values[where, row, :columns] = sent[kind][:, :columns]
+        columns = min(size, columns_used)
+        points.values[rows, row, :columns] = block[kind][:, :columns]

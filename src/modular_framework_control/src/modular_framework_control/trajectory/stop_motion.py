@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Computes the motion in which joints come to rest when a motion is stopped before its end.
+"""Stop motions, in which joints come to rest when a motion is stopped before its end.
 
-A stop begins at the measured state, not at the desired one, because the joints may not have followed the trajectory.
+A stop begins at the measured state instead of the desired state, because the joints may not have followed.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from modular_framework_control.trajectory.joint_trajectory import (
+    MIN_SEGMENT_S,
     POSITION,
-    SHORTEST_SEGMENT_S,
     VELOCITY,
     Array,
     Track,
@@ -19,28 +19,28 @@ from modular_framework_control.trajectory.joint_trajectory import (
 from modular_framework_control.trajectory.motion_limits import MotionLimits
 
 FOLLOWING_LAG_S = 0.05
-"""Largest lag of a joint behind its commands [s]: a ramp begins at the position that the joint reaches in this time at
-its measured velocity. Tuned on an arm that follows 0.03 s late over a network; a joint with a larger lag moves back a
-little while it brakes."""
-COMMAND_S = 0.01
-"""Largest age of the last command [s]; the desired motion since then has not been sent to the joint."""
-FOLLOWING_SHARE = 0.1
-"""A joint whose measured velocity differs from the desired one by at most this share of it counts as following; a ramp
-then begins at the desired velocity, because measured velocities are late and noisy."""
-SHARP_BRAKING_SHARE = 0.9
-"""Share of the largest deceleration that a stop without a ramp takes. The rest is for a joint that follows late to
-catch up, so that it does not run past the end of the stop and come back."""
-PEAK_OF_RAMP = 1.5
-"""Largest deceleration of a ramp, as a multiple of its mean one."""
+"""Maximum lag of a joint behind its commands [s]; a ramp begins at the position that the joint reaches within this time
+at its measured velocity. Tuned on an arm that follows 0.03 s late over a network; a joint with a larger lag moves back
+a little while braking."""
+MAX_COMMAND_AGE_S = 0.01
+"""Maximum age of the last command [s]; the desired motion since then has not been sent to the joint."""
+FOLLOWING_FRACTION = 0.1
+"""Maximum relative velocity error of a joint that counts as following. Its ramp begins at the desired velocity, because
+measured velocities are delayed and noisy."""
+SHARP_BRAKING_FRACTION = 0.9
+"""Fraction of the maximum deceleration for a stop without a ramp. The reserve lets a lagging joint catch up without
+overshooting the end of the stop."""
+RAMP_PEAK_FACTOR = 1.5
+"""Peak deceleration of a ramp as a multiple of the mean deceleration."""
 
 
 class StopMotion:
-    """Makes the motion in which joints stop.
+    """Computes stop motions.
 
     Args:
-        duration_s: of a ramp [s], longer where a joint may not brake that hard; 0 to brake as hard as each joint may: a
-            joint whose largest deceleration is not known is held where it is measured.
-        limits: of the joints.
+        duration_s: Duration of a ramp, extended if a joint cannot brake that hard. With 0, each joint brakes at its
+            maximum deceleration; a joint with unknown deceleration is held at its measured position.
+        limits: Limits of the joints.
     """
 
     def __init__(self, duration_s: float, limits: MotionLimits) -> None:
@@ -48,29 +48,31 @@ class StopMotion:
         self._limits = limits
 
     def tracks(self, desired: Array, actual: Array, time_s: float, rate: float) -> list[Track]:
-        """The motion of all joints from `time_s` on.
+        """Returns the stop motion of all joints.
 
         Args:
-            desired: positions and velocities desired now, shape (3, joints) or (2, joints).
-            actual: positions and velocities measured, shape (2, joints).
-            time_s: now [s of the trajectories' clock].
-            rate: how fast that clock runs, 0 to 1; a slowed robot has as much less speed to lose.
+            desired: Desired positions and velocities, shape (3, joints) or (2, joints).
+            actual: Measured positions and velocities, shape (2, joints).
+            time_s: Current time [s of the trajectory clock].
+            rate: Rate of the trajectory clock, 0 to 1, which scales the speed of the robot.
         """
-        limits, sharp = self._limits, self._duration_s * rate <= SHORTEST_SEGMENT_S
-        follows = np.abs(desired[VELOCITY] - actual[VELOCITY]) <= FOLLOWING_SHARE * np.abs(desired[VELOCITY])
-        velocity = np.clip(np.where(follows, desired[VELOCITY], actual[VELOCITY]), -limits.fastest, limits.fastest)
-        under_way = FOLLOWING_LAG_S * np.minimum(np.abs(actual[VELOCITY]), limits.fastest) + COMMAND_S * np.minimum(
-            np.abs(desired[VELOCITY]), limits.fastest
+        limits, is_sharp = self._limits, self._duration_s * rate <= MIN_SEGMENT_S
+        is_following = np.abs(desired[VELOCITY] - actual[VELOCITY]) <= FOLLOWING_FRACTION * np.abs(desired[VELOCITY])
+        velocity = np.clip(
+            np.where(is_following, desired[VELOCITY], actual[VELOCITY]), -limits.max_velocities, limits.max_velocities
         )
-        ahead = np.clip(desired[POSITION] - actual[POSITION], -under_way, under_way)
+        max_lead = FOLLOWING_LAG_S * np.minimum(
+            np.abs(actual[VELOCITY]), limits.max_velocities
+        ) + MAX_COMMAND_AGE_S * np.minimum(np.abs(desired[VELOCITY]), limits.max_velocities)
+        lead = np.clip(desired[POSITION] - actual[POSITION], -max_lead, max_lead)
         limits = limits.with_positions(actual[POSITION])
-        position = np.clip(actual[POSITION] + ahead, limits.lowest, limits.highest)
+        position = np.clip(actual[POSITION] + lead, limits.min_positions, limits.max_positions)
         with np.errstate(divide="ignore", invalid="ignore"):
-            braking_s = np.where(limits.braking > 0.0, np.abs(velocity) / limits.braking, 0.0)
+            braking_s = np.where(limits.max_decelerations > 0.0, np.abs(velocity) / limits.max_decelerations, 0.0)
         durations_s = rate * np.maximum(
-            self._duration_s, braking_s * (1.0 / SHARP_BRAKING_SHARE if sharp else PEAK_OF_RAMP)
+            self._duration_s, braking_s * (1.0 / SHARP_BRAKING_FRACTION if is_sharp else RAMP_PEAK_FACTOR)
         )
-        if not (durations_s > SHORTEST_SEGMENT_S).any():
+        if not (durations_s > MIN_SEGMENT_S).any():
             return [Track.hold(list(range(len(durations_s))), actual[POSITION], time_s)]
         return [
             _ramp(
@@ -78,25 +80,25 @@ class StopMotion:
                 (position[joint], velocity[joint] / rate) if duration_s > 0.0 else (actual[POSITION, joint], 0.0),
                 time_s,
                 duration_s,
-                limits.highest[joint] if velocity[joint] > 0.0 else limits.lowest[joint],
-                3 if sharp else 5,
+                limits.max_positions[joint] if velocity[joint] > 0.0 else limits.min_positions[joint],
+                3 if is_sharp else 5,
             )
             for joint, duration_s in enumerate(durations_s.tolist())
         ]
 
 
 def _ramp(joint: int, start: tuple[float, float], time_s: float, duration_s: float, bound: float, order: int) -> Track:
-    """A ramp to rest on which half of the way without it is gone; `bound` ends it earlier.
+    """Returns a ramp to rest over half the distance of unbraked motion, shortened to end at `bound`.
 
-    The velocity falls evenly with `order` 3, as 1 - 3s^2 + 2s^3 with 5.
+    With `order` 3 the velocity decreases linearly, with 5 as 1 - 3s^2 + 2s^3.
     """
     position, velocity = start
-    left = abs(bound - position)
-    if 0.5 * abs(velocity) * duration_s > left:
-        duration_s = 2.0 * left / abs(velocity)
+    max_distance = abs(bound - position)
+    if 0.5 * abs(velocity) * duration_s > max_distance:
+        duration_s = 2.0 * max_distance / abs(velocity)
     begin, end = np.zeros((3, 1)), np.zeros((3, 1))
     begin[POSITION], begin[VELOCITY] = position, velocity
-    if duration_s <= SHORTEST_SEGMENT_S:
+    if duration_s <= MIN_SEGMENT_S:
         return Track.hold([joint], begin[POSITION], time_s)
     end[POSITION] = position + 0.5 * duration_s * velocity
     coefficients = segment_coefficients(begin, end, duration_s, order)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Path and goal tolerances of a trajectory, and the text of their violations.
+"""Path and goal tolerances of a trajectory, and descriptions of violations.
 
-Defaults come from the parameters below `constraints`; a goal may replace or erase them. An infinite tolerance is one
-that is not checked.
+Defaults come from the parameters below `constraints`; a goal may replace or erase them. An infinite tolerance is not
+checked.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from modular_framework_ros.node_handle import NodeHandle, read_number
 
 @dataclass(frozen=True, slots=True)
 class JointTolerance:
-    """A tolerance of a goal: positive replaces the default, 0 keeps it, negative erases it.
+    """A tolerance of a goal; positive replaces the default, 0 keeps the default, negative erases it.
 
     Attributes:
-        position: [rad] or [m].
-        velocity: [rad/s] or [m/s].
+        position: Position tolerance [rad|m].
+        velocity: Velocity tolerance [rad/s|m/s].
     """
 
     position: float = 0.0
@@ -35,9 +35,9 @@ class Tolerances:
     """Bounds on position and velocity error of each joint.
 
     Attributes:
-        path: on the way, shape (2, joints).
-        goal: at the end, shape (2, joints).
-        goal_time_s: how long after the end the goal may still be reached [s].
+        path: Bounds during the motion, shape (2, joints).
+        goal: Bounds at the end, shape (2, joints).
+        goal_time_s: Maximum delay of reaching the goal after the end of the trajectory.
     """
 
     path: Array
@@ -46,17 +46,17 @@ class Tolerances:
 
     @property
     def checks_path(self) -> bool:
-        """Whether there is anything to check on the way."""
+        """Whether any path tolerance is finite."""
         return bool(np.isfinite(self.path).any())
 
 
 def read_tolerances(controller_nh: NodeHandle, joint_names: Sequence[str]) -> Tolerances:
-    """Defaults from `constraints/{goal_time, stopped_velocity_tolerance, <joint>/{trajectory, goal}}`.
+    """Reads the defaults `constraints/{goal_time, stopped_velocity_tolerance, <joint>/{trajectory, goal}}`.
 
-    What is not positive, as a tolerance, is not checked.
+    Tolerances up to 0 are not checked.
 
     Raises:
-        ParameterError: a value that is not a number, or a negative time.
+        ParameterError: A value is not a number, or the time is negative.
     """
     constraints = controller_nh.child("constraints")
     stopped = _bound(read_number(constraints, "stopped_velocity_tolerance", 0.01, None))
@@ -81,23 +81,23 @@ def tolerances_of_goal(
     goal: Mapping[str, JointTolerance],
     goal_time_s: float,
 ) -> Tolerances:
-    """The tolerances of one goal; joints it does not move are not checked, and those of other joints are not used.
+    """Returns the tolerances of a goal; joints outside the goal are not checked, and their tolerances are ignored.
 
     Args:
-        defaults: those of the controller.
-        joint_names: all joints of the controller.
-        joints: indices of the joints of the goal.
-        path: what the goal says for the way, by joint name.
-        goal: what the goal says for the end, by joint name.
-        goal_time_s: positive replaces the default [s], 0 keeps it, negative means 0.
+        defaults: Default tolerances of the controller.
+        joint_names: All joints of the controller.
+        joints: Indices of the goal's joints.
+        path: Path tolerances of the goal, by joint name.
+        goal: Goal tolerances of the goal, by joint name.
+        goal_time_s: Goal time; positive replaces the default, 0 keeps the default, negative means 0.
 
     Raises:
-        InvalidTrajectoryError: one that is not a number.
+        InvalidTrajectoryError: A tolerance is not a number.
     """
     given = [(kind, *item) for kind, tolerances in (("path", path), ("goal", goal)) for item in tolerances.items()]
     faults = [
         f"{kind}_tolerance of joint '{name}' is not a number: position {tolerance.position:.6g}, velocity "
-        f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the parameter's) or less (not checked)"
+        f"{tolerance.velocity:.6g}; expected more than 0 (a bound), 0 (the default) or less (not checked)"
         for kind, name, tolerance in given
         if math.isnan(tolerance.position) or math.isnan(tolerance.velocity)
     ]
@@ -105,19 +105,19 @@ def tolerances_of_goal(
         raise InvalidTrajectoryError("; ".join(faults))
     time_s = defaults.goal_time_s if goal_time_s == 0.0 else max(0.0, goal_time_s)
     return Tolerances(
-        _merged(defaults.path, joint_names, joints, path), _merged(defaults.goal, joint_names, joints, goal), time_s
+        _merge(defaults.path, joint_names, joints, path), _merge(defaults.goal, joint_names, joints, goal), time_s
     )
 
 
 def foreign_tolerances(
     joint_names: Sequence[str], path: Mapping[str, JointTolerance], goal: Mapping[str, JointTolerance]
 ) -> str:
-    """Which tolerances of a goal are of joints that the controller does not have; "" when none is.
+    """Returns a warning on tolerances for joints that the controller does not have, or "".
 
     Args:
-        joint_names: all joints of the controller.
-        path: what the goal says for the way, by joint name.
-        goal: what the goal says for the end, by joint name.
+        joint_names: All joints of the controller.
+        path: Path tolerances of the goal, by joint name.
+        goal: Goal tolerances of the goal, by joint name.
     """
     foreign = [
         f"{kind}_tolerance of joint '{name}'"
@@ -125,31 +125,27 @@ def foreign_tolerances(
         for name in tolerances
         if name not in joint_names
     ]
-    return (
-        f"not used: {', '.join(foreign)}, which the controller does not have; it has: {', '.join(joint_names)}"
-        if foreign
-        else ""
-    )
+    return f"ignored: {', '.join(foreign)}; joints of the controller: {', '.join(joint_names)}" if foreign else ""
 
 
-def _merged(
+def _merge(
     defaults: Array, joint_names: Sequence[str], joints: Sequence[int], given: Mapping[str, JointTolerance]
 ) -> Array:
-    merged = np.full_like(defaults, math.inf)
+    result = np.full_like(defaults, math.inf)
     for i in joints:
         tolerance = given.get(joint_names[i], JointTolerance())
         for row, value in enumerate((tolerance.position, tolerance.velocity)):
-            merged[row, i] = defaults[row, i] if value == 0.0 else value if value > 0.0 else math.inf
-    return merged
+            result[row, i] = defaults[row, i] if value == 0.0 else value if value > 0.0 else math.inf
+    return result
 
 
 def violations(error: Array, tolerance: Array, joint_names: Sequence[str]) -> str:
-    """Which joints are out of tolerance, each with its error and its tolerance; "" when none is.
+    """Returns the joints out of tolerance with errors and tolerances, or "".
 
     Args:
-        error: desired minus actual, position and velocity, shape (2, joints).
-        tolerance: same shape; infinite where nothing is checked.
-        joint_names: names of the joints.
+        error: Position and velocity errors, desired minus actual, shape (2, joints).
+        tolerance: Tolerances, infinite if not checked; shape (2, joints).
+        joint_names: Names of the joints.
     """
     within = np.abs(error) <= tolerance
     if within.all():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Goal, result code and state snapshot of a trajectory controller."""
+"""Goals, result codes and state snapshots of trajectory controllers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class TrajectoryErrorCode(IntEnum):
 
 
 class GoalRejectedError(Exception):
-    """A goal that the controller rejects, with the result code."""
+    """A rejected goal, with its result code."""
 
     def __init__(self, code: TrajectoryErrorCode, reason: str) -> None:
         super().__init__(reason)
@@ -39,10 +39,10 @@ class TrajectoryGoal:
     """The goal of an action client.
 
     Attributes:
-        trajectory: the motion.
-        path_tolerance: by joint name.
-        goal_tolerance: by joint name.
-        goal_time_tolerance_s: positive replaces the default [s], 0 keeps it, negative means 0.
+        trajectory: Trajectory to follow.
+        path_tolerance: Path tolerances by joint name.
+        goal_tolerance: Goal tolerances by joint name.
+        goal_time_tolerance_s: Goal time; positive replaces the default, 0 keeps the default, negative means 0.
     """
 
     trajectory: JointTrajectory
@@ -56,11 +56,11 @@ class TrajectorySnapshot:
     """State of the controller in one cycle.
 
     Attributes:
-        time_s: time of the cycle [s].
-        desired: position, velocity, acceleration, shape (3, joints).
-        actual: position, velocity, shape (2, joints).
-        error: desired minus actual, shape (2, joints).
-        elapsed_s: how far the trajectory has come since its time_from_start 0 [s].
+        time_s: Time of the cycle.
+        desired: Desired positions, velocities and accelerations, shape (3, joints).
+        actual: Measured positions and velocities, shape (2, joints).
+        error: Desired minus actual, shape (2, joints).
+        elapsed_s: Elapsed time of the trajectory since time_from_start 0.
     """
 
     time_s: float

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from modular_framework_control.hardware_interface.joint_limit_parameters import JointLimits, SoftJointLimits
 from modular_framework_control.hardware_interface.joint_limits import soft_velocities
 from modular_framework_control.trajectory.motion_limits import CURVE_MARGIN
-from modular_framework_control.trajectory.stop_motion import FOLLOWING_LAG_S, SHARP_BRAKING_SHARE
+from modular_framework_control.trajectory.stop_motion import FOLLOWING_LAG_S, SHARP_BRAKING_FRACTION
 
 _SLACK = 1e-6  # tolerance for rounding [rad], and as a share of a limit
 
@@ -161,7 +161,7 @@ class CommandCheck:
 
 
 def _braking_distance(velocity: float, joint: CheckedJoint) -> float:
-    return velocity**2 / (2.0 * SHARP_BRAKING_SHARE * joint.limits.max_acceleration)
+    return velocity**2 / (2.0 * SHARP_BRAKING_FRACTION * joint.limits.max_acceleration)
 
 
 def _closing_speed(distance: float, deceleration: float, period_s: float) -> float:
