@@ -105,7 +105,7 @@ def test_something_in_the_way_is_a_stall_and_aborts_after_the_timeout(robot: Ste
     robot.step(3)
     state, result, text = gripper.result(handle)
     assert (state, result.reached_goal, result.stalled) == ("ABORTED", False, True)
-    assert result.position == 0.5 and f"joint '{gripper.joint}' stands at 0.5, +0.4 short of its goal" in text
+    assert result.position == 0.5 and f"joint '{gripper.joint}' is at rest at 0.5, +0.4 short of its goal" in text
     robot.run(1.0)
     squeezed = gripper.commanded
     if gripper.joint == "jaw":

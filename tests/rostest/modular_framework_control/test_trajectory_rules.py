@@ -441,7 +441,7 @@ def test_query_state_returns_what_is_desired_when(robot: SteppedRobot, arm: Arm)
         )
     after = query(rospy.Time.from_sec(begun_s + 5.0))
     assert list(after.position[:2]) == pytest.approx([0.4, 0.0]) and not any(after.velocity)
-    with pytest.raises(rospy.ServiceException, match="before the motion under way began"):
+    with pytest.raises(rospy.ServiceException, match="before the start of the current motion"):
         query(rospy.Time.from_sec(begun_s - 5.0))
 
 

@@ -93,7 +93,7 @@ def test_a_blocked_gripper_stalls_after_the_timeout_and_goes_on_squeezing(loop: 
     loop.run(0.2)
     assert goal_handle.status is GoalStatus.ABORTED
     assert goal_handle.result is not None and goal_handle.result.stalled and not goal_handle.result.reached_goal
-    assert "joint 'finger' stands at 0.5" in goal_handle.text
+    assert "joint 'finger' is at rest at 0.5" in goal_handle.text
     loop.manager.update(loop.time_s, 0.01)
     assert handle(loop).command == 0.8
 

@@ -55,7 +55,7 @@ def test_what_cannot_be_reported_is_named(make_loop: Callable[..., Any], paramet
 @pytest.mark.parametrize(
     ("extra", "words"),
     [
-        ([{"name": "w"}, {"name": "w"}], "entry 1 is skipped: it names joint 'w' again"),
+        ([{"name": "w"}, {"name": "w"}], "entry 1 is skipped: joint 'w' is repeated"),
         ([{"name": ""}, {"name": "w"}], "entry 0 is skipped: it is {'name': ''}; expected a mapping with a name"),
         (["elbow", {"name": "w"}], "entry 0 is skipped: it is 'elbow'"),
         (

@@ -13,11 +13,17 @@ def test_turns_are_taken_in_the_first_cycle_that_is_due(rate: float, step_s: flo
     schedule = Schedule(rate)
     schedule.start(0.0)
     steps = round(1.0 / rate / step_s)
-    taken = [number for number in range(60 * round(rate) * steps) if schedule.take_turn(number * step_s)]
+    taken = [number for number in range(60 * round(rate) * steps) if schedule.take_if_due(number * step_s)]
     assert taken == list(range(0, 60 * round(rate) * steps, steps))
 
 
 def test_turns_that_were_missed_are_not_made_up_for() -> None:
     schedule = Schedule(10.0)
     schedule.start(0.0)
-    assert [schedule.take_turn(time_s) for time_s in (0.0, 0.55, 0.56, 0.64, 0.65)] == [True, True, False, False, True]
+    assert [schedule.take_if_due(time_s) for time_s in (0.0, 0.55, 0.56, 0.64, 0.65)] == [
+        True,
+        True,
+        False,
+        False,
+        True,
+    ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base class of every controller, and the gains that several of them use."""
+"""Base class of controllers, and PID control."""
 
 from modular_framework_control.controller_interface.controller import Controller
 

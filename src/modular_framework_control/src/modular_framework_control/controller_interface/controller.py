@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base class of controllers: made without arguments, then initialised, started, updated and stopped.
+"""Base class of controllers, which are constructed without arguments, then initialized, started, updated and stopped.
 
 `init` runs on a thread that may wait; `waiting`, `starting`, `update`, `stopping`, `aborting` and `failed` run in the
-control loop and must not block. A thread started there inherits the loop's priority, so start threads and processes
-in `init`. A controller uses only the time passed to these methods, so that it behaves alike under simulated and real
-time.
+control loop and must not block. Start threads and processes in `init`, because a thread started in the control loop
+inherits the loop's priority. A controller uses only the time passed to these methods, so that it behaves equally under
+simulated and real time.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from modular_framework_ros.node_handle import NodeHandle
 
 
 class ControllerError(Exception):
-    """A controller cannot be set up or used as asked."""
+    """A controller cannot be initialized or used as requested."""
 
 
 class Controller:
-    """Base of all controllers.
+    """Base class of all controllers.
 
     Attributes:
-        interface_class: the hardware interface this controller works on.
-        robot_hw: the hardware, set before `init`, for controllers that need a second interface; the handles that `init`
-            gets from any of its interfaces are claimed for this controller.
-        pids: set by `init` of controllers with gains; the keys are the namespaces of the gains below the controller's
-            name, in which they can be changed while the controller runs.
+        interface_class: Hardware interface of the controller.
+        robot_hw: Hardware, set before `init`, for controllers that need further interfaces; handles that `init` gets
+            from any interface are claimed for the controller.
+        pids: PIDs, set by `init`; the keys are the namespaces of the gains below the controller's name, where the gains
+            can be changed at runtime.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]]
@@ -40,66 +40,66 @@ class Controller:
 
     @property
     def moving(self) -> bool:
-        """Whether it carries out a goal or brings the joints to rest: simulated time must pass for it."""
+        """Whether the controller executes a goal or brings joints to rest, for which simulated time must pass."""
         return False
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         """Gets the joint handles and reads the parameters.
 
         Args:
-            hw: the interface of class `interface_class`; the joints of the handles that are taken are claimed.
-            root_nh: namespace of the robot.
-            controller_nh: namespace of this controller's own parameters, topics and actions.
+            hw: Hardware interface of class `interface_class`; joints of requested handles are claimed.
+            root_nh: Namespace of the robot.
+            controller_nh: Namespace of the controller's parameters, topics and actions.
 
         Returns:
-            Whether the controller can be used. An exception with the reason is better than False.
+            Whether the controller can be used; prefer to raise an exception with the reason instead of returning False.
         """
         del hw, root_nh, controller_nh
         return True
 
     def waiting(self, time_s: float) -> None:
-        """Called in every cycle in which the hardware is not yet ready to start this controller."""
+        """Runs in every cycle until the hardware is ready to start this controller."""
 
     def aborting(self, time_s: float) -> None:
-        """Called once instead of `starting` if the hardware refused the switch or took too long."""
+        """Runs once instead of `starting` if the hardware refused the switch or took too long."""
 
     def starting(self, time_s: float) -> None:
-        """Called once before the first update after a start."""
+        """Runs once before the first update after a start."""
 
     def update(self, time_s: float, period_s: float) -> None:
         """Runs one control cycle.
 
         Args:
-            time_s: time of this cycle [s].
-            period_s: time since the last cycle [s].
+            time_s: Time of this cycle.
+            period_s: Time since the last cycle.
         """
 
     def stopping(self, time_s: float) -> None:
-        """Called once after the last update before a stop."""
+        """Runs once after the last update before a stop."""
 
     def interrupted(self, time_s: float, reason: str) -> None:
-        """Called instead of `stopping` where it is started again at once; `reason` is for the results of its goals."""
+        """Runs instead of `stopping` before an immediate restart; `reason` is for the results of goals."""
         del reason
         self.stopping(time_s)
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
-        """Called once when the hardware of its joints cannot follow: end goals, hold, refuse new ones.
+        """Runs once when a hardware fault begins; ends goals, holds the joints and refuses new goals.
 
-        `update` is still called in every cycle. For a controller that starts during a fault this is called before its
-        first update.
+        `update` still runs in every cycle. If a controller starts during a fault, this method runs before the first
+        update.
 
         Args:
-            time_s: time of this cycle [s].
-            reason: for the results of the goals.
+            time_s: Time of this cycle.
+            reason: Reason for the results of goals.
         """
 
     def on_hardware_recovered(self, time_s: float) -> None:
-        """Called once when the hardware can follow again; the joints may have moved, so hold the measured positions."""
+        """Runs once when a hardware fault ends; holds the measured positions, because the joints may have moved."""
 
     def failed(self, time_s: float, reason: str) -> None:
-        """Called instead of `stopping` if this controller raised; `reason` is for the results of its goals."""
+        """Runs instead of `stopping` if the controller raised; `reason` is for the results of goals."""
         del reason
         self.stopping(time_s)
 
     def close(self) -> None:
-        """Called once after the controller was unloaded, on a thread that may wait; closes what `init` opened."""
+        """Runs once after the controller was unloaded, on a thread that may wait; closes resources opened in `init`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PID control of one joint, with the gains users write below `gains/<joint>` or `pid`."""
+"""PID control of one joint, with gains from the parameters `gains/<joint>` or `pid`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 
 @dataclass(frozen=True, slots=True)
 class PidGains:
-    """Gains under the names of control_toolbox.
+    """PID gains under the names of control_toolbox.
 
     Attributes:
-        p: command per error.
-        i: command per error and second.
-        d: command per rate of the error.
-        i_clamp_min: smallest command of the integral's part, at most 0.
-        i_clamp_max: largest command of the integral's part, at least 0.
-        antiwindup: whether the integral itself is bounded, instead of only its part of the command.
+        p: Proportional gain.
+        i: Integral gain [1/s].
+        d: Derivative gain [s].
+        i_clamp_min: Lower bound of the integral term, at most 0.
+        i_clamp_max: Upper bound of the integral term, at least 0.
+        antiwindup: Whether the integrated error itself is bounded, instead of only the integral term.
     """
 
     p: float
@@ -31,14 +31,13 @@ class PidGains:
 
 
 class Pid:
-    """Proportional, integral and derivative gain, with a bound on the integral's part of the command.
+    """A PID with a bounded integral term.
 
     Args:
-        gains: the initial gains.
+        gains: Initial gains.
 
     Attributes:
-        gains: the gains in use; may be replaced at any time, from any thread. The integral's part of the command goes
-            on from where it is.
+        gains: Gains in use; any thread may replace them at any time, without a jump of the integral term.
     """
 
     __slots__ = ("gains", "_gains", "_sum")
@@ -48,19 +47,19 @@ class Pid:
         self._sum = 0.0
 
     def reset(self) -> None:
-        """Clears the sum."""
+        """Clears the integrated error."""
         self._sum = 0.0
 
     def command(self, error: float, error_rate: float, period_s: float) -> float:
-        """The command for an error.
+        """Computes the command.
 
         Args:
-            error: desired minus measured.
-            error_rate: its change [1/s].
-            period_s: time since the last call [s].
+            error: Desired minus measured value.
+            error_rate: Derivative of the error.
+            period_s: Time since the last call.
 
         Returns:
-            p * error + i * (sum of error * period), bounded, + d * error_rate; 0 for an error that is no number.
+            p * error + i * sum(error * period), bounded, + d * error_rate; 0 for an error that is not finite.
         """
         if self.gains is not self._gains:
             self._change_gains()
@@ -69,35 +68,35 @@ class Pid:
             return 0.0
         total = self._sum + error * max(0.0, period_s)
         if gains.antiwindup and gains.i != 0.0:
-            ends = sorted((gains.i_clamp_min / gains.i, gains.i_clamp_max / gains.i))
-            total = min(max(total, ends[0]), ends[1])
+            bounds = sorted((gains.i_clamp_min / gains.i, gains.i_clamp_max / gains.i))
+            total = min(max(total, bounds[0]), bounds[1])
         self._sum = total
-        return gains.p * error + _integral_part(gains, total) + gains.d * error_rate
+        return gains.p * error + _integral_term(gains, total) + gains.d * error_rate
 
     def _change_gains(self) -> None:
-        """Takes over the new gains; a sum that the old ones left unused does not become a command."""
-        part = _integral_part(self._gains, self._sum)
+        """Switches to the new gains and keeps the integral term unchanged."""
+        term = _integral_term(self._gains, self._sum)
         self._gains = self.gains
-        self._sum = part / self._gains.i if self._gains.i != 0.0 else 0.0
+        self._sum = term / self._gains.i if self._gains.i != 0.0 else 0.0
 
 
-def _integral_part(gains: PidGains, total: float) -> float:
+def _integral_term(gains: PidGains, total: float) -> float:
     return min(max(gains.i * total, gains.i_clamp_min), gains.i_clamp_max)
 
 
 def read_pid(gains_nh: NodeHandle) -> Pid:
-    """Gains of one joint.
+    """Reads the gains of one joint.
 
-    `p` must be there; defaults are `i` 0, `d` 0, `i_clamp` 0 (or `i_clamp_min`, `i_clamp_max`), `antiwindup` false.
-    An `i_clamp` of 0 switches the integral off, as in ros_control.
+    `p` is required; defaults are `i` 0, `d` 0, `i_clamp` 0 (or `i_clamp_min`, `i_clamp_max`), `antiwindup` false.
+    As in ros_control, an `i_clamp` of 0 disables the integral term.
 
     Raises:
-        ParameterError: no `p`, or a value of the wrong kind.
+        ParameterError: `p` is missing, or a value has the wrong type.
     """
     if not gains_nh.has_param("p"):
         raise ParameterError(
             f"parameter {join_names(gains_nh.namespace, 'p')} is not set; a joint that is controlled "
-            "by velocity or effort needs its gains: p, and if wanted i, d, i_clamp, antiwindup"
+            "by velocity or effort needs gains: p, and optionally i, d, i_clamp, antiwindup"
         )
     p, i, d = (read_number(gains_nh, key, 0.0, None) for key in ("p", "i", "d"))
     clamp = abs(read_number(gains_nh, "i_clamp", 0.0, None))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers of arms, grippers and single joints, and those that report joint states and sensors."""
+"""Controllers of arms, grippers and single joints, and controllers that report joint states and sensors."""

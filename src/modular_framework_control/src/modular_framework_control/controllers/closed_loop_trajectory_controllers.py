@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectory controllers for joints that take velocities or efforts.
-
-Position-controlled joints close the position loop themselves; these controllers close it with a PID.
-"""
+"""Trajectory controllers that close the position loop of velocity- or effort-controlled joints by a PID."""
 
 from __future__ import annotations
 
@@ -18,16 +15,15 @@ from modular_framework_ros.node_handle import NodeHandle, read_number
 class _ClosedLoopTrajectoryController(JointTrajectoryController):
     """Commands `velocity_ff * desired velocity + PID(position error, velocity error)` per joint.
 
-    Parameters, besides those of every trajectory controller: `gains/<joint>/{p, i, d, i_clamp, i_clamp_min,
-    i_clamp_max, antiwindup}`; `velocity_ff/<joint>` 0. The command is 0 while the controller does not run, and while
-    the hardware has a fault.
+    Parameters, in addition to JointTrajectoryController: `gains/<joint>/{p, i, d, i_clamp, i_clamp_min, i_clamp_max,
+    antiwindup}`; `velocity_ff/<joint>` 0. The command is 0 while the controller is stopped or the hardware has a fault.
     """
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
         self.pids = {f"gains/{name}": read_pid(controller_nh.child(f"gains/{name}")) for name in self.joint_names}
-        forward = controller_nh.child("velocity_ff")
-        self._velocity_ff = [read_number(forward, name, 0.0, None) for name in self.joint_names]
+        feedforward = controller_nh.child("velocity_ff")
+        self._velocity_ff = [read_number(feedforward, name, 0.0, None) for name in self.joint_names]
         return True
 
     def _command_rest(self) -> None:
@@ -36,7 +32,7 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
             handle.command = 0.0
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
-        for handle, pid, forward, velocity, position_error, velocity_error in zip(
+        for handle, pid, feedforward, velocity, position_error, velocity_error in zip(
             self._handles,
             self.pids.values(),
             self._velocity_ff,
@@ -45,19 +41,16 @@ class _ClosedLoopTrajectoryController(JointTrajectoryController):
             error[VELOCITY].tolist(),
             strict=True,
         ):
-            handle.command = forward * velocity + pid.command(position_error, velocity_error, period_s)
+            handle.command = feedforward * velocity + pid.command(position_error, velocity_error, period_s)
 
 
 class VelocityJointTrajectoryController(_ClosedLoopTrajectoryController):
-    """velocity_controllers/JointTrajectoryController; gains in [1/s] (p), [1/s^2] (i), [1] (d, velocity_ff)."""
+    """velocity_controllers/JointTrajectoryController, with gains in [1/s] (p), [1/s^2] (i), [1] (d, velocity_ff)."""
 
     interface_class = VelocityJointInterface
 
 
 class EffortJointTrajectoryController(_ClosedLoopTrajectoryController):
-    """effort_controllers/JointTrajectoryController.
-
-    Gains are in [Nm/rad] (p), [Nm/(rad s)] (i), [Nm s/rad] (d, velocity_ff).
-    """
+    """effort_controllers/JointTrajectoryController, with gains in [Nm/rad] (p), [Nm/(rad s)] (i), [Nm s/rad] (d)."""
 
     interface_class = EffortJointInterface

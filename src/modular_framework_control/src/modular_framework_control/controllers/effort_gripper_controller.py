@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controls a gripper whose joint takes efforts: a PID turns the position error into an effort, bounded by the goal."""
+"""Gripper controller for an effort-controlled joint: a PID on the position error with bounded effort."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from modular_framework_ros.node_handle import NodeHandle
 class EffortGripperActionController(GripperActionController):
     """effort_controllers/GripperActionController.
 
-    Parameters, besides those of every gripper controller: `gains/<joint>/{p, i, d, i_clamp, ...}`. The effort is at
-    most the goal's `max_effort`, or the parameter's when the goal gives none; without both only the hardware bounds it.
-    It is 0 while the controller does not run, and while the hardware has a fault.
+    Parameters, in addition to GripperActionController: `gains/<joint>/{p, i, d, i_clamp, ...}`. The effort is bounded
+    by the goal's `max_effort`, else by the parameter `max_effort`, else only by the hardware. The effort is 0 while the
+    controller is stopped or the hardware has a fault.
     """
 
     interface_class = EffortJointInterface
@@ -33,8 +33,8 @@ class EffortGripperActionController(GripperActionController):
         self._pid.reset()
         super().starting(time_s)
 
-    def _end_all(self, status: GoalStatus, text: str) -> None:
-        super()._end_all(status, text)
+    def _end_goals(self, status: GoalStatus, text: str) -> None:
+        super()._end_goals(status, text)
         self._handle.command = 0.0
 
     def _apply(self, period_s: float) -> None:

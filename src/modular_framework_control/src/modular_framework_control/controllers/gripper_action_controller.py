@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Moves a gripper of one joint to a position with bounded effort, and detects a stall.
+"""Gripper controller for one joint, with bounded effort and stall detection.
 
-A grasp ends in a stall: the fingers stop short of the goal because they hold an object. As in ros_controllers the goal
-is then aborted with `stalled` set, and the command stays in force, so that the fingers keep their grip.
+A grasp ends in a stall: the fingers stop short of the goal because they hold an object. As in ros_controllers, the goal
+is then aborted with `stalled` set, and the command stays active, so that the fingers keep their grip.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class GripperState:
     """Feedback and result of a gripper goal.
 
     Attributes:
-        position: measured [rad|m].
-        effort: measured [Nm|N].
-        stalled: the joint does not move and is not at its goal.
-        reached_goal: the joint is within `goal_tolerance` of its goal.
+        position: Measured position [rad|m].
+        effort: Measured effort [Nm|N].
+        stalled: Whether the joint is at rest but not at the goal.
+        reached_goal: Whether the joint is within `goal_tolerance` of the goal.
     """
 
     position: float
@@ -60,23 +60,23 @@ class _Goal:
 class GripperActionController(Controller):
     """position_controllers/GripperActionController.
 
-    A joint is stalled when it has stayed within `stall_velocity_threshold * stall_timeout` of one position for
-    `stall_timeout`. That compares the mean velocity over this time with the threshold, not the velocity of one cycle,
-    because a contact makes the joint vibrate. The time counts from the start of the goal at the earliest. While the
-    measured values are stale the goal is not judged, and this time does not count.
+    A joint is stalled if it stays within `stall_velocity_threshold * stall_timeout` of one position for
+    `stall_timeout`. This criterion bounds the mean velocity instead of the velocity of one cycle, because contacts make
+    the joint vibrate. The time counts from the start of the goal at the earliest; time with stale measurements does not
+    count, and goals are not evaluated meanwhile.
 
-    A goal beyond the limits of the joint, where they are known, is refused, as by the trajectory controller.
+    As in the trajectory controller, a goal beyond the known limits of the joint is refused.
 
-    While the hardware has a fault the joint is held where it is measured, and goals are refused with its reason. When
-    the measured position is not a number the goal is aborted, and the joint is held where it was measured last.
+    During a hardware fault, the joint is held at its measured position, and goals are refused with the fault's reason.
+    If the measured position is not a number, the goal is aborted and the joint is held at its last measured position.
 
-    Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, used for
-    goals that give none, 0 = the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
+    Parameters, below the controller's name: `joint`; `goal_tolerance` [rad|m] 0.01; `max_effort` [Nm|N] 0, the default
+    for goals, where 0 means the hardware's default; `stall_velocity_threshold` [rad/s|m/s] 0.001; `stall_timeout` [s]
     1.0; `action_monitor_rate` [1/s] 20; `state_publish_rate` [1/s] 50.
 
     Attributes:
-        on_state: called in the control loop at `state_publish_rate` with a snapshot, whose gains are 0.
-        on_feedback: called in the control loop at `action_monitor_rate` with the active goal handle and the state.
+        on_state: Function called in the control loop at `state_publish_rate` with a snapshot, whose gains are 0.
+        on_feedback: Function called in the control loop at `action_monitor_rate` with the active goal handle and state.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]] = PositionJointInterface
@@ -95,8 +95,8 @@ class GripperActionController(Controller):
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         names = read_names(controller_nh, "joint")
         if len(names) != 1:
-            where = join_names(controller_nh.namespace, "joint")
-            raise ParameterError(f"parameter {where}: got {names!r}; expected the name of one joint")
+            source = join_names(controller_nh.namespace, "joint")
+            raise ParameterError(f"parameter {source}: got {names!r}; expected the name of one joint")
         self._handle: JointHandle = hw.get_handle(names[0])
         (self._limits,) = limits_of([self._handle], root_nh)
         self._goal_tolerance = read_number(controller_nh, "goal_tolerance", 0.01)
@@ -104,28 +104,28 @@ class GripperActionController(Controller):
         self._stall_timeout_s = read_number(controller_nh, "stall_timeout", 1.0)
         threshold = read_number(controller_nh, "stall_velocity_threshold", 0.001)
         self._stall_distance = threshold * self._stall_timeout_s
-        self._state_turns = Schedule(read_number(controller_nh, "state_publish_rate", 50.0))
-        self._feedback_turns = Schedule(read_number(controller_nh, "action_monitor_rate", 20.0))
+        self._state_schedule = Schedule(read_number(controller_nh, "state_publish_rate", 50.0))
+        self._feedback_schedule = Schedule(read_number(controller_nh, "action_monitor_rate", 20.0))
         return True
 
     # ---- any thread ----
 
     @property
     def moving(self) -> bool:
-        """Whether it carries out a goal."""
+        """Whether the controller executes a goal."""
         return self._active is not None
 
     def submit(self, position: float, max_effort: float, goal_handle: GripperGoalHandle) -> None:
         """Hands a goal to the control loop.
 
         Args:
-            position: where to go [rad|m].
-            max_effort: bound on the effort, whose sign does not count [Nm|N]; 0 for the controller's default.
-            goal_handle: gets the status of the goal.
+            position: Goal position [rad|m].
+            max_effort: Bound of the magnitude of the effort [Nm|N]; 0 for the controller's default.
+            goal_handle: Handle that receives the status of the goal.
 
         Raises:
-            GripperGoalError: not a number, beyond the limits of the joint, or the controller does not run. If it is
-                stopped meanwhile, the goal handle ends as rejected.
+            GripperGoalError: A value is not finite, the position is beyond the joint's limits, or the controller is
+                stopped. If the controller is stopped during the call, the goal handle ends as rejected.
         """
         if not self._running:
             raise GripperGoalError("the controller is not running; start it first")
@@ -133,24 +133,27 @@ class GripperActionController(Controller):
             raise GripperGoalError(
                 f"got position {position}, max_effort {max_effort}; expected finite numbers (effort 0 = default)"
             )
-        lowest, highest = self._limits.range_from(self._handle.position)
-        if position < max(lowest, -MAX_VALUE) - POINT_MARGIN or position > min(highest, MAX_VALUE) + POINT_MARGIN:
+        min_position, max_position = self._limits.range_from(self._handle.position)
+        if (
+            position < max(min_position, -MAX_VALUE) - POINT_MARGIN
+            or position > min(max_position, MAX_VALUE) + POINT_MARGIN
+        ):
             raise GripperGoalError(
                 f"position of joint '{self._handle.name}' is {position:.6g}; its limits are "
-                f"{self._limits.min_position:.6g} to {self._limits.max_position:.6g}; give a position within them"
+                f"{self._limits.min_position:.6g} to {self._limits.max_position:.6g}; give a position within the limits"
             )
         self._mailbox.put(_Goal(position, abs(max_effort), goal_handle))
         if not self._running:
-            self._reject_waiting("the controller was stopped")
+            self._reject_pending("the controller was stopped")
 
     def cancel(self, goal_handle: GripperGoalHandle) -> None:
-        """Requests that the control loop stops following the goal of `goal_handle`."""
+        """Requests that the control loop cancels the goal of `goal_handle`."""
         self._mailbox.put(goal_handle)
 
     # ---- control loop ----
 
     def starting(self, time_s: float) -> None:
-        self._reject_waiting("the goal was sent while the controller was being stopped")
+        self._reject_pending("the goal was sent while the controller was stopping")
         self._active, self._fault = None, ""
         missing = unmeasured([self._handle])
         if missing:
@@ -158,17 +161,17 @@ class GripperActionController(Controller):
         self._max_effort = self._default_max_effort
         self._hold()
         self._apply(0.0)
-        self._state_turns.start(time_s)
+        self._state_schedule.start(time_s)
         self._running = True
 
     def stopping(self, time_s: float) -> None:
-        self._end_all(GoalStatus.CANCELED, "the controller was stopped")
+        self._end_goals(GoalStatus.CANCELED, "the controller was stopped")
 
     def interrupted(self, time_s: float, reason: str) -> None:
-        self._end_all(GoalStatus.CANCELED, reason)
+        self._end_goals(GoalStatus.CANCELED, reason)
 
     def failed(self, time_s: float, reason: str) -> None:
-        self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
+        self._end_goals(GoalStatus.ABORTED, f"the controller failed: {reason}")
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
         self._fault = f"hardware fault: {reason}"
@@ -178,21 +181,21 @@ class GripperActionController(Controller):
         self._fault = ""
         self._hold()
 
-    def _end_all(self, status: GoalStatus, text: str) -> None:
+    def _end_goals(self, status: GoalStatus, text: str) -> None:
         self._running = False
-        if self._active is not None:  # a gripper at its goal keeps its grip, a moving one stops
+        if self._active is not None:  # a gripper at its goal keeps its grip, a moving gripper stops
             self._hold()
             self._apply(0.0)
         self._finish(status, self._state(False, False), text)
-        self._reject_waiting(text)
+        self._reject_pending(text)
 
-    def _reject_waiting(self, text: str) -> None:
+    def _reject_pending(self, text: str) -> None:
         for goal in self._mailbox.drain():
             if isinstance(goal, _Goal):
                 goal.goal_handle.finish(GoalStatus.REJECTED, self._state(False, False), text)
 
     def update(self, time_s: float, period_s: float) -> None:
-        self._mailbox.process(lambda goal: self._carry_out(goal, time_s))
+        self._mailbox.process(lambda goal: self._process(goal, time_s))
         missing = unmeasured([self._handle])
         if missing and self._active is not None:
             self._finish(GoalStatus.ABORTED, self._state(False, False), missing)
@@ -204,7 +207,7 @@ class GripperActionController(Controller):
         self._apply(period_s)
         if self._active is not None:
             self._check(self._active, time_s, period_s)
-        if self.on_state is not None and self._state_turns.take_turn(time_s):
+        if self.on_state is not None and self._state_schedule.take_if_due(time_s):
             self.on_state(self._snapshot(time_s, period_s))
 
     def _snapshot(self, time_s: float, period_s: float) -> JointControlSnapshot:
@@ -214,23 +217,23 @@ class GripperActionController(Controller):
             time_s, period_s, self._command, handle.position, handle.velocity, error, handle.command, PidGains(0.0)
         )
 
-    def _carry_out(self, goal: _Goal | GripperGoalHandle, time_s: float) -> None:
+    def _process(self, goal: _Goal | GripperGoalHandle, time_s: float) -> None:
         if isinstance(goal, _Goal) and self._fault:
             goal.goal_handle.finish(GoalStatus.REJECTED, self._state(False, False), self._fault)
         elif isinstance(goal, _Goal):
-            self._take_up(goal, time_s)
+            self._accept(goal, time_s)
         elif self._active is not None and self._active.goal_handle is goal:
             self._finish(GoalStatus.CANCELED, self._state(False, False), "canceled on request")
             self._hold()
 
-    def _take_up(self, goal: _Goal, time_s: float) -> None:
+    def _accept(self, goal: _Goal, time_s: float) -> None:
         self._finish(GoalStatus.CANCELED, self._state(False, False), "preempted by a new goal")
         self._active = goal
         self._command = goal.position
         self._max_effort = goal.max_effort if goal.max_effort > 0.0 else self._default_max_effort
         self._rest_position = self._handle.position
         self._rest_since_s = time_s
-        self._feedback_turns.start(time_s)
+        self._feedback_schedule.start(time_s)
         goal.goal_handle.activate()
 
     def _check(self, goal: _Goal, time_s: float, period_s: float) -> None:
@@ -249,22 +252,22 @@ class GripperActionController(Controller):
             self._finish(
                 GoalStatus.ABORTED,
                 self._state(True, False),
-                f"stalled: joint '{self._handle.name}' stands at {position:.6g}, {error:+.6g} short of its "
+                f"stalled: joint '{self._handle.name}' is at rest at {position:.6g}, {error:+.6g} short of its "
                 f"goal (tolerance {self._goal_tolerance:.6g}), for {time_s - self._rest_since_s:.3g} s",
             )
             return
-        if self.on_feedback is not None and self._feedback_turns.take_turn(time_s):
+        if self.on_feedback is not None and self._feedback_schedule.take_if_due(time_s):
             self.on_feedback(goal.goal_handle, self._state(False, False))
 
     def _hold(self) -> None:
-        """Holds the position with no more effort than before, because the fingers may hold an object."""
+        """Holds the position without more effort than before, because the fingers may hold an object."""
         if math.isfinite(self._handle.position):
             self._measured = self._handle.position
         self._command = self._measured
         self._handle.held = True
 
     def _apply(self, period_s: float) -> None:
-        """Commands the joint; `period_s` [s] is the time since the last call, 0 at a start."""
+        """Commands the joint; `period_s` is the time since the last call, 0 at a start."""
         del period_s
         self._handle.command = self._command
         self._handle.max_effort = self._max_effort

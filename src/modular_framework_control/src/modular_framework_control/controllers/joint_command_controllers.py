@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that follow the commands of one topic: positions, velocities or efforts of one joint or of several.
+"""Controllers that follow position, velocity or effort commands for one or several joints from a topic.
 
-If the hardware takes the commanded quantity, the command is passed on; if it takes another one, a PID computes that.
+Commands are forwarded if the hardware takes the commanded quantity; otherwise a PID computes the hardware's quantity.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ CYCLES_PER_REPORT = 10
 
 @dataclass(frozen=True, slots=True)
 class JointControlSnapshot:
-    """State of a PID controller of one joint in a cycle.
+    """State of a PID controller of one joint in one cycle.
 
     Attributes:
-        time_s: time of the cycle [s].
-        period_s: time since the one before [s].
-        set_point: commanded value.
-        process_value: measured value.
-        process_value_dot: its rate of change; 0 where that is not measured.
-        error: input of the PID.
-        command: to the joint.
-        gains: of the PID.
+        time_s: Time of the cycle.
+        period_s: Time since the previous cycle.
+        set_point: Commanded value.
+        process_value: Measured value.
+        process_value_dot: Derivative of the measured value; 0 if not measured.
+        error: Input of the PID.
+        command: Command to the joint.
+        gains: Gains of the PID.
     """
 
     time_s: float
@@ -51,16 +51,16 @@ class JointControlSnapshot:
 
 
 class JointCommandController(Controller):
-    """Base class: a command submitted by any thread is in force, for all joints at once, from the next cycle on.
+    """Base class of command controllers; a submitted command applies to all joints from the next cycle on.
 
-    While the hardware has a fault the joints are held, and commands are refused with its reason. When the
-    controller stops, the joints come to rest.
+    During a hardware fault, the joints are held, and commands are refused with the fault's reason. When the controller
+    stops, the joints come to rest.
 
-    Parameters, below the controller's name: `joints`, or `joint` for controllers of one.
+    Parameters, below the controller's name: `joints`, or `joint` for controllers of one joint.
 
     Attributes:
-        single: whether it controls one joint, and its topic `command` holds one number.
-        joint_names: the joints, in the order of the numbers of a command.
+        single: Whether the controller has one joint, and the topic `command` one number.
+        joint_names: Joints, in the order of the values of a command.
     """
 
     single = True
@@ -83,13 +83,13 @@ class JointCommandController(Controller):
         return True
 
     def submit(self, values: Sequence[float]) -> None:
-        """Takes a command from any thread.
+        """Submits a command, from any thread.
 
         Args:
-            values: one number a joint, in the unit of what is controlled.
+            values: Command per joint, in the unit of the controlled quantity.
 
         Raises:
-            ControllerError: not as many as joints, not finite, or the hardware has a fault; the last command stays.
+            ControllerError: A value is missing or not finite, or the hardware has a fault; the last command stays.
         """
         if self._fault:
             raise ControllerError(self._fault)
@@ -122,22 +122,22 @@ class JointCommandController(Controller):
 
     def _rest(self) -> None:
         """Holds the joints, also when another thread submits a command at the same time."""
-        resting = self._resting()
-        self._set_points = resting
-        self._command(resting, 0.0)
+        rest_command = self._rest_command()
+        self._set_points = rest_command
+        self._command(rest_command, 0.0)
 
-    def _resting(self) -> tuple[float, ...]:
+    def _rest_command(self) -> tuple[float, ...]:
         """Returns the command that holds the joints."""
         return (0.0,) * len(self._handles)
 
     def _command(self, set_points: tuple[float, ...], period_s: float) -> None:
-        """Commands the joints; `period_s` [s] is the time since the last call, 0 at a start."""
+        """Commands the joints; `period_s` is the time since the last call, 0 at a start."""
         for handle, value in zip(self._handles, set_points, strict=True):
             handle.command = value
 
 
 class PositionJointPositionController(JointCommandController):
-    """position_controllers/JointPositionController: positions [rad|m] for joints that take positions."""
+    """position_controllers/JointPositionController, position commands [rad|m] for position-controlled joints."""
 
     interface_class = PositionJointInterface
 
@@ -146,7 +146,7 @@ class PositionJointPositionController(JointCommandController):
         for handle in self._handles:
             handle.hold(handle.position)
 
-    def _resting(self) -> tuple[float, ...]:
+    def _rest_command(self) -> tuple[float, ...]:
         return tuple(handle.position if math.isfinite(handle.position) else handle.command for handle in self._handles)
 
 
@@ -157,7 +157,7 @@ class PositionJointGroupPositionController(PositionJointPositionController):
 
 
 class VelocityJointVelocityController(JointCommandController):
-    """velocity_controllers/JointVelocityController: velocities [rad/s|m/s] for joints that take velocities."""
+    """velocity_controllers/JointVelocityController, velocity commands [rad/s|m/s] for velocity-controlled joints."""
 
     interface_class = VelocityJointInterface
 
@@ -169,7 +169,7 @@ class VelocityJointGroupVelocityController(VelocityJointVelocityController):
 
 
 class EffortJointEffortController(JointCommandController):
-    """effort_controllers/JointEffortController: efforts [Nm|N] for joints that take efforts."""
+    """effort_controllers/JointEffortController, effort commands [Nm|N] for effort-controlled joints."""
 
     interface_class = EffortJointInterface
 
@@ -181,13 +181,13 @@ class EffortJointGroupEffortController(EffortJointEffortController):
 
 
 class GainsController(JointCommandController):
-    """Base class of controllers with a PID for each joint; they command 0 when they stop.
+    """Base class of controllers with a PID per joint, which command 0 when they stop.
 
-    Parameters besides: `pid/{p, i, d, i_clamp, ...}` for one joint, `<joint>/pid/...` for each of several.
+    Additional parameters: `pid/{p, i, d, i_clamp, ...}` for one joint, `<joint>/pid/...` for each of several joints.
 
     Attributes:
-        on_state: called in the control loop every CYCLES_PER_REPORT cycles, by controllers of one joint; must not
-            block.
+        on_state: Function called in the control loop every CYCLES_PER_REPORT cycles by controllers of one joint; must
+            not block.
     """
 
     def __init__(self) -> None:
@@ -198,8 +198,8 @@ class GainsController(JointCommandController):
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
-        where = ["pid"] if self.single else [f"{name}/pid" for name in self.joint_names]
-        self.pids = {name: read_pid(controller_nh.child(name)) for name in where}
+        namespaces = ["pid"] if self.single else [f"{name}/pid" for name in self.joint_names]
+        self.pids = {name: read_pid(controller_nh.child(name)) for name in namespaces}
         self._pids = list(self.pids.values())
         return True
 
@@ -226,7 +226,7 @@ class GainsController(JointCommandController):
             handle.command = 0.0
 
     def _measured(self) -> tuple[float, float]:
-        """Returns the controlled value of the first joint, and its rate of change."""
+        """Returns the controlled quantity of the first joint and its derivative."""
         return self._handles[0].position, self._handles[0].velocity
 
     def _rest(self) -> None:
@@ -235,15 +235,15 @@ class GainsController(JointCommandController):
         super()._rest()
 
 
-class _PositionByGains(GainsController):
-    """Positions [rad|m], bounded by the known limits, for joints that do not take positions."""
+class _PidPositionController(GainsController):
+    """Position commands [rad|m], bounded by the known limits, for joints that are not position-controlled."""
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         super().init(hw, root_nh, controller_nh)
         self._limits = limits_of(self._handles, root_nh)
         return True
 
-    def _resting(self) -> tuple[float, ...]:
+    def _rest_command(self) -> tuple[float, ...]:
         return tuple(handle.position for handle in self._handles)
 
     def _command(self, set_points: tuple[float, ...], period_s: float) -> None:
@@ -256,14 +256,14 @@ class _PositionByGains(GainsController):
             handle.command = pid.command(error, -handle.velocity, period_s)
 
 
-class VelocityJointPositionController(_PositionByGains):
-    """velocity_controllers/JointPositionController: a position for a joint that takes velocities."""
+class VelocityJointPositionController(_PidPositionController):
+    """velocity_controllers/JointPositionController, position commands for a velocity-controlled joint."""
 
     interface_class = VelocityJointInterface
 
 
-class EffortJointPositionController(_PositionByGains):
-    """effort_controllers/JointPositionController: a position for a joint that takes efforts."""
+class EffortJointPositionController(_PidPositionController):
+    """effort_controllers/JointPositionController, position commands for an effort-controlled joint."""
 
     interface_class = EffortJointInterface
 
@@ -275,7 +275,7 @@ class EffortJointGroupPositionController(EffortJointPositionController):
 
 
 class EffortJointVelocityController(GainsController):
-    """effort_controllers/JointVelocityController: a velocity [rad/s|m/s] for a joint that takes efforts."""
+    """effort_controllers/JointVelocityController, velocity commands [rad/s|m/s] for an effort-controlled joint."""
 
     interface_class = EffortJointInterface
 
@@ -292,7 +292,7 @@ class EffortJointVelocityController(GainsController):
 
     def _command(self, set_points: tuple[float, ...], period_s: float) -> None:
         error = set_points[0] - self._handles[0].velocity
-        known = period_s > 0.0 and math.isfinite(self._last_error)
-        rate = (error - self._last_error) / period_s if known else 0.0
+        has_rate = period_s > 0.0 and math.isfinite(self._last_error)
+        rate = (error - self._last_error) / period_s if has_rate else 0.0
         self._last_error = self._error = error
         self._handles[0].command = self._pids[0].command(error, rate, period_s)

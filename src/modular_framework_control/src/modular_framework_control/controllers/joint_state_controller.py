@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reports the measured state of all joints at a fixed rate."""
+"""Controller that reports the measured state of all joints at a fixed rate."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from modular_framework_control.realtime.schedule import Schedule
 from modular_framework_ros.node_handle import NodeHandle, join_names, read_names, read_number
 
 LOGGER = logging.getLogger("rosout.joint_state_controller")
-STILL_PERIOD_S = 0.05
-"""Real time between two reports while the time of the loop stands still [s]: nodes that start then need one."""
+PAUSED_PERIOD_S = 0.05
+"""Wall time between reports while loop time is paused [s], for nodes that start during the pause."""
 STATE_KEYS = ("position", "velocity", "effort")
 
 
@@ -27,11 +27,11 @@ class JointStateSnapshot:
     """States of all joints in one cycle.
 
     Attributes:
-        time_s: time of the cycle [s].
-        names: joint names; extra joints last.
-        positions: [rad|m].
-        velocities: [rad/s|m/s].
-        efforts: [Nm|N].
+        time_s: Time of the cycle.
+        names: Joint names, extra joints last.
+        positions: Joint positions [rad|m].
+        velocities: Joint velocities [rad/s|m/s].
+        efforts: Joint efforts [Nm|N].
     """
 
     time_s: float
@@ -44,13 +44,13 @@ class JointStateSnapshot:
 class JointStateController(Controller):
     """joint_state_controller/JointStateController.
 
-    Parameters, below the controller's name: `publish_rate` [1/s] 50, with 0 nothing is published; `joints`: which ones,
-    in which order, all of them by name when not given; `extra_joints`: list of {name, position, velocity, effort}
-    reported as constants unless the hardware has a joint of that name. As in ros_controllers an entry that makes no
-    sense is skipped with an error on the log.
+    Parameters, below the controller's name: `publish_rate` [1/s] 50, 0 disables publishing; `joints`, the reported
+    joints in order, by default all joints sorted by name; `extra_joints`, a list of {name, position, velocity, effort}
+    reported as constants unless the hardware has the joint. As in ros_controllers, an invalid entry is logged and
+    skipped.
 
     Attributes:
-        on_state: called in the control loop at `publish_rate`; must not block.
+        on_state: Function called in the control loop at `publish_rate`; must not block.
     """
 
     interface_class = JointStateInterface
@@ -61,30 +61,30 @@ class JointStateController(Controller):
         self._extra: list[JointStateHandle] = []
         self._clock: Callable[[], float] = time.monotonic
         self._reported_s = -math.inf
-        self._repeat_s = 0.0
+        self._next_repeat_s = 0.0
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
         names = read_names(controller_nh, "joints") if controller_nh.has_param("joints") else sorted(hw.names)
         self._handles = [hw.get_handle(name) for name in names]
-        self._turns = Schedule(read_number(controller_nh, "publish_rate", 50.0))
+        self._schedule = Schedule(read_number(controller_nh, "publish_rate", 50.0))
         self._extra = [joint for joint in _extra_joints(controller_nh) if joint.name not in hw.names]
         self._names = [handle.name for handle in (*self._handles, *self._extra)]
         return True
 
     def starting(self, time_s: float) -> None:
-        self._turns.start(time_s)
+        self._schedule.start(time_s)
 
     def _is_due(self, time_s: float, period_s: float) -> bool:
-        """Whether to report now: in turn, and, while time stands still, what the joints are at that time."""
-        if self._turns.take_turn(time_s):
+        """Returns whether a report is due at the fixed rate or, while loop time is paused, in wall time."""
+        if self._schedule.take_if_due(time_s):
             self._reported_s = time_s
             return True
         if period_s > 0.0:
             return False
         now_s = self._clock()
-        if time_s == self._reported_s and now_s < self._repeat_s:
+        if time_s == self._reported_s and now_s < self._next_repeat_s:
             return False
-        self._reported_s, self._repeat_s = time_s, now_s + STILL_PERIOD_S
+        self._reported_s, self._next_repeat_s = time_s, now_s + PAUSED_PERIOD_S
         return True
 
     def update(self, time_s: float, period_s: float) -> None:
@@ -114,10 +114,10 @@ def _extra_joints(controller_nh: NodeHandle) -> list[JointStateHandle]:
         )
         return []
     joints: dict[str, JointStateHandle] = {}
-    for number, entry in enumerate(entries):
+    for index, entry in enumerate(entries):
         fault = _fault_of_extra_joint(entry, joints)
         if fault:
-            LOGGER.error("parameter %s: entry %d is skipped: %s", where, number, fault)
+            LOGGER.error("parameter %s: entry %d is skipped: %s", where, index, fault)
         else:
             name = entry["name"]
             joints[name] = JointStateHandle(name, *(float(entry.get(key, 0.0)) for key in STATE_KEYS))
@@ -128,7 +128,7 @@ def _fault_of_extra_joint(entry: Any, joints: Mapping[str, Any]) -> str:
     if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
         return f"it is {entry!r}; expected a mapping with a name"
     if entry["name"] in joints:
-        return f"it names joint '{entry['name']}' again; name each joint once"
+        return f"joint '{entry['name']}' is repeated; name each joint once"
     values = [entry.get(key, 0.0) for key in STATE_KEYS]
     if any(isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v) for v in values):
         return f"{', '.join(STATE_KEYS)} of joint '{entry['name']}' are {values}; expected finite numbers"

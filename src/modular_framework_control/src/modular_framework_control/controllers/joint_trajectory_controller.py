@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes joints follow trajectories, with tolerances, under the parameters of ros_controllers' trajectory controller.
+"""Trajectory controller with the parameters of ros_controllers' joint_trajectory_controller.
 
-Goals, commands and cancellations from any thread go through a mailbox, which `update` processes; everything that
-depends on time is decided there, with the time that `update` is given. A trajectory has a clock of its own, which slows
-down and stops with the robot.
+Goals, commands and cancellations from any thread go through a mailbox. `update` processes the mailbox and makes all
+time-dependent decisions. A trajectory has its own clock, which slows down and stops with the robot.
 """
 
 from __future__ import annotations
@@ -60,17 +59,18 @@ class JointTrajectoryController(Controller):
     [rad/s] 0.01, <joint>/{trajectory, goal} [rad] 0 = not checked}`; `stop_trajectory_duration` [s] 0.0;
     `state_publish_rate` [1/s] 50; `action_monitor_rate` [1/s] 20; `allow_partial_joints_goal` false.
 
-    A goal beyond the limits of its joints, where they are known, is refused. Whatever ends a motion before its goal
-    (cancel, abort, a trajectory without points) stops it from where the joints are measured, within their limits:
-    with `stop_trajectory_duration` 0 each brakes as hard as it may, and is held at once if that is not known.
+    A goal beyond the known limits of its joints is refused. A cancellation, an abort or an empty trajectory stops the
+    motion from the measured positions, within the limits. With `stop_trajectory_duration` 0, each joint brakes at its
+    maximum deceleration, or is held at once if that is unknown.
 
-    While the hardware has a fault the joints are held where they are measured, and goals are refused with its reason.
-    When a measured position is not a number the goal is aborted, the joints stop, and goals are refused until it is.
+    During a hardware fault, the joints are held at their measured positions, and goals are refused with the fault's
+    reason. If a measured position is not a number, the goal is aborted, the joints stop, and goals are refused until
+    all positions are valid.
 
     Attributes:
-        joint_names: the joints, in the order of all arrays.
-        on_state: called in the control loop at `state_publish_rate` with a snapshot; must not block.
-        on_feedback: called in the control loop at `action_monitor_rate` with the active goal handle and a snapshot.
+        joint_names: Joints, in the order of all arrays.
+        on_state: Function called in the control loop at `state_publish_rate` with a snapshot; must not block.
+        on_feedback: Function called in the control loop at `action_monitor_rate` with active goal handle and snapshot.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]] = PositionJointInterface
@@ -90,8 +90,8 @@ class JointTrajectoryController(Controller):
         self._namespace = controller_nh.namespace
         self.joint_names = read_names(controller_nh, "joints")
         self._handles = [hw.get_handle(name) for name in self.joint_names]
-        known = limits_of(self._handles, root_nh)
-        self._limits = MotionLimits.of(known)
+        joint_limits = limits_of(self._handles, root_nh)
+        self._limits = MotionLimits.of(joint_limits)
         self._rules = GoalRules(
             tuple(self.joint_names),
             read_tolerances(controller_nh, self.joint_names),
@@ -99,9 +99,9 @@ class JointTrajectoryController(Controller):
             read_bool(controller_nh, "allow_partial_joints_goal", False),
         )
         self._stop_motion = StopMotion(read_number(controller_nh, "stop_trajectory_duration", 0.0), self._limits)
-        self._state_turns = Schedule(read_number(controller_nh, "state_publish_rate", 50.0))
-        self._feedback_turns = Schedule(read_number(controller_nh, "action_monitor_rate", 20.0))
-        self._continuous = np.array([limits.continuous for limits in known])
+        self._state_schedule = Schedule(read_number(controller_nh, "state_publish_rate", 50.0))
+        self._feedback_schedule = Schedule(read_number(controller_nh, "action_monitor_rate", 20.0))
+        self._continuous = np.array([limits.continuous for limits in joint_limits])
         self._any_continuous = bool(self._continuous.any())
         self._clock = TrajectoryClock(speed_scaling_handles(self.robot_hw, self.joint_names))
         self._plan = TrajectoryPlan(len(self.joint_names))
@@ -112,59 +112,62 @@ class JointTrajectoryController(Controller):
 
     @property
     def moving(self) -> bool:
-        """Whether it follows a goal, a command or a stop ramp."""
+        """Whether the controller follows a goal, a command or a stop ramp."""
         return self._active is not None or (self._running and self._clock.now_s < self._plan.end_s)
 
     def submit(self, goal: TrajectoryGoal, goal_handle: TrajectoryGoalHandle | None = None) -> None:
-        """Hands a goal (with a goal handle) or a command (without one) to the control loop.
+        """Hands a goal (with a goal handle) or a command (without goal handle) to the control loop.
 
         Raises:
-            GoalRejectedError: it is malformed or the controller does not run; the goal handle is not changed. If the
-                controller is stopped meanwhile, the goal handle ends as rejected.
+            GoalRejectedError: The goal is malformed or the controller is stopped; the goal handle is unchanged. If the
+                controller is stopped during the call, the goal handle ends as rejected.
         """
         if not self._running:
             raise GoalRejectedError(TrajectoryErrorCode.INVALID_GOAL, "the controller is not running; start it first")
-        trajectory, surplus = goal.trajectory, ""
+        trajectory, surplus_warning = goal.trajectory, ""
         if self._rules.allow_partial:
-            trajectory, surplus = drop_surplus_values(trajectory)
-        for warning in (foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance), surplus):
+            trajectory, surplus_warning = drop_surplus_values(trajectory)
+        for warning in (
+            foreign_tolerances(self.joint_names, goal.path_tolerance, goal.goal_tolerance),
+            surplus_warning,
+        ):
             if warning:
                 LOGGER.warning("%s: %s", self._namespace, warning)
-        here = np.array([handle.position for handle in self._handles])
-        self._mailbox.put(validate_goal(replace(goal, trajectory=trajectory), goal_handle, self._rules, here))
+        measured = np.array([handle.position for handle in self._handles])
+        self._mailbox.put(validate_goal(replace(goal, trajectory=trajectory), goal_handle, self._rules, measured))
         if not self._running:
-            self._reject_waiting("the controller was stopped")
+            self._reject_pending("the controller was stopped")
 
     def cancel(self, goal_handle: TrajectoryGoalHandle) -> None:
-        """Requests that the control loop stops following the goal of `goal_handle`."""
+        """Requests that the control loop cancels the goal of `goal_handle`."""
         self._mailbox.put(goal_handle)
 
     def desired_at(self, time_s: float) -> Array:
-        """Returns the desired position, velocity and acceleration at `time_s` [s], shape (3, joints).
+        """Returns the desired position, velocity and acceleration at `time_s`, shape (3, joints).
 
-        This is what they are if the robot keeps its present speed scaling.
+        The result assumes that the robot keeps its current speed scaling.
 
         Raises:
-            ControllerError: the controller does not run, or the motion at that time is no longer stored.
+            ControllerError: The controller is stopped, or the motion at this time is no longer stored.
         """
         if not self._running:
-            raise ControllerError("the controller is not running; nothing is desired")
-        asked_s, stored_from_s = self._clock.expected_at(time_s), self._plan.stored_from_s
-        if stored_from_s is not None and asked_s < stored_from_s - MIN_SEGMENT_S:
+            raise ControllerError("the controller is not running and has no desired state; start it first")
+        trajectory_s, stored_from_s = self._clock.expected_at(time_s), self._plan.stored_from_s
+        if stored_from_s is not None and trajectory_s < stored_from_s - MIN_SEGMENT_S:
             raise ControllerError(
-                f"got {time_s:.9g} s, which is before the motion under way began, by "
-                f"{stored_from_s - asked_s:.6g} s of its trajectory; ask for a later time"
+                f"got {time_s:.9g} s, which is before the start of the current motion, by "
+                f"{stored_from_s - trajectory_s:.6g} s of its trajectory; give a later time"
             )
-        return self._clock.slowed(self._plan.sample(asked_s))
+        return self._clock.slowed(self._plan.sample(trajectory_s))
 
     # ---- control loop ----
 
     def starting(self, time_s: float) -> None:
-        self._reject_waiting("the goal was sent while the controller was being stopped")
+        self._reject_pending("the goal was sent while the controller was stopping")
         self._active, self._fault = None, ""
         self._clock.start(time_s)
-        self._state_turns.start(time_s)
-        self._feedback_turns.start(time_s)
+        self._state_schedule.start(time_s)
+        self._feedback_schedule.start(time_s)
         self._read_actual()
         self._unmeasured = unmeasured(self._handles)
         if self._unmeasured:
@@ -177,15 +180,15 @@ class JointTrajectoryController(Controller):
 
     def stopping(self, time_s: float) -> None:
         del time_s
-        self._end_all(GoalStatus.CANCELED, "the controller was stopped")
+        self._end_goals(GoalStatus.CANCELED, "the controller was stopped")
 
     def interrupted(self, time_s: float, reason: str) -> None:
         del time_s
-        self._end_all(GoalStatus.CANCELED, reason)
+        self._end_goals(GoalStatus.CANCELED, reason)
 
     def failed(self, time_s: float, reason: str) -> None:
         del time_s
-        self._end_all(GoalStatus.ABORTED, f"the controller failed: {reason}")
+        self._end_goals(GoalStatus.ABORTED, f"the controller failed: {reason}")
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
         self._fault = f"hardware fault: {reason}"
@@ -197,15 +200,15 @@ class JointTrajectoryController(Controller):
         self._read_actual()
         self._rest()
 
-    def _end_all(self, status: GoalStatus, text: str) -> None:
+    def _end_goals(self, status: GoalStatus, text: str) -> None:
         self._running = False
         self._finish(status, TrajectoryErrorCode.INVALID_GOAL, text)
-        self._reject_waiting(text)
+        self._reject_pending(text)
         self._read_actual()
         if self._plan.stored_from_s is not None:
             self._command_rest()
 
-    def _reject_waiting(self, text: str) -> None:
+    def _reject_pending(self, text: str) -> None:
         for goal in self._mailbox.drain():
             if isinstance(goal, ValidatedGoal) and goal.goal_handle is not None:
                 goal.goal_handle.finish(GoalStatus.REJECTED, TrajectoryErrorCode.INVALID_GOAL, text)
@@ -214,7 +217,7 @@ class JointTrajectoryController(Controller):
         self._clock.advance(time_s)
         self._read_actual()
         self._watch_positions()
-        self._mailbox.process(self._carry_out)
+        self._mailbox.process(self._process)
         if self._fault:
             self._rest()
         self._plan.forget_before(self._clock.now_s)
@@ -227,7 +230,7 @@ class JointTrajectoryController(Controller):
         self._report(time_s, desired, error)
 
     def _watch_positions(self) -> None:
-        """Stops the motion when a position is no longer a number, and again at the measured positions when all are."""
+        """Stops the motion when a measured position becomes invalid, and again when all positions are valid."""
         missing = "" if np.isfinite(self._actual[POSITION]).all() else unmeasured(self._handles)
         if bool(missing) != bool(self._unmeasured):
             self._unmeasured = missing
@@ -235,32 +238,38 @@ class JointTrajectoryController(Controller):
             self._stop()
 
     def _desired_and_error(self) -> tuple[Array, Array]:
-        """Position, velocity and acceleration desired now, and how far the joints are from the first two."""
+        """Returns the desired position, velocity and acceleration, and the position and velocity errors."""
         desired = self._clock.slowed(self._plan.sample(self._clock.now_s))
         error = desired[:2] - self._actual
         if self._any_continuous:
-            turned = error[POSITION, self._continuous]
-            error[POSITION, self._continuous] = turned - 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
+            unwrapped = error[POSITION, self._continuous]
+            error[POSITION, self._continuous] = unwrapped - 2.0 * math.pi * np.round(unwrapped / (2.0 * math.pi))
         return desired, error
 
     def _desired_and_measured(self) -> tuple[Array, Array]:
-        """The state desired now, and positions and velocities measured.
+        """Returns the desired state, and the measured positions and velocities.
 
-        Measured positions of continuous joints are within half a turn of the commanded ones. A measured value that is
-        not a number is replaced by the desired one.
+        Measured positions of continuous joints are shifted to within pi of the desired positions. Measured values that
+        are not numbers are replaced by desired values.
         """
         desired, error = self._desired_and_error()
         actual = desired[:2] - error
         return desired, np.where(np.isfinite(actual), actual, desired[:2])
 
     def _command(self, desired: Array, error: Array, period_s: float) -> None:
-        """Commands the joints; `desired` is position, velocity and acceleration, `error` that of the first two."""
+        """Commands the joints.
+
+        Args:
+            desired: Desired positions, velocities and accelerations, shape (3, joints).
+            error: Position and velocity errors, shape (2, joints).
+            period_s: Time since the last call.
+        """
         del error, period_s
         for handle, position in zip(self._handles, desired[POSITION].tolist(), strict=True):
             handle.command = position
 
     def _command_rest(self) -> None:
-        """Commands the joints to hold their measured positions; that stays in force while the controller is stopped."""
+        """Commands the joints to hold their measured positions, also while the controller is stopped."""
         _, actual = self._desired_and_measured()
         for handle, position in zip(self._handles, actual[POSITION].tolist(), strict=True):
             handle.hold(position)
@@ -275,21 +284,17 @@ class JointTrajectoryController(Controller):
         self._plan.hold(actual[POSITION], self._clock.now_s)
         self._command_rest()
 
-    def _carry_out(self, goal: ValidatedGoal | TrajectoryGoalHandle) -> None:
+    def _process(self, goal: ValidatedGoal | TrajectoryGoalHandle) -> None:
         if isinstance(goal, ValidatedGoal):
-            refusal = self._fault or self._unmeasured or self._take_up(goal)
+            refusal = self._fault or self._unmeasured or self._accept(goal)
             if refusal:
                 self._refuse(goal, refusal)
         elif self._active is not None and self._active.goal_handle is goal:
             self._finish(GoalStatus.CANCELED, TrajectoryErrorCode.INVALID_GOAL, "canceled on request")
             self._stop()
 
-    def _take_up(self, goal: ValidatedGoal) -> str:
-        """Begins to follow a goal, which replaces the active goal, and the present motion from its own start on.
-
-        Returns:
-            Why it cannot be followed, or "".
-        """
+    def _accept(self, goal: ValidatedGoal) -> str:
+        """Replaces the active goal, and from the goal's start on the current motion; returns a refusal or ""."""
         if goal.spline is None:
             self._replace_active(goal)
             self._stop()
@@ -299,8 +304,8 @@ class JointTrajectoryController(Controller):
         end_s = origin_s + float(goal.spline.times_s[-1])
         if end_s <= now_s + MIN_SEGMENT_S:
             return (
-                f"all {len(goal.spline.times_s)} points lie in the past: the last one was due "
-                f"{now_s - end_s:.6g} s before the goal was taken up; give a later header stamp or time_from_start"
+                f"all {len(goal.spline.times_s)} points lie in the past: the last point was due "
+                f"{now_s - end_s:.6g} s before the goal was accepted; give a later header stamp or time_from_start"
             )
         splice_s = max(now_s, origin_s)
         if end_s <= splice_s + MIN_SEGMENT_S:
@@ -323,7 +328,7 @@ class JointTrajectoryController(Controller):
         return ""
 
     def _beyond_limits(self, goal: ValidatedGoal, track: Track, late_s: float) -> str:
-        """Describes how a goal, joined to the present motion, violates the limits of its joints; "" if it does not."""
+        """Returns a description of limit violations of a goal joined to the current motion, or ""."""
         if goal.spline is None or goal.violations is None:
             return ""
         first = int(np.searchsorted(goal.spline.times_s, late_s, side="right"))
@@ -341,7 +346,7 @@ class JointTrajectoryController(Controller):
         late = int(np.searchsorted(times_s, late_s, side="right"))
         if late > 1 or (late == 1 and late_s > 0.0):
             LOGGER.warning(
-                "%s: the first %d of %d points are left out, they lie in the past; the next one is due in %.3f s",
+                "%s: the first %d of %d points are in the past and left out; the next point is due in %.3f s",
                 self._namespace,
                 late,
                 len(times_s),
@@ -361,7 +366,7 @@ class JointTrajectoryController(Controller):
             goal.goal_handle.activate()
 
     def _stop(self) -> None:
-        """Stops the motion, beginning at the measured positions."""
+        """Stops the motion, starting at the measured positions."""
         desired, actual = self._desired_and_measured()
         now_s = self._clock.now_s
         tracks = self._stop_motion.tracks(desired, actual, now_s, self._clock.rate)
@@ -370,7 +375,7 @@ class JointTrajectoryController(Controller):
             self._handles[joint].held = True
 
     def _check(self, goal: ValidatedGoal, now_s: float, error: Array) -> bool:
-        """Ends a goal that is reached or whose tolerances are violated; returns whether the motion must stop."""
+        """Ends a goal that is reached or violates its tolerances; returns whether the motion must stop."""
         if any(handle.state.stale for handle in self._handles):
             return False
         tolerances, late_s = goal.tolerances, now_s - self._plan.end_s
@@ -407,8 +412,10 @@ class JointTrajectoryController(Controller):
 
     def _report(self, time_s: float, desired: Array, error: Array) -> None:
         goal_handle = self._active.goal_handle if self._active is not None else None
-        on_state = self.on_state if self._state_turns.take_turn(time_s) else None
-        on_feedback = self.on_feedback if goal_handle is not None and self._feedback_turns.take_turn(time_s) else None
+        on_state = self.on_state if self._state_schedule.take_if_due(time_s) else None
+        on_feedback = (
+            self.on_feedback if goal_handle is not None and self._feedback_schedule.take_if_due(time_s) else None
+        )
         if on_state is None and on_feedback is None:
             return
         elapsed_s = self._plan.elapsed_s(self._clock.now_s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectory controllers for joints that take velocities, or velocities and accelerations, with their positions."""
+"""Trajectory controllers that command velocities, and optionally accelerations, together with positions."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ from modular_framework_control.trajectory.joint_trajectory import ACCELERATION, 
 
 
 class PosVelJointTrajectoryController(JointTrajectoryController):
-    """pos_vel_controllers/JointTrajectoryController: commands position [rad|m] and velocity [rad/s|m/s].
+    """pos_vel_controllers/JointTrajectoryController, which commands position [rad|m] and velocity [rad/s|m/s].
 
     Attributes:
-        further_commands: attribute of a joint's handle that takes a command beside the position: row of the desired
-            state that it is given.
+        further_commands: Row of the desired state for each additional command attribute of a joint handle.
     """
 
     interface_class: ClassVar[type[HardwareInterface[Any]]] = PosVelJointInterface
@@ -40,7 +39,7 @@ class PosVelJointTrajectoryController(JointTrajectoryController):
 
 
 class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
-    """pos_vel_acc_controllers/JointTrajectoryController: commands acceleration [rad/s^2|m/s^2] besides."""
+    """pos_vel_acc_controllers/JointTrajectoryController, which also commands acceleration [rad/s^2|m/s^2]."""
 
     interface_class = PosVelAccJointInterface
     further_commands: ClassVar[Mapping[str, int]] = {

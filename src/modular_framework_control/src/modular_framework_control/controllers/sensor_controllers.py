@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that command nothing.
-
-They report what force-torque sensors and inertial units measure, and the speed scaling of a robot.
-"""
+"""Controllers that report force-torque sensors, IMUs and the speed scaling of a robot."""
 
 from __future__ import annotations
 
@@ -20,14 +17,14 @@ from modular_framework_ros.node_handle import NodeHandle, read_number
 
 
 class SensorController(Controller):
-    """Base: every sensor of one kind is reported at a fixed rate.
+    """Base class of controllers that report all sensors of one type at a fixed rate.
 
-    Parameters, below the controller's name: `publish_rate` [1/s] 50; with 0 nothing is published.
+    Parameters, below the controller's name: `publish_rate` [1/s] 50; 0 disables publishing.
 
     Attributes:
-        sensor_names: the sensors, in the order of the hardware.
-        on_reading: called in the control loop with the time [s] and one sensor's handle; must copy what it needs and
-            not block.
+        sensor_names: Sensors, in the order of the hardware.
+        on_reading: Function called in the control loop with the time [s] and a sensor's handle; must copy the values
+            and not block.
     """
 
     def __init__(self) -> None:
@@ -36,16 +33,16 @@ class SensorController(Controller):
         self._handles: list[Any] = []
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
-        self._turns = Schedule(read_number(controller_nh, "publish_rate", 50.0))
+        self._schedule = Schedule(read_number(controller_nh, "publish_rate", 50.0))
         self.sensor_names = list(hw.names)
         self._handles = [hw.get_handle(name) for name in self.sensor_names]
         return True
 
     def starting(self, time_s: float) -> None:
-        self._turns.start(time_s)
+        self._schedule.start(time_s)
 
     def update(self, time_s: float, period_s: float) -> None:
-        if self.on_reading is not None and self._turns.take_turn(time_s):
+        if self.on_reading is not None and self._schedule.take_if_due(time_s):
             for handle in self._handles:
                 self.on_reading(time_s, handle)
 

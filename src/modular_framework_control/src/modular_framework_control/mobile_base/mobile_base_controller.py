@@ -201,7 +201,7 @@ class MobileBaseController(Controller, ABC):
         if self._turns is None or settings.publish_rate != self._turns.rate:
             self._turns = Schedule(settings.publish_rate)
             self._turns.start(time_s)
-        if self.on_odometry is None or not self._turns.take_turn(time_s):
+        if self.on_odometry is None or not self._turns.take_if_due(time_s):
             return False
         self.on_odometry(
             OdometrySnapshot(

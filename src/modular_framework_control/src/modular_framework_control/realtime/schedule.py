@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When something that is done at a fixed rate is due, counted in the time of the control loop."""
+"""Schedule of periodic work in the time of the control loop."""
 
 from __future__ import annotations
 
 import math
 
 SAME_TIME_S = 1e-6
-"""Times that differ by less are the same [s]: sums of periods are not exact."""
+"""Tolerance of time comparisons [s], because sums of periods are inexact."""
 
 
 class Schedule:
-    """Turns at a fixed rate; missed ones are not made up for.
+    """Deadlines at a fixed rate; missed deadlines are skipped.
 
     Args:
-        rate: of the turns [1/s]; 0 means never.
+        rate: Rate of the deadlines [1/s]; 0 for none.
     """
 
     def __init__(self, rate: float) -> None:
@@ -22,11 +22,11 @@ class Schedule:
         self._next_s = math.inf
 
     def start(self, time_s: float) -> None:
-        """Makes the first turn due at `time_s` [s]."""
+        """Sets the first deadline to `time_s`."""
         self._next_s = time_s if self._period_s < math.inf else math.inf
 
-    def take_turn(self, time_s: float) -> bool:
-        """Returns whether a turn is due at `time_s` [s]; if so it is taken, and the next one is due a period later."""
+    def take_if_due(self, time_s: float) -> bool:
+        """Returns whether a deadline has passed at `time_s`; if so, the next deadline is one period later."""
         if time_s < self._next_s - SAME_TIME_S:
             return False
         following_s = self._next_s + self._period_s

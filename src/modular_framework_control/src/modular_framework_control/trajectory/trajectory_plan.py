@@ -33,7 +33,7 @@ class TrajectoryPlan:
         end_s: End time of the motion of all joints.
     """
 
-    __slots__ = ("end_s", "_everything", "_stages")
+    __slots__ = ("end_s", "_all_joints", "_stages")
 
     def __init__(self, joints: int) -> None:
         self._all_joints = list(range(joints))
