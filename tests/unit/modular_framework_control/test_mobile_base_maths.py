@@ -111,7 +111,7 @@ def test_without_limits_or_time_commands_pass_or_stand() -> None:
     [
         ({"has_velocity_limits": True}, "/x/max_velocity is not set although has_velocity_limits is true"),
         ({"has_jerk_limits": True, "max_jerk": -2.0}, "must be at least 0"),
-        ({"has_acceleration_limits": True, "max_acceleration": 1.0, "min_acceleration": 0.5}, "could not stand still"),
+        ({"has_acceleration_limits": True, "max_acceleration": 1.0, "min_acceleration": 0.5}, "base can stop"),
         ({"has_velocity_limits": "yes"}, "expected true or false"),
     ],
 )
@@ -169,10 +169,10 @@ def test_the_radius_is_that_of_the_cylinder_or_sphere_of_the_wheel() -> None:
     ("ask", "fault"),
     [
         (lambda: geometry().radius("square"), "wheel link 'cube' is <box>; expected <cylinder> or <sphere>"),
-        (lambda: geometry().radius("none"), "there is no joint 'none'; joints: left, right, square, turned"),
+        (lambda: geometry().radius("none"), "unknown joint 'none'; joints: left, right, square, turned"),
         (lambda: geometry('<origin xyz="1 2"/>').distance("left", "square"), "<origin xyz> of joint 'square' is '1 2'"),
         (lambda: geometry(description="<robot"), "not well-formed XML"),
-        (lambda: geometry(description=""), "is not set, and wheel_radius is looked up there"),
+        (lambda: geometry(description=""), "is not set, but needed for wheel_radius"),
         (
             lambda: geometry(
                 description='<robot name="r"><joint name="a"><parent link="x"/><child link="x"/></joint></robot>'

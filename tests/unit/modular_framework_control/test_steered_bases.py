@@ -21,7 +21,7 @@ from modular_framework_control.hardware_interface.interfaces import (
 )
 from modular_framework_control.hardware_interface.robot_hw import RobotHW
 from modular_framework_control.mobile_base.four_wheel_kinematics import (
-    FASTEST_AXLE,
+    MAX_AXLE_SPEED_RATIO,
     FourWheelGeometry,
     PlanarTwist,
     axle_angle,
@@ -96,7 +96,7 @@ def test_no_pair_of_angles_makes_an_axle_faster_than_a_small_multiple_of_the_spe
     twist = GEOMETRY.twist_of_axles(1.0, front, rear)
     half = WHEEL_BASE / 2.0
     for end in (1.0, -1.0):
-        assert math.hypot(twist.linear, twist.lateral + end * half * twist.angular) <= FASTEST_AXLE + 1e-9
+        assert math.hypot(twist.linear, twist.lateral + end * half * twist.angular) <= MAX_AXLE_SPEED_RATIO + 1e-9
 
 
 def test_the_angle_of_an_axle_is_between_those_of_its_wheels() -> None:
@@ -355,11 +355,11 @@ def test_a_steering_command_that_is_not_finite_is_refused(rover: Callable[..., A
 @pytest.mark.parametrize(
     ("parameters", "fault"),
     [
-        ({"front_wheel": FOUR[0]}, "front_wheel: got .*; expected two joints, the left one and the right one"),
+        ({"front_wheel": FOUR[0]}, "front_wheel: got .*; expected two joints, left and right"),
         ({"rear_steering": None}, "rear_steering: got None"),
         ({"wheel_steering_y_offset": 0.6}, "wheel_steering_y_offset below half the track"),
         ({"wheel_radius": 0.0}, "wheel_radius above 0"),
-        ({"track": None}, "robot_description is not set, and track is looked up there"),
+        ({"track": None}, "robot_description is not set, but needed for track"),
     ],
 )
 def test_a_rover_that_cannot_be_is_refused(rover: Callable[..., Any], parameters: dict[str, Any], fault: str) -> None:
@@ -372,7 +372,7 @@ def test_a_rover_that_cannot_be_is_refused(rover: Callable[..., Any], parameters
     [
         ({"front_steer": 3}, "front_steer: got 3; expected a joint's name"),
         ({"rear_wheel": "front_steer_joint"}, "is not ahead of joint"),
-        ({"rear_wheel": "none"}, "there is no joint 'none'"),
+        ({"rear_wheel": "none"}, "unknown joint 'none'"),
         (
             {"robot_description": URDF.replace('<cylinder radius="0.11" length="0.1"/>', '<sphere radius="0.11"/>')},
             "wheel link 'w' is <sphere>; expected <cylinder>, whose radius",

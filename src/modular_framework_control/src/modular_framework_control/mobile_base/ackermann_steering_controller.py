@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drives a base like a car: a rear wheel drives, a front wheel in the middle steers."""
+"""Controller for a car-like base with a driven rear wheel and a steered front wheel on the centre line."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError
 class AckermannSteeringController(MobileBaseController):
     """ackermann_steering_controller/AckermannSteeringController.
 
-    A command is a `BaseVelocity` whose `angular` is the angle of the steering [rad], as in ros_controllers; limits
-    below `angular/z` are those of this angle.
+    As in ros_controllers, a command is a `BaseVelocity` whose `angular` is the steering angle [rad]; limits below
+    `angular/z` apply to this angle.
 
-    Parameters, besides those of every mobile base: `rear_wheel` rear_wheel_joint and `front_steer` front_steer_joint,
-    the joints; `wheel_separation_h` [m], the distance of the axles, and `wheel_radius` [m]: of the robot description
-    when not set, the latter of a cylinder only; `wheel_separation_h_multiplier`, `wheel_radius_multiplier`,
+    Parameters, in addition to MobileBaseController: the joints `rear_wheel` rear_wheel_joint and `front_steer`
+    front_steer_joint; `wheel_separation_h`, the distance between the axles, and `wheel_radius` [m], by default from the
+    robot description (the radius from a cylinder only); `wheel_separation_h_multiplier`, `wheel_radius_multiplier`,
     `steer_pos_multiplier` 1.
 
-    While a position is not a number the odometry does not change, and the base comes to rest.
+    While a joint position is not a number, the odometry stops and the base comes to rest.
     """
 
     interface_class = VelocityJointInterface
@@ -59,33 +59,33 @@ class AckermannSteeringController(MobileBaseController):
 
     def starting(self, time_s: float) -> None:
         super().starting(time_s)
-        self._turned = self._wheel.position
+        self._last_position = self._wheel.position
 
-    def _forget(self) -> None:
-        super()._forget()
-        self._limits.forget()
+    def _clear_commands(self) -> None:
+        super()._clear_commands()
+        self._limits.clear()
 
     def _follow_wheels(self, time_s: float) -> bool:
         if self._open_loop:
             commanded = self._limits.last
             self.odometry.move_at(commanded.linear, 0.0, commanded.linear * self._curvature(commanded.angular), time_s)
             return True
-        turned, angle = self._wheel.position, self._steer.position
-        if not (math.isfinite(turned) and math.isfinite(angle)):
+        position, angle = self._wheel.position, self._steer.position
+        if not (math.isfinite(position) and math.isfinite(angle)):
             return False
-        if math.isfinite(self._turned):
-            way = (turned - self._turned) * self._radius
-            self.odometry.move(way, way * self._curvature(angle), time_s)
-        self._turned = turned
+        if math.isfinite(self._last_position):
+            distance = (position - self._last_position) * self._radius
+            self.odometry.move(distance, distance * self._curvature(angle), time_s)
+        self._last_position = position
         return True
 
     def _curvature(self, angle: float) -> float:
-        """One over the radius of the circle that the middle of the rear axle drives [1/m]."""
+        """Returns the path curvature of the rear axle's centre [1/m]."""
         return math.tan(angle * self._steer_factor) / self._wheel_base
 
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
-        wanted: BaseVelocity = AT_REST if command is None else command
-        limited = self._limits.limit(wanted, period_s)
+        requested: BaseVelocity = AT_REST if command is None else command
+        limited = self._limits.limit(requested, period_s)
         self._wheel.command = limited.linear / self._radius
         self._steer.command = limited.angular
 
@@ -99,7 +99,7 @@ def _wheel_base_of(geometry: WheelGeometry, wheel: str, steer: str) -> float:
     base = abs(float(geometry.between(wheel, steer)[0]))
     if base <= 0.0:
         raise ParameterError(
-            f"robot_description: joint '{steer}' is not ahead of joint '{wheel}'; expected axles that "
-            "are apart; set wheel_separation_h, or correct the description"
+            f"robot_description: joint '{steer}' is not ahead of joint '{wheel}'; expected a distance "
+            "between the axles; set wheel_separation_h, or correct the description"
         )
     return base

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controls a base with differential drive."""
+"""Controller for a base with differential drive."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 
 @dataclass(frozen=True, slots=True)
 class WheelState:
-    """One wheel in one cycle.
+    """State of one wheel in one cycle.
 
     Attributes:
-        position: measured [rad].
-        velocity: measured [rad/s].
-        acceleration: derivative of the measured velocity [rad/s^2].
-        effort: measured [Nm].
-        desired_position: integral of the commands since the start [rad].
-        desired_velocity: commanded [rad/s].
-        desired_acceleration: derivative of the command [rad/s^2].
+        position: Measured position [rad].
+        velocity: Measured velocity [rad/s].
+        acceleration: Derivative of the measured velocity [rad/s^2].
+        effort: Measured effort [Nm].
+        desired_position: Integral of the commands since the start [rad].
+        desired_velocity: Commanded velocity [rad/s].
+        desired_acceleration: Derivative of the command [rad/s^2].
     """
 
     position: float
@@ -47,12 +47,12 @@ class WheelState:
 
 @dataclass(frozen=True)
 class DiffDriveSettings(BaseSettings):
-    """Settings of differential drive: also the factors that calibrate its geometry.
+    """Settings of differential drive, with factors that calibrate the geometry.
 
     Attributes:
-        left_wheel_radius_multiplier: of `wheel_radius`, for the left wheels.
-        right_wheel_radius_multiplier: of `wheel_radius`, for the right wheels.
-        wheel_separation_multiplier: of `wheel_separation`.
+        left_wheel_radius_multiplier: Factor on `wheel_radius` for the left wheels.
+        right_wheel_radius_multiplier: Factor on `wheel_radius` for the right wheels.
+        wheel_separation_multiplier: Factor on `wheel_separation`.
     """
 
     left_wheel_radius_multiplier: float = 1.0
@@ -61,7 +61,7 @@ class DiffDriveSettings(BaseSettings):
 
 
 class _Wheel:
-    """One wheel: its joint, and what its accelerations are computed from."""
+    """A wheel joint with the last velocities, for accelerations."""
 
     def __init__(self, handle: JointHandle) -> None:
         self.handle = handle
@@ -72,7 +72,7 @@ class _Wheel:
         self._desired_position, self._desired_velocity = self.handle.position, 0.0
 
     def step(self, period_s: float) -> WheelState:
-        """The state after a command was given, `period_s` [s] after the last call."""
+        """Returns the state after a command, `period_s` after the last call."""
         handle = self.handle
         rate = 1.0 / period_s if period_s > 0.0 else 0.0
         self._desired_position += handle.command * period_s
@@ -92,21 +92,20 @@ class _Wheel:
 class DiffDriveController(MobileBaseController):
     """diff_drive_controller/DiffDriveController; a command is a `BaseVelocity`.
 
-    Parameters, besides those of every mobile base: `left_wheel`, `right_wheel`: one joint or a list of joints, as many
-    on either side; `wheel_separation` [m] and `wheel_radius` [m]: of the robot description when not set;
+    Parameters, in addition to MobileBaseController: `left_wheel` and `right_wheel`, one joint or equally long lists of
+    joints; `wheel_separation` [m] and `wheel_radius` [m], by default from the robot description;
     `wheel_separation_multiplier` 1; `wheel_radius_multiplier`, or `left_wheel_radius_multiplier` and
-    `right_wheel_radius_multiplier`, 1; `publish_cmd` false: publish what is commanded; and
-    `publish_wheel_joint_controller_state` false.
+    `right_wheel_radius_multiplier`, 1; `publish_cmd` false; `publish_wheel_joint_controller_state` false.
 
-    While the position of a wheel is not a number the odometry does not change, and the base comes to rest.
+    While the position of a wheel is not a number, the odometry stops and the base comes to rest.
 
     Attributes:
-        settings: a DiffDriveSettings.
-        wheel_names: joints, the left ones first.
-        publishes_command: whether `on_command` is wanted.
-        publishes_wheels: whether `on_wheels` is wanted.
-        on_command: called in every cycle of the control loop with its time [s] and the velocity that is commanded.
-        on_wheels: called likewise with the states of the wheels, in the order of `wheel_names`.
+        settings: Settings that can change at runtime.
+        wheel_names: Joints, left joints first.
+        publishes_command: Whether commanded velocities are published.
+        publishes_wheels: Whether wheel states are published.
+        on_command: Function called in every control cycle with the time [s] and the commanded velocity.
+        on_wheels: Function called in every control cycle with the time [s] and the wheel states, as in `wheel_names`.
     """
 
     interface_class = VelocityJointInterface
@@ -123,7 +122,7 @@ class DiffDriveController(MobileBaseController):
         if len(left) != len(right) or set(left) & set(right):
             raise ParameterError(
                 f"parameters {join_names(controller_nh.namespace, 'left_wheel')} and right_wheel: got "
-                f"{left} and {right}; expected as many joints on either side, each named once"
+                f"{left} and {right}; expected equally many joints on both sides, each named once"
             )
         self.wheel_names = [*left, *right]
         self.publishes_command = read_bool(controller_nh, "publish_cmd", False)
@@ -162,14 +161,14 @@ class DiffDriveController(MobileBaseController):
         super().starting(time_s)
         for wheel in (*self._left, *self._right):
             wheel.start()
-        self._turned = self._positions()
+        self._last_positions = self._positions()
 
-    def _forget(self) -> None:
-        super()._forget()
-        self._limits.forget()
+    def _clear_commands(self) -> None:
+        super()._clear_commands()
+        self._limits.clear()
 
     def _geometry(self) -> tuple[float, float, float]:
-        """Radius of the left and of the right wheels, and their separation [m]."""
+        """Returns the radii of left and right wheels, and the wheel separation [m]."""
         settings = self.settings
         return (
             self._radius * settings.left_wheel_radius_multiplier,
@@ -178,7 +177,7 @@ class DiffDriveController(MobileBaseController):
         )
 
     def _positions(self) -> tuple[float, float]:
-        """Mean position of the left and of the right wheels [rad]."""
+        """Returns the mean positions of left and right wheels [rad]."""
         count = len(self._left)
         return (
             sum(wheel.handle.position for wheel in self._left) / count,
@@ -189,15 +188,15 @@ class DiffDriveController(MobileBaseController):
         if self._open_loop:
             self.odometry.move_at(self._limits.last.linear, 0.0, self._limits.last.angular, time_s)
             return True
-        turned = self._positions()
-        if not all(map(math.isfinite, turned)):
+        positions = self._positions()
+        if not all(map(math.isfinite, positions)):
             return False
         left_radius, right_radius, separation = self._geometry()
-        if all(map(math.isfinite, self._turned)):
-            left = (turned[0] - self._turned[0]) * left_radius
-            right = (turned[1] - self._turned[1]) * right_radius
+        if all(map(math.isfinite, self._last_positions)):
+            left = (positions[0] - self._last_positions[0]) * left_radius
+            right = (positions[1] - self._last_positions[1]) * right_radius
             self.odometry.move((left + right) / 2.0, (right - left) / separation, time_s)
-        self._turned = turned
+        self._last_positions = positions
         return True
 
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
@@ -224,7 +223,7 @@ def _separation_of(geometry: WheelGeometry, left: str, right: str) -> float:
     separation = geometry.distance(left, right)
     if separation <= 0.0:
         raise ParameterError(
-            f"robot_description: joints '{left}' and '{right}' are at the same place; expected wheels "
-            "that are apart; set wheel_separation, or correct the description"
+            f"robot_description: joints '{left}' and '{right}' are at the same position; expected a distance "
+            "between the wheels; set wheel_separation, or correct the description"
         )
     return separation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Drives a base whose four wheels all drive and steer."""
+"""Controller for a base with four driven and steered wheels."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from modular_framework_ros.node_handle import (
     read_number,
 )
 
-SLOWEST = 1e-3
-"""Slowest linear velocity [m/s]; below it the base stops, as a pure rotation would need large steering angles."""
+MIN_SPEED = 1e-3
+"""Minimum linear velocity [m/s]; below, the base stops, because a pure rotation would need large steering angles."""
 
 
 @dataclass(frozen=True, slots=True)
 class SteeringCommand:
-    """A speed, and the angles of both axles.
+    """Command of a speed and of the angles of both axles.
 
     Attributes:
-        speed: of the middle of the base [m/s], negative for backwards.
-        front_angle: of the middle of the front axle [rad].
-        rear_angle: of the middle of the rear axle [rad].
+        speed: Speed of the base's centre [m/s], negative for backwards.
+        front_angle: Angle of the front axle's centre [rad].
+        rear_angle: Angle of the rear axle's centre [rad].
     """
 
     speed: float
@@ -47,19 +47,19 @@ class SteeringCommand:
 
     @property
     def finite(self) -> bool:
-        """Whether all of it are numbers."""
+        """Whether all values are finite."""
         return all(map(math.isfinite, (self.speed, self.front_angle, self.rear_angle)))
 
 
 @dataclass(frozen=True, slots=True)
 class SteeringSnapshot:
-    """Motion of the base, in the terms of four_wheel_steering_msgs.
+    """Motion of the base, as in four_wheel_steering_msgs.
 
     Attributes:
-        time_s: time of the cycle [s].
-        values: speed, acceleration and jerk of the base.
-        angles: of the front and of the rear axle [rad].
-        angle_velocities: of both [rad/s].
+        time_s: Time of the cycle.
+        values: Speed, acceleration and jerk of the base.
+        angles: Angles of front and rear axle [rad].
+        angle_velocities: Angular velocities of front and rear steering [rad/s].
     """
 
     time_s: float
@@ -69,7 +69,7 @@ class SteeringSnapshot:
 
 
 class _Rate:
-    """Rate of change of a value, averaged over some cycles."""
+    """Derivative of a value, averaged over a window of cycles."""
 
     def __init__(self, window: int) -> None:
         self._changes: deque[float] = deque(maxlen=window)
@@ -80,7 +80,7 @@ class _Rate:
         self._last = math.nan
 
     def of(self, value: float, period_s: float) -> float:
-        """The rate after `value` was reached, `period_s` [s] after the last call."""
+        """Returns the derivative at `value`, `period_s` after the last call."""
         if period_s > 0.0 and math.isfinite(self._last):
             self._changes.append((value - self._last) / period_s)
         self._last = value
@@ -90,17 +90,17 @@ class _Rate:
 class FourWheelSteeringController(MobileBaseController):
     """four_wheel_steering_controller/FourWheelSteeringController.
 
-    A command is a `BaseVelocity`, for which front and rear steer against each other, or a `SteeringCommand`; the last
-    one of either is in force.
+    A command is a `BaseVelocity`, for which front and rear steer in opposite directions, or a `SteeringCommand`; the
+    last command of either type is active.
 
-    Parameters, besides those of every mobile base: `front_wheel`, `rear_wheel`, `front_steering`, `rear_steering`: two
-    joints each, the left one first; `track`, `wheel_base`, `wheel_radius` and `wheel_steering_y_offset` [m]: of the
-    robot description when not set. Of the limits, those of accelerations and of `angular/z` are for `BaseVelocity`.
+    Parameters, in addition to MobileBaseController: `front_wheel`, `rear_wheel`, `front_steering`, `rear_steering`, two
+    joints each, left joint first; `track`, `wheel_base`, `wheel_radius` and `wheel_steering_y_offset` [m], by default
+    from the robot description. Limits of accelerations and of `angular/z` apply to `BaseVelocity` only.
 
-    While a wheel's velocity or angle is not a number the odometry does not change, and the base comes to rest.
+    While a wheel velocity or steering angle is not a number, the odometry stops and the base comes to rest.
 
     Attributes:
-        on_steering: called with `on_odometry`.
+        on_steering: Function called together with `on_odometry`.
     """
 
     interface_class = VelocityJointInterface
@@ -130,9 +130,9 @@ class FourWheelSteeringController(MobileBaseController):
         for rate in self._rates:
             rate.start()
 
-    def _forget(self) -> None:
-        super()._forget()
-        self._limits.forget()
+    def _clear_commands(self) -> None:
+        super()._clear_commands()
+        self._limits.clear()
         self._twist = PlanarTwist()
         self._steering = None
 
@@ -152,7 +152,7 @@ class FourWheelSteeringController(MobileBaseController):
         axles = axle_angle(angle[0], angle[1]), axle_angle(angle[2], angle[3])
         speed = math.copysign(
             math.hypot(velocity.linear, velocity.lateral),
-            velocity.linear if abs(velocity.linear) > SLOWEST else velocity.lateral,
+            velocity.linear if abs(velocity.linear) > MIN_SPEED else velocity.lateral,
         )
         period_s, self._last_s = time_s - self._last_s, time_s
         acceleration = self._rates[0].of(speed, period_s)
@@ -164,14 +164,14 @@ class FourWheelSteeringController(MobileBaseController):
         return due
 
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
-        if command is None and self._steering is not None:  # it comes to rest on the curve that it is on
+        if command is None and self._steering is not None:  # come to rest without changing the curve
             command = replace(self._steering, speed=0.0)
         self._steering = command if isinstance(command, SteeringCommand) else None
         if self._steering is not None:
             angles = self._steer(self._steering, period_s)
         else:
             velocity: BaseVelocity = self._limits.limit(AT_REST if command is None else command, period_s)
-            at_rest = abs(velocity.linear) <= SLOWEST
+            at_rest = abs(velocity.linear) <= MIN_SPEED
             self._twist = PlanarTwist() if at_rest else PlanarTwist(velocity.linear, 0.0, velocity.angular)
             angles = self.geometry.wheels(self._twist)[0]
         for wheel, value in zip(self._wheels, self.geometry.wheels(self._twist)[1], strict=True):
@@ -180,7 +180,7 @@ class FourWheelSteeringController(MobileBaseController):
             steering.command = angle
 
     def _steer(self, command: SteeringCommand, period_s: float) -> list[float]:
-        """Angles of the steering joints, which do not depend on the speed [rad]."""
+        """Returns the steering angles, which do not depend on the speed [rad]."""
         front, rear = (
             clamped(angle, -math.pi / 2.0, math.pi / 2.0) for angle in (command.front_angle, command.rear_angle)
         )
@@ -198,14 +198,14 @@ class FourWheelSteeringController(MobileBaseController):
 
 
 def _joints(controller_nh: NodeHandle, keys: list[str]) -> list[str]:
-    """Two joints of each parameter."""
+    """Returns the two joints of each parameter."""
     found = []
     for key in keys:
         names = read_names(controller_nh, key)
         if len(names) != 2:
             raise ParameterError(
                 f"parameter {join_names(controller_nh.namespace, key)}: got {names}; expected two "
-                "joints, the left one and the right one"
+                "joints, left and right"
             )
         found += names
     return found
@@ -214,16 +214,16 @@ def _joints(controller_nh: NodeHandle, keys: list[str]) -> list[str]:
 def _read_geometry(
     root_nh: NodeHandle, controller_nh: NodeHandle, wheels: list[str], steerings: list[str]
 ) -> FourWheelGeometry:
-    def given(key: str, looked_up: Callable[[WheelGeometry], float]) -> float:
+    def value_of(key: str, from_urdf: Callable[[WheelGeometry], float]) -> float:
         if controller_nh.has_param(key):
             return read_number(controller_nh, key, 0.0)
-        return looked_up(WheelGeometry(root_nh, key))
+        return from_urdf(WheelGeometry(root_nh, key))
 
     geometry = FourWheelGeometry(
-        given("track", lambda urdf: urdf.distance(wheels[0], wheels[1])),
-        given("wheel_base", lambda urdf: urdf.distance(wheels[0], wheels[2])),
-        given("wheel_radius", lambda urdf: urdf.radius(wheels[0])),
-        given("wheel_steering_y_offset", lambda urdf: urdf.distance(steerings[0], wheels[0])),
+        value_of("track", lambda urdf: urdf.distance(wheels[0], wheels[1])),
+        value_of("wheel_base", lambda urdf: urdf.distance(wheels[0], wheels[2])),
+        value_of("wheel_radius", lambda urdf: urdf.radius(wheels[0])),
+        value_of("wheel_steering_y_offset", lambda urdf: urdf.distance(steerings[0], wheels[0])),
     )
     if (
         min(geometry.track, geometry.wheel_base, geometry.wheel_radius) <= 0.0

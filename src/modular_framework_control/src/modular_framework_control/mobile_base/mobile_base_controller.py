@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base class of controllers of mobile bases: command timeout, limits, odometry and what is published."""
+"""Base class for controllers of mobile bases: command timeout, limits and odometry."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Diagonal = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class BaseVelocity:
-    """Velocity of a base.
+    """Velocity of a base, in the base frame.
 
     Attributes:
-        linear: along its x axis [m/s].
-        angular: about its z axis [rad/s].
+        linear: Velocity along x [m/s].
+        angular: Angular velocity about z [rad/s].
     """
 
     linear: float = 0.0
@@ -32,7 +32,7 @@ class BaseVelocity:
 
     @property
     def finite(self) -> bool:
-        """Whether all of it are numbers."""
+        """Whether all values are finite."""
         return math.isfinite(self.linear) and math.isfinite(self.angular)
 
 
@@ -44,14 +44,14 @@ class OdometrySnapshot:
     """Pose and velocity of the base.
 
     Attributes:
-        time_s: time of the cycle [s].
-        x: in the odometry frame [m].
-        y: in the odometry frame [m].
-        heading: [rad].
-        linear: along the x axis of the base [m/s].
-        lateral: along its y axis [m/s].
-        angular: about its z axis [rad/s].
-        with_tf: whether the frame of the base is to be published.
+        time_s: Time of the cycle.
+        x: Position in the odometry frame [m].
+        y: Position in the odometry frame [m].
+        heading: Heading in the odometry frame [rad].
+        linear: Velocity along the base's x axis [m/s].
+        lateral: Velocity along the base's y axis [m/s].
+        angular: Angular velocity about the z axis [rad/s].
+        with_tf: Whether the transform of the base is published.
     """
 
     time_s: float
@@ -66,11 +66,11 @@ class OdometrySnapshot:
 
 @dataclass(frozen=True)
 class BaseSettings:
-    """Settings that may change while the controller runs; frozen, so a change replaces the object.
+    """Settings that can be replaced while the controller runs.
 
     Attributes:
-        publish_rate: of the odometry [1/s]; 0 for never.
-        enable_odom_tf: whether the frame of the base is published too.
+        publish_rate: Publish rate of the odometry [1/s]; 0 disables publishing.
+        enable_odom_tf: Whether the transform of the base is published.
     """
 
     publish_rate: float = 50.0
@@ -82,10 +82,10 @@ class BaseFrames:
     """Constant parts of the odometry message.
 
     Attributes:
-        odom: frame in which the pose is given.
-        base: frame of the base.
-        pose_covariance: its diagonal; x, y, z [m^2], roll, pitch, yaw [rad^2].
-        twist_covariance: its diagonal.
+        odom: Odometry frame.
+        base: Base frame.
+        pose_covariance: Variances of x, y, z [m^2], roll, pitch, yaw [rad^2].
+        twist_covariance: Variances of the corresponding velocities.
     """
 
     odom: str
@@ -95,20 +95,20 @@ class BaseFrames:
 
 
 class MobileBaseController(Controller, ABC):
-    """Base of controllers of wheels.
+    """Base class for controllers of wheeled bases.
 
-    Parameters, below the controller's name: `publish_rate` [1/s] 50, `open_loop` false: odometry from what is commanded
-    instead of what is measured; `cmd_vel_timeout` [s] 0.5: a command that is older is no longer in force;
-    `allow_multiple_cmd_vel_publishers` true; `velocity_rolling_window_size` 10; `base_frame_id` base_link,
-    `odom_frame_id` odom, `enable_odom_tf` true; `pose_covariance_diagonal` and `twist_covariance_diagonal`: six numbers
-    each, which must be there; `linear/x` and `angular/z`: limits, see `read_speed_limiter`.
+    Parameters, below the controller's name: `publish_rate` [1/s] 50; `open_loop` false, odometry from commands instead
+    of measurements; `cmd_vel_timeout` [s] 0.5, maximum age of a command; `allow_multiple_cmd_vel_publishers` true;
+    `velocity_rolling_window_size` 10; `base_frame_id` base_link, `odom_frame_id` odom, `enable_odom_tf` true;
+    `pose_covariance_diagonal` and `twist_covariance_diagonal`, six numbers each, required; `linear/x` and `angular/z`,
+    limits, see `read_speed_limiter`.
 
     Attributes:
-        settings: what may be replaced, from any thread, while the controller runs.
-        frames: constant parts of the odometry message.
-        allows_several_publishers: whether commands may come from several publishers.
-        odometry: where the base is.
-        on_odometry: called in the control loop at `publish_rate`; must not block.
+        settings: Settings that any thread may replace at runtime.
+        frames: Constant parts of the odometry message.
+        allows_several_publishers: Whether commands may come from several publishers.
+        odometry: Odometry of the base.
+        on_odometry: Function called in the control loop at `publish_rate`; must not block.
     """
 
     def __init__(self) -> None:
@@ -117,7 +117,7 @@ class MobileBaseController(Controller, ABC):
         self._latest: Any = None
         self._latest_seen: Any = None
         self._seen_s = -math.inf
-        self._turns: Schedule | None = None
+        self._schedule: Schedule | None = None
         self._refusal = "the controller is not running; start it first"
 
     def init(self, hw: Any, root_nh: NodeHandle, controller_nh: NodeHandle) -> bool:
@@ -145,13 +145,13 @@ class MobileBaseController(Controller, ABC):
     # ---- any thread ----
 
     def submit(self, command: Any) -> None:
-        """Takes a command, which is in force from the next cycle on until it is too old.
+        """Submits a command, which is active from the next cycle until the timeout.
 
         Args:
-            command: with a property `finite`; its class depends on the controller.
+            command: Command with a property `finite`; the class depends on the controller.
 
         Raises:
-            ControllerError: not finite, the controller does not run, or the hardware has a fault.
+            ControllerError: The command is not finite, the controller is stopped, or the hardware has a fault.
         """
         if self._refusal:
             raise ControllerError(self._refusal)
@@ -160,48 +160,48 @@ class MobileBaseController(Controller, ABC):
         self._latest = command
 
     def drop_command(self) -> None:
-        """Drops the present command: the base comes to rest within its limits."""
+        """Drops the active command, so that the base comes to rest within its limits."""
         self._latest = None
 
     # ---- control loop ----
 
     def starting(self, time_s: float) -> None:
         self._brake()
-        self._forget()
-        self._turns = None  # they begin with the first cycle
+        self._clear_commands()
+        self._schedule = None  # created in the first cycle
         self.odometry.start(time_s)
         self._refusal = ""
 
     def stopping(self, time_s: float) -> None:
         self._refusal = "the controller is not running; start it first"
         self._brake()
-        self._forget()
+        self._clear_commands()
 
     def on_hardware_fault(self, time_s: float, reason: str) -> None:
         self._refusal = f"hardware fault: {reason}"
         self._brake()
-        self._forget()
+        self._clear_commands()
 
     def on_hardware_recovered(self, time_s: float) -> None:
-        self._forget()  # a command may have come just as the fault did
+        self._clear_commands()  # a command may have arrived together with the fault
         self._refusal = ""
 
     def update(self, time_s: float, period_s: float) -> None:
-        measured = self._follow_wheels(time_s)
+        is_measured = self._follow_wheels(time_s)
         self._report(time_s)
         if self._refusal:
             self._brake()
         else:
-            command = self._in_force(time_s)
-            self._drive(command if measured else None, time_s, period_s)
+            command = self._active_command(time_s)
+            self._drive(command if is_measured else None, time_s, period_s)
 
     def _report(self, time_s: float) -> bool:
-        """Publishes the odometry if that is due; returns whether it was."""
+        """Publishes the odometry if due; returns whether it was due."""
         settings, pose = self.settings, self.odometry
-        if self._turns is None or settings.publish_rate != self._turns.rate:
-            self._turns = Schedule(settings.publish_rate)
-            self._turns.start(time_s)
-        if self.on_odometry is None or not self._turns.take_if_due(time_s):
+        if self._schedule is None or settings.publish_rate != self._schedule.rate:
+            self._schedule = Schedule(settings.publish_rate)
+            self._schedule.start(time_s)
+        if self.on_odometry is None or not self._schedule.take_if_due(time_s):
             return False
         self.on_odometry(
             OdometrySnapshot(
@@ -210,24 +210,30 @@ class MobileBaseController(Controller, ABC):
         )
         return True
 
-    def _in_force(self, time_s: float) -> Any:
-        """Returns the last command; None if it is too old."""
+    def _active_command(self, time_s: float) -> Any:
+        """Returns the last command, or None after the timeout."""
         command = self._latest
         if command is not self._latest_seen:
             self._latest_seen, self._seen_s = command, time_s
         return None if time_s - self._seen_s > self._timeout_s else command
 
-    def _forget(self) -> None:
-        """Clears all commands, including the earlier ones that acceleration limits are computed from."""
+    def _clear_commands(self) -> None:
+        """Clears all commands, including previous commands for acceleration limits."""
         self._latest = self._latest_seen = None
 
     @abstractmethod
     def _follow_wheels(self, time_s: float) -> bool:
-        """Updates the odometry; returns whether all wheels are measured."""
+        """Updates the odometry; returns whether all measurements are valid."""
 
     @abstractmethod
     def _drive(self, command: Any, time_s: float, period_s: float) -> None:
-        """Commands the joints for a command to the base; with None the base comes to rest within its limits."""
+        """Commands the joints for a command to the base, or for coming to rest within the limits if None.
+
+        Args:
+            command: Active command, or None.
+            time_s: Time of the cycle.
+            period_s: Time since the last cycle.
+        """
 
     @abstractmethod
     def _brake(self) -> None:
@@ -235,47 +241,52 @@ class MobileBaseController(Controller, ABC):
 
 
 class TwistLimits:
-    """Limits of both velocities of a base, and what was commanded before, by which accelerations are limited.
+    """Limits of linear and angular velocity of a base, with previous commands for acceleration limits.
 
     Args:
-        linear: limits along x.
-        angular: limits about z.
+        linear: Limits along x.
+        angular: Limits about z.
 
     Attributes:
-        last: velocity commanded in the last cycle.
+        last: Velocity commanded in the last cycle.
     """
 
     def __init__(self, linear: SpeedLimiter, angular: SpeedLimiter) -> None:
         self._linear, self._angular = linear, angular
-        self.forget()
+        self.clear()
 
-    def forget(self) -> None:
-        """Clears the stored velocities, as of a base at rest."""
+    def clear(self) -> None:
+        """Resets the previous commands to rest."""
         self.last = self._before_last = AT_REST
 
-    def limit(self, wanted: BaseVelocity, period_s: float) -> BaseVelocity:
-        """The velocity to command in this cycle, `period_s` [s] after the last."""
+    def limit(self, requested: BaseVelocity, period_s: float) -> BaseVelocity:
+        """Returns the limited velocity for this cycle, `period_s` after the last cycle."""
         last, before = self.last, self._before_last
         self._before_last = last
         self.last = BaseVelocity(
-            self._linear.limit(wanted.linear, last.linear, before.linear, period_s),
-            self._angular.limit(wanted.angular, last.angular, before.angular, period_s),
+            self._linear.limit(requested.linear, last.linear, before.linear, period_s),
+            self._angular.limit(requested.angular, last.angular, before.angular, period_s),
         )
         return self.last
 
-    def limit_linear(self, wanted: float, period_s: float) -> float:
-        """The linear velocity to command in this cycle, of a base whose rotation has no limit of its own."""
+    def limit_linear(self, requested: float, period_s: float) -> float:
+        """Returns the limited linear velocity for this cycle, without limits on the rotation."""
         last = self.last
-        value = self._linear.limit(wanted, last.linear, self._before_last.linear, period_s)
+        value = self._linear.limit(requested, last.linear, self._before_last.linear, period_s)
         self.last, self._before_last = BaseVelocity(value, last.angular), last
         return value
 
 
 def read_positive(handle: NodeHandle, key: str, default: float) -> float:
-    """Reads a number parameter above 0.
+    """Reads a positive number parameter.
+
+    Args:
+        handle: Namespace of the parameter.
+        key: Name of the parameter.
+        default: Value of an unset parameter.
 
     Raises:
-        ParameterError: not a number above 0.
+        ParameterError: The value is not a positive number.
     """
     value = read_number(handle, key, default)
     if value <= 0.0:
@@ -284,10 +295,16 @@ def read_positive(handle: NodeHandle, key: str, default: float) -> float:
 
 
 def read_name(handle: NodeHandle, key: str, default: str, what: str) -> str:
-    """Reads a parameter that names something; `what` says what, for the message.
+    """Reads a parameter with a name.
+
+    Args:
+        handle: Namespace of the parameter.
+        key: Name of the parameter.
+        default: Value of an unset parameter.
+        what: Kind of named object, for the error message.
 
     Raises:
-        ParameterError: not a text, or an empty one.
+        ParameterError: The value is not a string or is empty.
     """
     value = handle.get_param(key, default)
     if not isinstance(value, str) or not value:

@@ -1,47 +1,47 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Odometry of a base on a plane, from the motion of its wheels."""
+"""Planar odometry of a base from the motion of its wheels."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 
-SHORTEST_PERIOD_S = 1e-4
-"""Velocities cannot be estimated from a shorter time [s]."""
+MIN_PERIOD_S = 1e-4
+"""Minimum time for an estimate of velocities [s]."""
 SMALL_ANGLE = 1e-4
-"""Below it the first terms of the series are exact to double precision [rad]."""
+"""Angle below which the first terms of the series are exact to double precision [rad]."""
 
 
-def arc(forward: float, sideways: float, turn: float) -> tuple[float, float]:
-    """Displacement of a base that moves at constant velocities, in its frame at the beginning [m].
+def arc(forward: float, sideways: float, rotation: float) -> tuple[float, float]:
+    """Returns the displacement of a base that moves at constant velocities, in its initial frame [m].
 
-    It is the exponential of a planar twist; for `sideways` 0 an arc of radius forward / turn.
+    The displacement is the exponential of a planar twist; for `sideways` 0, an arc of radius forward / turn.
 
     Args:
-        forward: way along x [m].
-        sideways: way along y [m].
-        turn: angle [rad].
+        forward: Integrated velocity along x [m].
+        sideways: Integrated velocity along y [m].
+        rotation: Rotation angle [rad].
     """
-    if abs(turn) < SMALL_ANGLE:
-        sine, versine = 1.0 - turn * turn / 6.0, turn / 2.0
+    if abs(rotation) < SMALL_ANGLE:
+        sine, versine = 1.0 - rotation * rotation / 6.0, rotation / 2.0
     else:
-        sine, versine = math.sin(turn) / turn, 2.0 * math.sin(0.5 * turn) ** 2 / turn
+        sine, versine = math.sin(rotation) / rotation, 2.0 * math.sin(0.5 * rotation) ** 2 / rotation
     return sine * forward - versine * sideways, versine * forward + sine * sideways
 
 
 class PlanarOdometry:
-    """Pose of the base in the frame where it began, and its velocities in its own frame.
+    """Pose of the base in its initial frame, and velocities in the base frame.
 
     Args:
-        window: over how many cycles estimated velocities are averaged.
+        window: Number of cycles over which estimated velocities are averaged.
 
     Attributes:
-        x: [m].
-        y: [m].
-        heading: angle from x [rad], not wrapped.
-        linear: velocity along the x axis of the base [m/s].
-        lateral: velocity along its y axis [m/s].
-        angular: velocity about its z axis [rad/s].
+        x: Position [m].
+        y: Position [m].
+        heading: Angle from the x axis, not wrapped [rad].
+        linear: Velocity along the base's x axis [m/s].
+        lateral: Velocity along the base's y axis [m/s].
+        angular: Angular velocity about the z axis [rad/s].
     """
 
     def __init__(self, window: int) -> None:
@@ -58,41 +58,41 @@ class PlanarOdometry:
         self.linear = self.lateral = self.angular = 0.0
         self._time_s = time_s
 
-    def move(self, forward: float, turn: float, time_s: float) -> None:
+    def move(self, forward: float, rotation: float, time_s: float) -> None:
         """Updates the pose by a measured displacement.
 
         Args:
-            forward: way since the last call [m].
-            turn: angle since the last call [rad].
-            time_s: time of the cycle [s].
+            forward: Distance since the last call [m].
+            rotation: Rotation since the last call [rad].
+            time_s: Time of the cycle.
         """
-        self._advance(forward, 0.0, turn)
+        self._advance(forward, 0.0, rotation)
         period_s = time_s - self._time_s
-        if period_s < SHORTEST_PERIOD_S:
+        if period_s < MIN_PERIOD_S:
             return
         self._time_s = time_s
         self._linear.append(forward / period_s)
-        self._angular.append(turn / period_s)
+        self._angular.append(rotation / period_s)
         self.linear = sum(self._linear) / len(self._linear)
         self.angular = sum(self._angular) / len(self._angular)
 
     def move_at(self, linear: float, lateral: float, angular: float, time_s: float) -> None:
-        """Updates the pose by velocities that are in force since the last call.
+        """Updates the pose by constant velocities since the last call.
 
         Args:
-            linear: along the x axis of the base [m/s].
-            lateral: along its y axis [m/s].
-            angular: about its z axis [rad/s].
-            time_s: time of the cycle [s].
+            linear: Velocity along the base's x axis [m/s].
+            lateral: Velocity along the base's y axis [m/s].
+            angular: Angular velocity about the z axis [rad/s].
+            time_s: Time of the cycle.
         """
         period_s = time_s - self._time_s
         self._time_s = time_s
         self.linear, self.lateral, self.angular = linear, lateral, angular
         self._advance(linear * period_s, lateral * period_s, angular * period_s)
 
-    def _advance(self, forward: float, sideways: float, turn: float) -> None:
-        ahead, left = arc(forward, sideways, turn)
+    def _advance(self, forward: float, sideways: float, rotation: float) -> None:
+        dx, dy = arc(forward, sideways, rotation)
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
-        self.x += ahead * cosine - left * sine
-        self.y += ahead * sine + left * cosine
-        self.heading += turn
+        self.x += dx * cosine - dy * sine
+        self.y += dx * sine + dy * cosine
+        self.heading += rotation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Limits of velocity, acceleration and jerk of a mobile base, under the parameter names of ros_controllers."""
+"""Velocity, acceleration and jerk limits of a mobile base, with the parameters of ros_controllers."""
 
 from __future__ import annotations
 
@@ -10,38 +10,44 @@ from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_n
 
 UNLIMITED = (-math.inf, math.inf)
 JERK_FACTOR = 2.0
-"""Factor on jerk limits: ros_controllers has it too, and its users' limits are tuned with it."""
+"""Factor on jerk limits, as in ros_controllers, whose users' limits are tuned with this factor."""
 
 
 def clamped(value: float, lowest: float, highest: float) -> float:
-    """The value in the range that is nearest to `value`."""
+    """Returns the value clamped to a range.
+
+    Args:
+        value: Value.
+        lowest: Minimum.
+        highest: Maximum.
+    """
     return min(max(value, lowest), highest)
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedLimiter:
-    """Keeps one velocity of a base, linear or angular, within its limits from one cycle to the next.
+    """Limits of a linear or angular velocity.
 
     Attributes:
-        velocity: smallest and largest [m/s|rad/s].
-        acceleration: smallest and largest [m/s^2|rad/s^2].
-        jerk: smallest and largest [m/s^3|rad/s^3].
+        velocity: Minimum and maximum velocity [m/s|rad/s].
+        acceleration: Minimum and maximum acceleration [m/s^2|rad/s^2].
+        jerk: Minimum and maximum jerk [m/s^3|rad/s^3].
     """
 
     velocity: tuple[float, float] = UNLIMITED
     acceleration: tuple[float, float] = UNLIMITED
     jerk: tuple[float, float] = UNLIMITED
 
-    def limit(self, wanted: float, last: float, before_last: float, period_s: float) -> float:
-        """The velocity to command: the jerk is limited first, then the acceleration, then the velocity.
+    def limit(self, requested: float, last: float, before_last: float, period_s: float) -> float:
+        """Returns the requested velocity with limited jerk, then acceleration, then velocity.
 
         Args:
-            wanted: the requested velocity.
-            last: velocity commanded in the last cycle.
-            before_last: velocity commanded in the cycle before that.
-            period_s: time since the last cycle [s].
+            requested: Requested velocity [m/s|rad/s].
+            last: Velocity commanded in the last cycle [m/s|rad/s].
+            before_last: Velocity commanded in the cycle before [m/s|rad/s].
+            period_s: Time since the last cycle.
         """
-        value = wanted
+        value = requested
         if self.jerk != UNLIMITED:
             change = last - before_last
             step_s2 = JERK_FACTOR * period_s * period_s
@@ -58,7 +64,7 @@ def read_speed_limiter(limits_nh: NodeHandle) -> SpeedLimiter:
     `..._jerk`.
 
     Raises:
-        ParameterError: a limit that is switched on has no largest value, or its range does not hold 0.
+        ParameterError: An enabled limit has no maximum, or its range does not contain 0.
     """
     return SpeedLimiter(*(_range(limits_nh, what) for what in ("velocity", "acceleration", "jerk")))
 
@@ -70,13 +76,13 @@ def _range(limits_nh: NodeHandle, what: str) -> tuple[float, float]:
     where = join_names(limits_nh.namespace, largest)
     if not limits_nh.has_param(largest):
         raise ParameterError(
-            f"parameter {where} is not set although {switch} is true; give the largest {what}, or set {switch} to false"
+            f"parameter {where} is not set although {switch} is true; set the maximum {what}, or set {switch} to false"
         )
     highest = read_number(limits_nh, largest, 0.0, None)
     lowest = read_number(limits_nh, smallest, -highest, None)
     if not lowest <= 0.0 <= highest:
         raise ParameterError(
-            f"parameters {where} and {smallest}: got {highest} and {lowest}; the largest {what} must "
-            "be at least 0 and the smallest at most 0, or the base could not stand still"
+            f"parameters {where} and {smallest}: got {highest} and {lowest}; the maximum {what} must "
+            "be at least 0 and the minimum at most 0, so that the base can stop"
         )
     return lowest, highest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Radius of wheels and distances between them, from the robot description."""
+"""Wheel radii and distances between wheels, from the robot description."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ class WheelGeometry:
     """Reads the geometry of wheels from `robot_description`.
 
     Args:
-        root_nh: where `robot_description` is found.
-        wanted_for: the parameter that would make the description unnecessary, for messages.
+        root_nh: Namespace of `robot_description`.
+        parameter: Name of the parameter that replaces the description, for error messages.
 
     Raises:
-        ParameterError: there is no description, or it is not XML.
+        ParameterError: The description is missing or not XML.
     """
 
-    def __init__(self, root_nh: NodeHandle, wanted_for: str) -> None:
+    def __init__(self, root_nh: NodeHandle, parameter: str) -> None:
         self._where = f"parameter {join_names(root_nh.namespace, 'robot_description')}"
-        self._remedy = f"set {wanted_for} in the controller's parameters, or correct the description"
+        self._remedy = f"set {parameter} in the controller's parameters, or correct the description"
         description = root_nh.get_param("robot_description")
         if not isinstance(description, str):
             raise ParameterError(
-                f"{self._where} is not set, and {wanted_for} is looked up there; load the robot "
-                f"description, or set {wanted_for} in the controller's parameters"
+                f"{self._where} is not set, but needed for {parameter}; load the robot "
+                f"description, or set {parameter} in the controller's parameters"
             )
         robot = self._read(description)
         self._joints = {joint.name: joint for joint in robot.joints}
@@ -51,36 +51,36 @@ class WheelGeometry:
             raise ParameterError(str(error)) from error
 
     def between(self, first: str, second: str) -> Array:
-        """Vector from the first joint to the second, both at 0: x, y, z in the frame of the first one's parent [m].
+        """Returns the vector between two joints at position 0, in the frame of the first joint's parent [m].
 
         Raises:
-            ParameterError: no such joint, an origin that is not made of numbers, or links that are no tree.
+            ParameterError: A joint is unknown, or the links do not form a tree.
         """
         parent, parent_of_second = (self._frame(self._joint(name).parent) for name in (first, second))
         start = parent @ self._joint(first).origin.matrix()
         end = parent_of_second @ self._joint(second).origin.matrix()
-        way: Array = parent[:3, :3].T @ (end - start)[:3, 3]
-        return way
+        offset: Array = parent[:3, :3].T @ (end - start)[:3, 3]
+        return offset
 
     def distance(self, first: str, second: str) -> float:
-        """Distance between two joints, both unmoved [m]; raises as `between`."""
+        """Returns the distance between two joints at position 0 [m]; raises as `between`."""
         return float(np.linalg.norm(self.between(first, second)))
 
     def radius(self, joint: str, shapes: tuple[str, ...] = ("cylinder", "sphere")) -> float:
-        """Radius of the wheel that a joint turns [m]: of its link's first collision geometry, as in ros_controllers.
+        """Returns the radius of a joint's wheel [m], as in ros_controllers from the link's first collision geometry.
 
         Args:
-            joint: name of the joint.
-            shapes: geometries that are wheels.
+            joint: Name of the joint.
+            shapes: Accepted geometry tags.
 
         Raises:
-            ParameterError: no such joint, or its link has no such collision geometry.
+            ParameterError: The joint is unknown, or the link has no such collision geometry.
         """
         name = self._joint(joint).child
         link = self._links.get(name)
         if link is None:
             raise self._error(
-                f"joint '{joint}' has the child link '{name}', which is not there; "
+                f"joint '{joint}' has the unknown child link '{name}'; "
                 f"links: {', '.join(sorted(self._links)) or 'none'}"
             )
         found = link.collisions[0].shapes if link.collisions else ()
@@ -95,7 +95,7 @@ class WheelGeometry:
 
     def _joint(self, name: str) -> Joint:
         if name not in self._joints:
-            raise self._error(f"there is no joint '{name}'; joints: {', '.join(sorted(self._joints)) or 'none'}")
+            raise self._error(f"unknown joint '{name}'; joints: {', '.join(sorted(self._joints)) or 'none'}")
         return self._joints[name]
 
     def _checked(self, wheel: Cylinder | Sphere, link: str) -> float:
@@ -104,17 +104,17 @@ class WheelGeometry:
         return wheel.radius
 
     def _error(self, fault: str) -> ParameterError:
-        """Returns the error of a fault of the description, with its place and what to do."""
+        """Returns the error for a fault of the description, with the parameter and the remedy."""
         return ParameterError(f"{self._where}: {fault}; {self._remedy}")
 
     def _frame(self, link: str) -> Array:
-        """Frame of a link in the root link, all joints unmoved."""
+        """Returns the pose of a link in the root link, with all joints at position 0."""
         frame = np.eye(4)
-        above = link
+        ancestor = link
         for _ in range(len(self._joints) + 1):
-            carrier = next((joint for joint in self._joints.values() if joint.child == above), None)
-            if carrier is None:
+            joint_above = next((joint for joint in self._joints.values() if joint.child == ancestor), None)
+            if joint_above is None:
                 return frame
-            frame = carrier.origin.matrix() @ frame
-            above = carrier.parent
-        raise self._error(f"the way from link '{link}' to the root link never ends; expected a tree of links")
+            frame = joint_above.origin.matrix() @ frame
+            ancestor = joint_above.parent
+        raise self._error(f"the path from link '{link}' to the root link never ends; expected a tree of links")
