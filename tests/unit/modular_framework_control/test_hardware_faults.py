@@ -129,7 +129,7 @@ def test_another_fault_and_the_recovery_are_reported(loop: Any, caplog: pytest.L
         "recovered",
     ]
     assert caplog.text.count("hardware fault: hardware 'arm': protective stop") == 1
-    assert caplog.text.count("the hardware follows again (it did not for: hardware 'arm': link lost)") == 1
+    assert caplog.text.count("the hardware has recovered (from: hardware 'arm': link lost)") == 1
 
 
 def test_a_controller_started_during_a_fault_is_notified_before_its_first_update(loop: Any) -> None:

@@ -399,7 +399,7 @@ def test_after_a_reset_of_time_the_arm_holds_and_its_goal_has_ended(loop: Any) -
     loop.run(0.2)
     assert (goal_handle.status, goal_handle.text) == (
         GoalStatus.CANCELED,
-        "time went back, or the robot was put elsewhere",
+        "time went back, or the robot was moved to a new pose",
     )
     assert commands(loop) == pytest.approx(held, abs=0.03)
 

@@ -58,7 +58,7 @@ def test_time_stands_still_while_the_loop_is_held_up(caplog: pytest.LogCaptureFi
     clocks = Clocks()
     loop_time = LoopTime(clocks.system, clocks.steady)
     clocks.steady_s += 3.0  # before the loop begins nothing is held up
-    loop_time.longest_step_s = 0.05
+    loop_time.max_step_s = 0.05
     begun_s = loop_time.now()
     for passed_s in (0.008, 0.05, 0.9, 0.008):
         clocks.steady_s += passed_s
@@ -66,7 +66,7 @@ def test_time_stands_still_while_the_loop_is_held_up(caplog: pytest.LogCaptureFi
         assert time_s + loop_time.ahead_s == pytest.approx(clocks.system(), abs=1e-6)
     assert time_s - begun_s == pytest.approx(0.008 + 0.05 + 0.05 + 0.008, abs=1e-6)
     assert [record.getMessage() for record in caplog.records] == [
-        "the control loop was held up for 0.900 s: motions go on as much later"
+        "the control loop was held up for 0.900 s: motions continue later"
     ]
 
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads, starts, stops and updates controllers."""
+"""The controller manager."""

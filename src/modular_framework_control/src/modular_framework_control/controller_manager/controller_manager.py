@@ -2,7 +2,7 @@
 """Loads, starts, updates, stops and unloads controllers on one `RobotHW`, with the rules of ros_control.
 
 Threads that may wait (services) load and unload controllers and request switches. The control loop calls `update`,
-which never waits for them: the list of controllers is replaced, never changed, and a switch is passed in one attribute.
+which never waits for these threads: the tuple of controllers is replaced, and a switch is passed in one attribute.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from modular_framework_ros.node_handle import NodeHandle, join_names
 
 Detach = Callable[[], None]
 Attach = Callable[[str, Controller], Detach]
-RESET_REASON = "time went back, or the robot was put elsewhere"
+RESET_REASON = "time went back, or the robot was moved to a new pose"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +40,10 @@ class ControllerReport:
     """One line of `list_controllers`.
 
     Attributes:
-        info: name, type and claimed joints.
-        state: initialized, running, stopped, waiting or aborted.
-        failure: why the controller was stopped by the manager; "" when it was not.
-        statistics: its update times since it was started last.
+        info: Name, type and claimed joints.
+        state: State of the controller.
+        failure: Reason why the manager stopped the controller, or "".
+        statistics: Update times since the last start.
     """
 
     info: ControllerInfo
@@ -61,12 +61,12 @@ class ControllerManager:
     """The controllers of one robot.
 
     Args:
-        robot_hw: initialised hardware.
-        root_nh: namespace below which each controller's parameters are found under its name.
-        types: known controller types.
-        attach: called for each loaded controller; opens its topics and actions and returns what closes them.
-        update_wait_s: how long a switch waits for the next cycle of the control loop [s of real time].
-        clock: real time [s], for the statistics.
+        robot_hw: Initialized hardware.
+        root_nh: Namespace of the robot, with each controller's parameters below the controller's name.
+        types: Known controller types.
+        attach: Function that opens the topics and actions of a loaded controller and returns a function to close them.
+        update_wait_s: Maximum wait of a switch for the next control cycle [s of wall time].
+        clock: Wall time for the statistics [s].
     """
 
     def __init__(
@@ -94,24 +94,22 @@ class ControllerManager:
         self._watch = FaultWatch(robot_hw)
         unlimited = missing_limits(robot_hw)
         if unlimited:
-            LOGGER.warning(
-                "no limits in robot_description or joint_limits: %s; commands of any size are passed on", unlimited
-            )
+            LOGGER.warning("no limits in robot_description or joint_limits: %s; commands are not limited", unlimited)
 
     @property
     def fault(self) -> str:
-        """The fault of the hardware in the last cycle; "" without one."""
+        """Hardware fault in the last cycle, or ""."""
         return self._watch.text
 
     # ---- control loop ----
 
     def watch_hardware(self) -> None:
-        """Reads the faults of hardware that is not ready for controllers; in each cycle until it is."""
+        """Reads the faults of the hardware; runs in each cycle until the hardware is ready for controllers."""
         self._watch.faults(log=False)
 
     @property
     def moving(self) -> bool:
-        """Whether a running controller carries out a goal."""
+        """Whether a running controller executes a goal."""
         return any(entry.running and entry.controller.moving for entry in self._loaded)
 
     def update(
@@ -121,21 +119,21 @@ class ControllerManager:
         reset_controllers: bool = False,
         reset_reason: str = RESET_REASON,
     ) -> None:
-        """Updates every running controller, then carries out a pending switch. Never raises, never waits.
+        """Updates every running controller, then executes a pending switch; never raises and never waits.
 
         Args:
-            time_s: time of this cycle [s].
-            period_s: time since the last cycle [s].
-            reset_controllers: restart the running controllers first (after a reset of the simulation); a time before
-                that of the last cycle does the same.
-            reset_reason: why, for the results of the goals that end with it.
+            time_s: Time of this cycle.
+            period_s: Time since the last cycle.
+            reset_controllers: Whether running controllers restart first, as after a reset of the simulation; they also
+                restart if time goes back.
+            reset_reason: Reason for the results of goals that the restart ends.
         """
         self._robot_hw.seed_commands()
         reset = reset_controllers or time_s < self._last_time_s
         self._last_time_s = time_s
         faults = self._watch.faults()
-        begun_s = self._clock()
-        late_s = begun_s + period_s if period_s > 0.0 else math.inf
+        start_s = self._clock()
+        deadline_s = start_s + period_s if period_s > 0.0 else math.inf
         for entry in self._loaded:
             if entry.state is not ControllerState.RUNNING:
                 continue
@@ -149,11 +147,11 @@ class ControllerManager:
                     continue
             try:
                 entry.controller.update(time_s, period_s)
-            except Exception as error:  # one controller's fault must not stop the others
+            except Exception as error:  # an error in one controller must not stop other controllers
                 entry.fail(time_s, f"update() raised {type(error).__name__}: {error}")
-            ended_s = self._clock()
-            entry.statistics.add(time_s, ended_s - begun_s, begun_s <= late_s < ended_s)
-            begun_s = ended_s
+            end_s = self._clock()
+            entry.statistics.add(time_s, end_s - start_s, start_s <= deadline_s < end_s)
+            start_s = end_s
         if self._pending is not None:
             self._step_switch(time_s)
 
@@ -169,7 +167,7 @@ class ControllerManager:
             except Exception as error:
                 LOGGER.exception("switch_controller: the hardware raised")
                 request.errors.append(f"hardware raised {type(error).__name__}: {error}")
-                request.give_up(time_s)
+                request.abort_waiting(time_s)
                 finished = True
             if finished:
                 self._pending = None
@@ -180,15 +178,15 @@ class ControllerManager:
     # ---- threads that may wait ----
 
     def load_controller(self, name: str) -> None:
-        """Makes and initialises the controller whose parameters are below `name`.
+        """Creates and initializes the controller with parameters below `name`.
 
         Raises:
-            ControllerError: already loaded, no or unknown type, its `init` failed, or its topics and actions cannot be
-                opened; says which.
+            ControllerError: The controller is already loaded, the type is missing or unknown, `init` failed, or topics
+                and actions cannot be opened.
         """
         with self._services:
             if any(entry.name == name for entry in self._loaded):
-                raise ControllerError(f"cannot load controller '{name}': one of that name is already loaded")
+                raise ControllerError(f"cannot load controller '{name}': it is already loaded; unload it first")
             controller_nh = self._root_nh.child(name)
             controller_type = controller_nh.get_param("type")
             if not isinstance(controller_type, str) or not controller_type:
@@ -216,21 +214,23 @@ class ControllerManager:
         for interface in self._robot_hw.interfaces:
             interface.take_claims()
         try:
-            main = self._robot_hw.get(controller.interface_class)
+            main_interface = self._robot_hw.get(controller.interface_class)
             controller.robot_hw = self._robot_hw
-            if controller.init(main, self._root_nh, controller_nh) is not True:
+            if controller.init(main_interface, self._root_nh, controller_nh) is not True:
                 raise ControllerError("init() returned False")
         except Exception as error:  # a user's controller may raise anything
             raise ControllerError(f"cannot load controller '{name}': {error}") from error
-        others = [interface for interface in self._robot_hw.interfaces if interface is not main]
-        claims = [InterfaceResources(interface.type_name, interface.take_claims()) for interface in (main, *others)]
+        others = [interface for interface in self._robot_hw.interfaces if interface is not main_interface]
+        claims = [
+            InterfaceResources(interface.type_name, interface.take_claims()) for interface in (main_interface, *others)
+        ]
         return tuple(claim for claim in claims if claim.resources or claim is claims[0])
 
     def unload_controller(self, name: str) -> None:
         """Unloads a controller that is not running.
 
         Raises:
-            ControllerError: not loaded, or running.
+            ControllerError: The controller is not loaded or is running.
         """
         with self._services:
             entry = next((entry for entry in self._loaded if entry.name == name), None)
@@ -249,18 +249,18 @@ class ControllerManager:
         start_asap: bool = False,
         timeout_s: float = 0.0,
     ) -> None:
-        """Stops and starts controllers in one cycle of the control loop; returns when that is done.
+        """Stops and starts controllers in one control cycle, and returns when the switch is done.
 
         Args:
-            start: names to start.
-            stop: names to stop.
-            strictness: BEST_EFFORT (1) leaves out what cannot be done, STRICT (2) refuses; 0 means BEST_EFFORT.
-            start_asap: start each controller as soon as the hardware is ready for it.
-            timeout_s: how long the hardware may take to get ready [s of the loop's time]; 0 for no bound.
+            start: Names of controllers to start.
+            stop: Names of controllers to stop.
+            strictness: BEST_EFFORT (1) skips impossible items, STRICT (2) refuses the switch; 0 means BEST_EFFORT.
+            start_asap: Whether each controller starts as soon as the hardware is ready for it.
+            timeout_s: Maximum time for the hardware to get ready [s of loop time]; 0 for no limit.
 
         Raises:
-            ControllerError: refused, in conflict over a joint, refused by the hardware, which may also raise, not
-                started, or not carried out because the control loop did not run or has ended.
+            ControllerError: The switch is refused by the rules or by the hardware, controllers conflict over a joint, a
+                controller failed to start, or the control loop is not running.
         """
         with self._services:
             plan = plan_switch({entry.name: entry for entry in self._loaded}, start, stop, Strictness.of(strictness))
@@ -273,7 +273,7 @@ class ControllerManager:
                 raise ControllerError("; ".join(request.errors))
 
     def _prepare(self, request: SwitchRequest) -> None:
-        """Asks the hardware whether it can do the switch."""
+        """Asks the hardware whether the switch is possible."""
         try:
             conflict = self._robot_hw.check_for_conflict(request.plan.resulting)
             prepared = not conflict and self._robot_hw.prepare_switch(*request.hardware_lists)
@@ -288,52 +288,52 @@ class ControllerManager:
             raise ControllerError("cannot switch controllers: the hardware refused to prepare for it")
 
     def _hand_over(self, request: SwitchRequest) -> None:
-        """Puts `request` into the slot of the loop and waits until it is done, as long as the loop runs."""
+        """Passes a request to the control loop and waits until it is done, as long as the loop runs."""
         with self._slot_lock:
             if self._ended:
                 raise ControllerError("cannot switch controllers: the control loop has ended; start its node again")
             self._pending = request
-        seen = -1
-        while seen != request.cycles:
-            seen = request.cycles
+        last_cycles = -1
+        while last_cycles != request.cycles:
+            last_cycles = request.cycles
             if request.done.wait(self._update_wait_s):
                 return
         with self._slot_lock:
             self._pending = None
-            request.give_up(self._last_time_s)
+            request.abort_waiting(self._last_time_s)
         if not request.done.is_set():
             raise ControllerError(
-                f"the control loop did not carry out the switch: it made no cycle for "
-                f"{self._update_wait_s:.1f} s; is it running, or paused?"
+                f"the control loop did not carry out the switch: no cycle ran within "
+                f"{self._update_wait_s:.1f} s; is the loop stopped or paused?"
             )
 
     def list_controllers(self) -> list[ControllerReport]:
-        """All loaded controllers in the order they were loaded."""
+        """Returns a report per loaded controller, in the order of loading."""
         return [
             ControllerReport(entry.info, entry.state, entry.failure, entry.statistics.snapshot())
             for entry in self._loaded
         ]
 
     def get_controller_by_name(self, name: str) -> Controller | None:
-        """Returns the loaded controller of that name, if there is one."""
+        """Returns a loaded controller, or None."""
         return next((entry.controller for entry in self._loaded if entry.name == name), None)
 
     def list_controller_types(self) -> list[tuple[str, str]]:
-        """Known type names, each with the base class it is reported under."""
+        """Returns known type names with their reported base class."""
         return [(name, BASE_CLASS) for name in self.types.names]
 
     def reload_controller_libraries(self, force_kill: bool = False) -> None:
         """Searches for controller classes again; with `force_kill`, stops and unloads all controllers first.
 
         Raises:
-            ControllerError: controllers are loaded and `force_kill` is False.
+            ControllerError: Controllers are loaded, and `force_kill` is False.
         """
         with self._services:
             names = [entry.name for entry in self._loaded]
             if names and not force_kill:
                 raise ControllerError(
                     f"cannot reload controller libraries: loaded controllers: {self._names()}; "
-                    "unload them or ask for force_kill"
+                    "unload them or set force_kill"
                 )
             self.switch_controller([], names, Strictness.BEST_EFFORT)
             for name in reversed(names):
@@ -341,7 +341,7 @@ class ControllerManager:
             self.types.reload()
 
     def stop_all(self) -> None:
-        """Stops every running controller, which ends their goals, and refuses switches from now on, also a pending one.
+        """Stops all running controllers, and refuses pending and later switches.
 
         The control loop must have ended. May be called twice.
         """
@@ -350,7 +350,7 @@ class ControllerManager:
             request, self._pending = self._pending, None
             if request is not None:
                 request.errors.append("the switch was not carried out: the control loop has ended")
-                request.give_up(self._last_time_s)
+                request.abort_waiting(self._last_time_s)
                 request.done.set()
         for entry in self._loaded:
             if entry.running:
@@ -372,5 +372,5 @@ def _close(name: str, controller: Controller, detach: Detach) -> None:
     detach()
     try:
         controller.close()
-    except Exception as error:  # a user's controller may raise anything; it is gone all the same
+    except Exception as error:  # a user's controller may raise anything; it is unloaded anyway
         LOGGER.exception("controller '%s': close() raised %s: %s", name, type(error).__name__, error)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long the updates of a controller take, and how often they make the control loop late."""
+"""Statistics of a controller's update times and overruns."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class StatisticsSnapshot:
-    """Figures since the controller was started last.
+    """Update times since the last start of the controller.
 
     Attributes:
-        updated_at_s: time of the loop at the last update [s].
-        max_s: longest update [s].
-        mean_s: mean update [s].
-        variance_s2: variance of the updates [s^2].
-        overruns: cycles whose time ran out while this controller was updated.
-        last_overrun_s: time of the loop at the last of these [s]; 0 when there was none.
+        updated_at_s: Loop time of the last update.
+        max_s: Maximum update time.
+        mean_s: Mean update time.
+        variance_s2: Variance of update times [s^2].
+        overruns: Number of cycles whose deadline passed during this controller's update.
+        last_overrun_s: Loop time of the last overrun; 0 for none.
     """
 
     updated_at_s: float
@@ -28,7 +28,7 @@ class StatisticsSnapshot:
 
 
 class UpdateStatistics:
-    """Running figures of one controller; written by the control loop, without allocating anything that stays."""
+    """Running statistics of one controller, written by the control loop without lasting allocations."""
 
     __slots__ = ("_count", "_mean_s", "_squares", "_max_s", "_updated_at_s", "_overruns", "_last_overrun_s")
 
@@ -43,18 +43,18 @@ class UpdateStatistics:
         self._overruns = 0
 
     def add(self, time_s: float, duration_s: float, overrun: bool) -> None:
-        """Counts one update (mean and variance by Welford's recurrence).
+        """Adds one update (mean and variance by Welford's recurrence).
 
         Args:
-            time_s: time of the loop [s].
-            duration_s: how long the update took [s of real time].
-            overrun: whether the time of the cycle ran out in it.
+            time_s: Loop time.
+            duration_s: Duration of the update [s of wall time].
+            overrun: Whether the cycle's deadline passed during the update.
         """
         self._count += 1
         self._updated_at_s = time_s
-        away = duration_s - self._mean_s
-        self._mean_s += away / self._count
-        self._squares += away * (duration_s - self._mean_s)
+        deviation_s = duration_s - self._mean_s
+        self._mean_s += deviation_s / self._count
+        self._squares += deviation_s * (duration_s - self._mean_s)
         if duration_s > self._max_s:
             self._max_s = duration_s
         if overrun:
@@ -62,7 +62,7 @@ class UpdateStatistics:
             self._last_overrun_s = time_s
 
     def snapshot(self) -> StatisticsSnapshot:
-        """The figures so far; may be asked from any thread."""
+        """Returns the current figures, from any thread."""
         variance_s2 = self._squares / self._count if self._count else 0.0
         return StatisticsSnapshot(
             self._updated_at_s, self._max_s, self._mean_s, variance_s2, self._overruns, self._last_overrun_s

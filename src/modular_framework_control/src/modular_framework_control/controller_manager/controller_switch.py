@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One switch of controllers: checked on a thread that may wait, carried out cycle by cycle in the control loop."""
+"""A switch of controllers, checked on a thread that may wait and executed cycle by cycle in the control loop."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from modular_framework_control.controller_manager.controller_statistics import U
 from modular_framework_control.hardware_interface.interfaces import ControllerInfo
 from modular_framework_control.hardware_interface.robot_hw import HardwareFault, RobotHW, SwitchState
 
-# Below rospy's logger "rosout", so that messages also reach /rosout when rospy runs; plain logging otherwise.
+# Below rospy's logger "rosout", so that messages also reach /rosout if rospy runs.
 LOGGER = logging.getLogger("rosout.controller_manager")
 
 
 class ControllerState(Enum):
-    """States of a loaded controller, by the names `list_controllers` reports.
+    """States of a loaded controller, by their names in `list_controllers`.
 
-    One that is to start is waiting until the hardware is ready for it, and aborted when it does not get ready.
+    A starting controller is waiting until the hardware is ready, and aborted if the hardware does not get ready.
     """
 
     INITIALIZED = "initialized"
@@ -32,17 +32,17 @@ class ControllerState(Enum):
 
 
 class Strictness(IntEnum):
-    """Handling of items of a switch that cannot be done: leave them out, or refuse the whole switch."""
+    """Handling of impossible items of a switch: skip them, or refuse the whole switch."""
 
     BEST_EFFORT = 1
     STRICT = 2
 
     @classmethod
     def of(cls, number: int) -> Strictness:
-        """Returns the strictness with the number of a request; 0 means BEST_EFFORT, as in ros_control.
+        """Returns the strictness of a request; 0 means BEST_EFFORT, as in ros_control.
 
         Raises:
-            ControllerError: there is none of this number.
+            ControllerError: The value is unknown.
         """
         if number == 0:
             LOGGER.warning("switch_controller: strictness 0 is not defined; using BEST_EFFORT (1)")
@@ -50,17 +50,21 @@ class Strictness(IntEnum):
         try:
             return cls(number)
         except ValueError:
-            raise ControllerError(f"strictness {number} is not known; use BEST_EFFORT (1) or STRICT (2)") from None
+            raise ControllerError(f"unknown strictness {number}; use BEST_EFFORT (1) or STRICT (2)") from None
 
 
 @dataclass(slots=True)
 class LoadedController:
-    """A controller and what the manager knows of it; the control loop writes `state` and `fault`.
+    """A loaded controller with its state; the control loop writes `state` and `fault`.
 
     Attributes:
-        failure: why the manager stopped it; "" when it did not.
-        fault: the hardware fault it was notified of last; "" for none.
-        joints: the joints it claims, whatever the interface.
+        info: Name, type and claimed joints.
+        controller: Controller instance.
+        state: State of the controller.
+        failure: Reason why the manager stopped the controller, or "".
+        fault: Hardware fault of the last notification, or "".
+        statistics: Update times.
+        joints: Claimed joints of all interfaces.
     """
 
     info: ControllerInfo
@@ -83,7 +87,7 @@ class LoadedController:
         return self.state is ControllerState.RUNNING
 
     def start(self, time_s: float) -> str:
-        """Starts it; returns why it failed, or ""."""
+        """Starts the controller; returns the reason of a failure, or ""."""
         try:
             self.controller.starting(time_s)
         except Exception as error:  # a user's controller may raise anything; the loop must continue
@@ -94,7 +98,7 @@ class LoadedController:
         return ""
 
     def wait(self, time_s: float) -> str:
-        """Waits one cycle for the hardware; returns why it cannot wait any longer, or ""."""
+        """Runs one waiting cycle; returns the reason of a failure, or ""."""
         self.state = ControllerState.WAITING
         try:
             self.controller.waiting(time_s)
@@ -103,15 +107,15 @@ class LoadedController:
         return ""
 
     def abort(self, time_s: float) -> None:
-        """Ends its start; an exception in `aborting` is logged and leaves it aborted."""
+        """Aborts the start; an exception in `aborting` is logged."""
         self._end(ControllerState.ABORTED, self.controller.aborting, time_s)
 
     def stop(self, time_s: float) -> None:
-        """Stops it; an exception in `stopping` is logged and leaves it stopped."""
+        """Stops the controller; an exception in `stopping` is logged."""
         self._end(ControllerState.STOPPED, self.controller.stopping, time_s)
 
     def interrupt(self, time_s: float, reason: str) -> None:
-        """Stops it before a new start; an exception in `interrupted` is logged."""
+        """Stops the controller before an immediate restart; an exception in `interrupted` is logged."""
         self._end(ControllerState.STOPPED, lambda now_s: self.controller.interrupted(now_s, reason), time_s)
 
     def _end(self, state: ControllerState, hook: Callable[[float], None], time_s: float) -> None:
@@ -124,7 +128,7 @@ class LoadedController:
             LOGGER.exception("controller '%s': %s", self.name, self.failure)
 
     def notify_fault(self, time_s: float, faults: Sequence[HardwareFault]) -> None:
-        """Notifies it of a change of the faults of its joints' hardware."""
+        """Notifies the controller if the faults of its joints' hardware have changed."""
         reason = "; ".join(fault.reason for fault in faults if not fault.joints.isdisjoint(self.joints))
         if reason == self.fault:
             return
@@ -139,7 +143,7 @@ class LoadedController:
             self.fail(time_s, f"{method} raised {type(error).__name__}: {error}")
 
     def fail(self, time_s: float, reason: str) -> str:
-        """Stops it because it raised; call from the except block. Returns `reason`."""
+        """Stops the controller after an exception, from within the except block; returns `reason`."""
         self.failure = reason
         self.state = ControllerState.STOPPED
         LOGGER.exception("controller '%s' is stopped: %s", self.name, reason)
@@ -152,12 +156,12 @@ class LoadedController:
 
 @dataclass(frozen=True, slots=True)
 class SwitchPlan:
-    """The result of the rules of STRICT and BEST_EFFORT for a request.
+    """A request after the rules of STRICT or BEST_EFFORT.
 
     Attributes:
-        start: controllers to start.
-        stop: controllers to stop first; one that is in both is restarted.
-        resulting: infos of all controllers that run afterwards.
+        start: Controllers to start.
+        stop: Controllers to stop first; controllers in both tuples are restarted.
+        resulting: Infos of all controllers that run afterwards.
     """
 
     start: tuple[LoadedController, ...]
@@ -170,35 +174,35 @@ def plan_switch(
 ) -> SwitchPlan:
     """Applies the rules of STRICT and BEST_EFFORT to a request.
 
-    A controller that runs and is named in both lists is restarted. Named in both while it does not run, it cannot be
-    stopped, which STRICT refuses and BEST_EFFORT leaves out.
+    A running controller in both lists is restarted. A controller in both lists that is not running cannot be stopped;
+    STRICT refuses this item, and BEST_EFFORT skips it.
 
     Args:
-        loaded: all loaded controllers by name.
-        start: names to start.
-        stop: names to stop.
-        strictness: what to do with an item that cannot be done.
+        loaded: All loaded controllers by name.
+        start: Names of controllers to start.
+        stop: Names of controllers to stop.
+        strictness: Handling of impossible items.
 
     Raises:
-        ControllerError: STRICT, and an item cannot be done; all of them are listed.
+        ControllerError: The strictness is STRICT and items are impossible; the message lists all of them.
     """
     faults: list[str] = []
-    kept_stop: list[str] = []
-    kept_start: list[str] = []
+    accepted_stop: list[str] = []
+    accepted_start: list[str] = []
     for name in dict.fromkeys(stop):
         if name not in loaded:
-            faults.append(f"cannot stop '{name}': no controller of that name is loaded")
+            faults.append(f"cannot stop '{name}': it is not loaded")
         elif not loaded[name].running:
             faults.append(f"cannot stop '{name}': it is {loaded[name].state.value}, not running")
         else:
-            kept_stop.append(name)
+            accepted_stop.append(name)
     for name in dict.fromkeys(start):
         if name not in loaded:
-            faults.append(f"cannot start '{name}': no controller of that name is loaded")
-        elif loaded[name].running and name not in kept_stop:
+            faults.append(f"cannot start '{name}': it is not loaded")
+        elif loaded[name].running and name not in accepted_stop:
             faults.append(f"cannot start '{name}': it is already running")
         else:
-            kept_start.append(name)
+            accepted_start.append(name)
     if faults and strictness is Strictness.STRICT:
         names = ", ".join(sorted(loaded)) or "none"
         raise ControllerError(f"{'; '.join(faults)} (strictness STRICT; loaded controllers: {names})")
@@ -207,22 +211,24 @@ def plan_switch(
     resulting = tuple(
         entry.info
         for entry in loaded.values()
-        if entry.name in kept_start or (entry.running and entry.name not in kept_stop)
+        if entry.name in accepted_start or (entry.running and entry.name not in accepted_stop)
     )
-    return SwitchPlan(tuple(loaded[name] for name in kept_start), tuple(loaded[name] for name in kept_stop), resulting)
+    return SwitchPlan(
+        tuple(loaded[name] for name in accepted_start), tuple(loaded[name] for name in accepted_stop), resulting
+    )
 
 
 @dataclass(slots=True)
 class SwitchRequest:
-    """A planned switch that the control loop carries out.
+    """A planned switch for the control loop to execute.
 
     Attributes:
-        plan: what to do.
-        start_asap: start each controller as soon as the hardware is ready for it, not all together.
-        timeout_s: how long the hardware may take [s of the loop's time]; 0 for no bound.
-        cycles: how many the loop has spent on it.
-        done: set by the loop when nothing is left to do.
-        errors: what went wrong, filled by the loop before `done`.
+        plan: Controllers to stop and to start.
+        start_asap: Whether each controller starts as soon as the hardware is ready for it, instead of all together.
+        timeout_s: Maximum time for the hardware to get ready [s of loop time]; 0 for no limit.
+        cycles: Number of control cycles spent on the switch.
+        done: Event that the loop sets at the end of the switch.
+        errors: Errors, written by the loop before `done` is set.
     """
 
     plan: SwitchPlan
@@ -231,12 +237,12 @@ class SwitchRequest:
     cycles: int = 0
     done: threading.Event = field(default_factory=threading.Event)
     errors: list[str] = field(default_factory=list)
-    _begun_s: float | None = None
+    _start_s: float | None = None
     _waiting: list[LoadedController] = field(default_factory=list)
 
     @property
     def hardware_lists(self) -> tuple[list[ControllerInfo], list[ControllerInfo]]:
-        """Infos of what newly starts and what really stops; restarts do not concern the hardware."""
+        """Infos of the controllers that start and that stop, without restarted controllers."""
         start, stop = self.plan.start, self.plan.stop
         return (
             [entry.info for entry in start if entry not in stop],
@@ -244,29 +250,29 @@ class SwitchRequest:
         )
 
     def step(self, robot_hw: RobotHW, time_s: float) -> bool:
-        """One cycle of the switch, in the control loop; True when it is finished."""
+        """Executes one cycle of the switch in the control loop; returns whether the switch is finished."""
         self.cycles += 1
-        if self._begun_s is None:
+        if self._start_s is None:
             self._begin(robot_hw, time_s)
         if self.start_asap:
             for entry in list(self._waiting):
                 self._advance([entry], robot_hw.switch_result(entry.info), time_s)
         elif self._waiting:
             self._advance(list(self._waiting), robot_hw.switch_result(), time_s)
-        begun_s = time_s if self._begun_s is None else self._begun_s
-        if self._waiting and 0.0 < self.timeout_s < time_s - begun_s:
+        start_s = time_s if self._start_s is None else self._start_s
+        if self._waiting and 0.0 < self.timeout_s < time_s - start_s:
             names = ", ".join(entry.name for entry in self._waiting)
             self.errors.append(f"hardware was not ready within {self.timeout_s} s to start: {names}")
-            self.give_up(time_s)
+            self.abort_waiting(time_s)
         return not self._waiting
 
-    def give_up(self, time_s: float) -> None:
-        """Starts no more of the controllers that still wait."""
+    def abort_waiting(self, time_s: float) -> None:
+        """Aborts all waiting controllers."""
         while self._waiting:
             self._waiting.pop(0).abort(time_s)
 
     def _begin(self, robot_hw: RobotHW, time_s: float) -> None:
-        self._begun_s = time_s
+        self._start_s = time_s
         robot_hw.do_switch(*self.hardware_lists)
         for entry in self.plan.stop:
             if entry.running:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds controller classes under the names users write in controller files."""
+"""Controller classes by the type names in controller files."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ BUILT_IN_TYPES: dict[str, str] = {
 
 
 class ControllerTypes:
-    """Controller classes by type name: those registered, those built in, then those that packages offer.
+    """Controller classes by type name: registered classes, built-in classes, then plugins of packages.
 
     Args:
-        locations: type name -> "module:Class"; the built-in ones when not given.
-        plugins: classes that packages offer; those of the sourced workspace when not given.
+        locations: "module:Class" by type name; by default the built-in classes.
+        plugins: Plugins of packages; by default of the sourced workspace.
     """
 
     def __init__(self, locations: dict[str, str] | None = None, plugins: PluginIndex | None = None) -> None:
@@ -70,16 +70,16 @@ class ControllerTypes:
         return sorted({*self._locations, *self._factories, *self._plugins.names})
 
     def register(self, type_name: str, factory: Callable[[], Controller]) -> None:
-        """Makes a class known under `type_name` ("package/Class"); an earlier one of that name is replaced."""
+        """Registers a class under `type_name` ("package/Class"), replacing an earlier registration."""
         if "/" not in type_name:
             raise ControllerError(f"controller type '{type_name}': expected the form package/Class")
         self._factories[type_name] = factory
 
     def create(self, type_name: str) -> Controller:
-        """A new controller of that type.
+        """Returns a new controller of a type.
 
         Raises:
-            ControllerError: unknown type (the message lists the known ones), or its module cannot be imported.
+            ControllerError: The type is unknown, or its module cannot be imported.
         """
         if type_name in self._factories:
             return self._factories[type_name]()
@@ -112,5 +112,5 @@ class ControllerTypes:
         return controller
 
     def reload(self) -> None:
-        """Searches again for classes and modules, installed since the program started."""
+        """Searches again for plugins, to find packages installed since the program started."""
         self._plugins.reload()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the faults of the hardware in every cycle, and logs when they change."""
+"""Monitor of hardware faults that logs changes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from modular_framework_control.hardware_interface.robot_hw import HardwareFault,
 
 
 class FaultWatch:
-    """The faults of one hardware.
+    """Reads the faults of a robot's hardware in every cycle.
 
     Args:
-        robot_hw: the hardware.
+        robot_hw: Hardware to monitor.
 
     Attributes:
-        text: the faults of the last cycle in one text; "" if there were none.
+        text: Faults of the last cycle in one text, or "".
     """
 
     def __init__(self, robot_hw: RobotHW) -> None:
@@ -24,7 +24,7 @@ class FaultWatch:
         self.text = ""
 
     def faults(self, log: bool = True) -> Sequence[HardwareFault]:
-        """Returns the faults at the moment, with the joints they concern, and logs a change; never raises."""
+        """Returns the current faults with their joints, and logs changes; never raises."""
         try:
             faults = self._robot_hw.faults()
             if faults:  # user code may return values of any type
@@ -42,6 +42,6 @@ class FaultWatch:
 
     def _log_change(self, text: str) -> None:
         if text and text != self.text:
-            LOGGER.error("hardware fault: %s; controllers of its joints hold until it is over", text)
+            LOGGER.error("hardware fault: %s; controllers hold the affected joints until the fault ends", text)
         elif not text:
-            LOGGER.info("the hardware follows again (it did not for: %s)", self.text)
+            LOGGER.info("the hardware has recovered (from: %s)", self.text)

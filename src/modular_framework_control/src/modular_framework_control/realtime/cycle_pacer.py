@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps a control loop at its rate in real time, and counts how late its cycles begin and how long they take.
+"""Pacing of a control loop in real time, and statistics of its latency and cycle times.
 
-A system without real-time scheduling now and then takes the processor away for milliseconds: for work of its kernel
-that nothing may interrupt or, in a virtual machine, for other machines on the same host. A loop that sleeps there is
-woken only afterwards. The figures say how long that was, apart from the time that cycles themselves took too long.
+A system without real-time scheduling occasionally takes the processor away for milliseconds, for kernel work or, in a
+virtual machine, for other machines on the same host. A sleeping loop then wakes up late. The figures separate this
+latency from overruns of the cycles themselves.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from dataclasses import dataclass
 
 RESOLUTION_S = 5e-6
 NO_PROCESSOR_S = 1e-3
-"""A loop that wakes up later than this had no processor, or another thread held Python's interpreter [s]."""
+"""Wake-up latency from which the loop counts as without processor (or without Python's interpreter) [s]."""
 _BUCKETS = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class LoopFigures:
-    """How well a control loop keeps its rate, since the last reset.
+    """Timing figures of a control loop since the last reset.
 
     Attributes:
-        cycles: cycles that were run.
-        missed: cycles that were left out because an earlier one, or the system, took their time.
-        overruns: cycles whose work took longer than the period.
-        late_p50_s: half of the cycles began less late than this [s]; a multiple of RESOLUTION_S.
-        late_p99_s: 99 % did [s].
-        late_max_s: none began later [s].
-        work_mean_s: mean time of the work of a cycle [s].
-        work_max_s: longest work of a cycle [s].
-        no_processor_s: total time that the loop was due and had no processor [s].
-        no_processor_max_s: the longest such time [s].
+        cycles: Number of executed cycles.
+        missed: Number of skipped cycles.
+        overruns: Number of cycles with work longer than the period.
+        late_p50_s: Median delay of cycle starts, a multiple of RESOLUTION_S.
+        late_p99_s: 99th percentile of delays.
+        late_max_s: Maximum delay.
+        work_mean_s: Mean work time of a cycle.
+        work_max_s: Maximum work time of a cycle.
+        no_processor_s: Total time that the loop was due without a processor.
+        no_processor_max_s: Maximum time that the loop was due without a processor.
     """
 
     cycles: int
@@ -49,10 +49,10 @@ class LoopFigures:
 
 
 class LoopStatistics:
-    """Figures of a loop in memory of fixed size; written by the loop, read by any thread.
+    """Timing statistics in constant memory, written by the loop and read by any thread.
 
     Args:
-        period_s: how long a cycle may take [s].
+        period_s: Period of the loop.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -70,10 +70,10 @@ class LoopStatistics:
         """Counts one cycle.
 
         Args:
-            late_s: how much later than due it began [s].
-            missed: cycles left out before it.
-            work_s: how long its work took [s].
-            woken_late_s: how much later than asked the loop was woken for it; 0 where it did not sleep [s].
+            late_s: Delay of the cycle's start.
+            missed: Number of cycles skipped before this cycle.
+            work_s: Work time of the cycle.
+            woken_late_s: Wake-up latency; 0 if the loop did not sleep.
         """
         self._cycles += 1
         self._missed += missed
@@ -92,7 +92,7 @@ class LoopStatistics:
                 self._no_processor_max_s = woken_late_s
 
     def figures(self) -> LoopFigures:
-        """Returns the figures so far."""
+        """Returns the current figures."""
         mean_s = self._work_s / self._cycles if self._cycles else 0.0
         return LoopFigures(
             self._cycles,
@@ -107,27 +107,25 @@ class LoopStatistics:
             self._no_processor_max_s,
         )
 
-    def _percentile(self, share: float) -> float:
-        counted, wanted = 0, share * sum(self._late)
+    def _percentile(self, fraction: float) -> float:
+        cumulative, target = 0, fraction * sum(self._late)
         for bucket, count in enumerate(self._late):
-            counted += count
-            if counted >= wanted:
+            cumulative += count
+            if cumulative >= target:
                 return min((bucket + 1) * RESOLUTION_S, self._late_max_s) if bucket < _BUCKETS else self._late_max_s
         return 0.0
 
 
 class CyclePacer:
-    """Runs cycles at fixed times: after a cycle that took longer, the loop sleeps less.
-
-    One that is overdue by a period or more is left out.
+    """Runs cycles at fixed times; after a long cycle the loop sleeps less, and overdue cycles are skipped.
 
     Args:
-        period_s: time between two cycles [s].
-        clock: real time that never jumps [s].
-        sleep: waits for some time [s].
+        period_s: Period of the cycles.
+        clock: Monotonic clock [s].
+        sleep: Function that waits for a time [s].
 
     Attributes:
-        woken_late_s: how much later than asked the loop was woken for the present cycle, 0 where it did not sleep [s].
+        woken_late_s: Wake-up latency of the current cycle; 0 if the loop did not sleep.
     """
 
     def __init__(
@@ -139,19 +137,19 @@ class CyclePacer:
         self._sleep = sleep
 
     def run(self, cycle: Callable[[float, int], bool]) -> None:
-        """Runs cycles until one returns False; the first one begins at once.
+        """Runs cycles until a cycle returns False; the first cycle starts at once.
 
         Args:
-            cycle: gets how late it begins [s] and how many were left out before it. A thread started in it inherits
-                the priority of the loop.
+            cycle: Function called with the delay of its start [s] and the number of skipped cycles. Threads started in
+                a cycle inherit the priority of the loop.
         """
-        due_s, goes_on = self._clock(), True
-        while goes_on:
-            left_s = due_s - self._clock()
-            if left_s > 0.0:
-                self._sleep(left_s)
+        due_s, continues = self._clock(), True
+        while continues:
+            remaining_s = due_s - self._clock()
+            if remaining_s > 0.0:
+                self._sleep(remaining_s)
             late_s = self._clock() - due_s
-            self.woken_late_s = late_s if left_s > 0.0 else 0.0
+            self.woken_late_s = late_s if remaining_s > 0.0 else 0.0
             missed = int(late_s / self._period_s) if late_s > 0.0 else 0
             due_s += (1 + missed) * self._period_s
-            goes_on = cycle(late_s, missed)
+            continues = cycle(late_s, missed)

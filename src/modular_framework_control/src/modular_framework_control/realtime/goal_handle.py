@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The state of one goal inside a controller, shared with the action server that received it.
+"""The state of one goal inside a controller, shared with the action server that received the goal.
 
-The control loop changes a goal handle and calls its listener, which must not block: the ROS interface of a controller
-only puts the new status into a queue that another thread processes.
+The control loop changes a goal handle and calls its listener, which must not block. A controller's ROS interface only
+queues the new status for another thread.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ ResultT = TypeVar("ResultT")
 
 
 class GoalStatus(Enum):
-    """Status of a goal; the last four are final."""
+    """Status of a goal; the last four values are final."""
 
     PENDING = "pending"
     ACTIVE = "active"
@@ -29,12 +29,12 @@ class RealtimeGoalHandle(Generic[ResultT]):
     """State and result of one goal.
 
     Args:
-        listener: called in the control loop with this goal handle.
+        listener: Function called in the control loop with this goal handle after each change.
 
     Attributes:
-        status: of the goal.
-        result: set together with a final status.
-        text: why the goal ended, for people.
+        status: Status of the goal.
+        result: Result, set together with a final status.
+        text: Reason for the end of the goal, for users.
     """
 
     __slots__ = ("status", "result", "text", "_listener")
@@ -56,7 +56,13 @@ class RealtimeGoalHandle(Generic[ResultT]):
         self._notify()
 
     def finish(self, status: GoalStatus, result: ResultT, text: str = "") -> None:
-        """Ends the goal; a second call has no effect."""
+        """Ends the goal; later calls have no effect.
+
+        Args:
+            status: Final status.
+            result: Result of the goal.
+            text: Reason, for users.
+        """
         if not self.open:
             return
         self.status, self.result, self.text = status, result, text

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Goals and cancellations for the control loop, from threads that it must not wait for.
+"""Lock-free mailbox for goals and cancellations from other threads to the control loop.
 
-Any thread may put an item in; the loop drains the mailbox once per cycle, and so does whoever stops a controller. There
-is no lock, because the loop would have to wait while the thread that holds it is not running. Appending to a deque and
-taking from it are atomic.
+Any thread may put an item. The loop drains the mailbox once per cycle, and a thread that stops a controller drains it
+too. A lock could make the loop wait for a suspended thread; appending to and popping from a deque are atomic.
 """
 
 from __future__ import annotations
@@ -16,29 +15,29 @@ ItemT = TypeVar("ItemT")
 
 
 class Mailbox(Generic[ItemT]):
-    """Items in the sequence in which they were put in; each is taken out once, by whichever thread drains first."""
+    """A FIFO queue; each item is taken once, by the thread that drains first."""
 
     def __init__(self) -> None:
         self._items: deque[ItemT] = deque()
 
     def put(self, item: ItemT) -> None:
-        """Appends an item; returns at once."""
+        """Appends an item without waiting."""
         self._items.append(item)
 
     def drain(self) -> Iterator[ItemT]:
-        """Takes items out until none is left, including those put in meanwhile."""
+        """Yields items until the mailbox is empty, including items put meanwhile."""
         while True:
             try:
                 item = self._items.popleft()
-            except IndexError:  # to check first is not enough: two threads may drain it
+            except IndexError:  # a check would not be enough, because two threads may drain the mailbox
                 return
             yield item
 
     def process(self, handle: Callable[[ItemT], None]) -> None:
-        """Takes items out and calls `handle` with each; one on which it raises is put back as the first.
+        """Calls `handle` with each item; an item for which `handle` raises is put back as the first item.
 
         Raises:
-            Exception: what `handle` raised.
+            Exception: Error of `handle`.
         """
         for item in self.drain():
             try:

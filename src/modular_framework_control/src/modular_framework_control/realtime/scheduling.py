@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Asks the operating system to let the control loop run on time, where it permits that.
+"""Real-time scheduling of the control loop, as far as the operating system permits.
 
-The jitter that Python itself causes is reduced too: another thread releases the interpreter to the loop after a
-fraction of a cycle, and the loop keeps the interpreter during its cycle. The garbage collector ignores all objects that
-exist when the loop begins, or that it has seen twice.
+Jitter from Python itself is reduced too: other threads release the interpreter after a fraction of a cycle, and the
+loop keeps the interpreter during its cycle. The garbage collector ignores all objects that exist when the loop starts
+or that survive two collections.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from collections.abc import Iterator
 
 PRIORITY = 80
 OTHERS_BELOW = 10
-"""By how much the priority of the other threads of a process is lower than that of the loop."""
+"""Priority difference between the loop and the other threads of its process."""
 _SWITCH_INTERVAL_S = 2e-4
 _CYCLE_SWITCH_INTERVAL_S = 2e-3  # longer than the work of a cycle
 _NO_FULL_COLLECTIONS = 2**31 - 1
@@ -28,7 +28,7 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
 
 def prepare_interpreter() -> None:
-    """Keeps other threads and the garbage collector from delaying the loop; call it after set-up."""
+    """Reduces delays by other threads and the garbage collector; call after set-up."""
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     gc.collect()
     gc.freeze()
@@ -37,10 +37,10 @@ def prepare_interpreter() -> None:
 
 @contextlib.contextmanager
 def keeping_the_interpreter() -> Iterator[None]:
-    """Lets the calling thread keep the interpreter during a cycle, unless it waits for something itself.
+    """Lets the calling thread keep the interpreter during a cycle, unless the thread waits.
 
-    A thread that comes to wait for the interpreter asks for it only after the switch interval at that time. Without
-    this a cycle beside a busy thread hands the interpreter to and fro many times.
+    A waiting thread requests the interpreter after the current switch interval. Without this context, a cycle beside a
+    busy thread would switch the interpreter many times.
     """
     sys.setswitchinterval(_CYCLE_SWITCH_INTERVAL_S)
     try:
@@ -50,24 +50,24 @@ def keeping_the_interpreter() -> Iterator[None]:
 
 
 def run_in_real_time(priority: int = PRIORITY) -> list[str]:
-    """Gives this process real-time priority, the calling thread the highest (SCHED_FIFO), and locks its memory in RAM.
+    """Gives this process real-time priority (SCHED_FIFO), highest for the calling thread, and locks its memory in RAM.
 
-    The other threads get a real-time priority too, because the loop waits while one of them holds Python's interpreter:
-    a process that takes the processor from that thread would delay the loop.
+    Other threads get a real-time priority too, because the loop must wait for a thread that holds Python's interpreter,
+    and other processes could preempt this thread.
 
     Args:
-        priority: of the calling thread, above OTHERS_BELOW and up to 99; a process that serves the control loop takes
-            less than the loop's other threads have.
+        priority: Priority of the calling thread, above OTHERS_BELOW and up to 99; a process that serves the control
+            loop uses a lower priority than the loop's other threads.
 
     Returns:
-        What was not permitted and why; nothing when all was.
+        Refused requests with reasons; empty if all were permitted.
     """
     refused = []
     caller = threading.get_native_id()
     try:
         os.sched_setscheduler(caller, os.SCHED_FIFO, os.sched_param(priority))
         for thread in set(map(int, os.listdir("/proc/self/task"))) - {caller}:
-            with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
+            with contextlib.suppress(ProcessLookupError):  # the thread has ended
                 os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority - OTHERS_BELOW))
     except OSError as error:
         refused.append(
@@ -84,23 +84,23 @@ def run_in_real_time(priority: int = PRIORITY) -> list[str]:
 
 
 def leave_real_time() -> None:
-    """Gives all threads of this process ordinary scheduling, once nothing moves: to end takes much processor time."""
+    """Returns all threads of this process to ordinary scheduling; call at rest, because shutdown needs much time."""
     for thread in map(int, os.listdir("/proc/self/task")):
-        with contextlib.suppress(OSError):  # it has ended meanwhile
+        with contextlib.suppress(OSError):  # the thread has ended
             os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
 
 
 def keep_processors_awake(latency_device: str = LATENCY_DEVICE) -> list[str]:
-    """Keeps idle processors from sleep states that take long to leave, while this process lives (it costs power).
+    """Prevents deep sleep states of idle processors for the lifetime of this process, which costs power.
 
     Args:
-        latency_device: the kernel's device for such requests.
+        latency_device: The kernel's device for latency requests.
 
     Returns:
-        What was not permitted and why; nothing when all was.
+        Refused requests with reasons; empty if all were permitted.
     """
     try:
-        device = os.open(latency_device, os.O_WRONLY | os.O_CLOEXEC)  # the request holds as long as it is open
+        device = os.open(latency_device, os.O_WRONLY | os.O_CLOEXEC)  # the request is active while the device is open
         os.write(device, (0).to_bytes(4, sys.byteorder))
     except OSError as error:
         return [
@@ -111,7 +111,7 @@ def keep_processors_awake(latency_device: str = LATENCY_DEVICE) -> list[str]:
 
 
 def _lock_memory() -> str:
-    """Keeps the memory in use, now and later, in RAM; returns why that is not permitted, or ""."""
+    """Locks current and future memory in RAM; returns the reason of a refusal, or ""."""
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
         return f"at most {limit // 1024} kB may be locked"

@@ -72,7 +72,7 @@ class RobotHwNode:
             "~rate", "~real_time", "~ready_timeout", "~type"
         )
         self._period_s = 1.0 / rate_hz
-        self._loop_time.longest_step_s = max(HELD_UP_S, 2.0 * self._period_s)
+        self._loop_time.max_step_s = max(HELD_UP_S, 2.0 * self._period_s)
         listed = self._root_nh.has_param("robot_hardware") and not self._nh.has_param("type")
         self._hw_nh = self._root_nh if listed else self._nh
         type_name = COMBINED_TYPE if listed else type_name
