@@ -196,7 +196,7 @@ def test_two_controllers_may_not_command_one_joint_through_two_parts() -> None:
         ),
         (
             {"robot_hardware": ["a", "b"], "a": {"type": MOCK, "joints": ["x"]}, "b": {"type": MOCK, "joints": ["x"]}},
-            ["joint 'x' is in hardware 'a' and in 'b'; only one of them may command it"],
+            ["joint 'x' is in hardware 'a' and in 'b'; only one part may command it"],
         ),
     ],
 )

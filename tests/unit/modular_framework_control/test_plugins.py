@@ -113,7 +113,7 @@ def test_a_module_that_was_changed_is_imported_anew_after_a_reload(
         (
             "NoArm",
             "lab_arms_hw",
-            "is no RobotHW; derive it from modular_framework_control.hardware_interface.robot_hw.RobotHW",
+            "is not a RobotHW; derive it from modular_framework_control.hardware_interface.robot_hw.RobotHW",
         ),
     ],
 )

@@ -208,8 +208,8 @@ TWICE = "transmission_interface/SimpleTransmission has 1"
             r":3: transmission 't': <type> is 'transmission_interface/WormDrive'; "
             r"allowed: .*FourBarLinkageTransmission",
         ),
-        (simple().replace("<type>transmission_interface/SimpleTransmission</type>", ""), "it has no <type>; allowed"),
-        (simple().replace("<joint", "<joint name='x'/><joint", 1), f"it has 2 <joint>; {TWICE}"),
+        (simple().replace("<type>transmission_interface/SimpleTransmission</type>", ""), "<type> is missing; allowed"),
+        (simple().replace("<joint", "<joint name='x'/><joint", 1), f"got 2 <joint>; {TWICE}"),
         (simple().replace('<actuator name="m"', "<actuator"), r":8: transmission 't': <actuator> has no name"),
         (
             simple().replace("50", "fifty"),
@@ -224,8 +224,8 @@ TWICE = "transmission_interface/SimpleTransmission has 1"
         (simple().replace("0.5", "zero"), r":6: .*<offset> of joint 'j' is 'zero'; expected a number$"),
         (simple(interface="lab/Tea"), r":6: .*<hardwareInterface> of joint 'j' is 'lab/Tea'; allowed: .*Velocity"),
         (simple().replace(f"<hardwareInterface>{POSITION}</hardwareInterface>", ""), "is missing; give one of"),
-        (simple() + simple("u", "j", "n"), r":9: transmission 'u': joint 'j' is named by another transmission too"),
-        (simple() + simple("t", "k", "m"), "transmission 't' is named by another.*actuator 'm' is named by another"),
+        (simple() + simple("u", "j", "n"), r":9: transmission 'u': joint 'j' is also named by another transmission"),
+        (simple() + simple("t", "k", "m"), "transmission 't' is also named.*actuator 'm' is also named"),
         (
             pair("DifferentialTransmission", ("joint1", "joint1", "actuator1", "actuator2")),
             r"the roles of its <joint> are 'joint1', 'joint1'; "
@@ -340,9 +340,9 @@ def test_each_interface_of_a_joint_has_its_command_of_the_actuator() -> None:
         (
             ["m1"],
             robot(pair("DifferentialTransmission")),
-            r":3: transmission 'wrist': actuator 'm2' is not there; this hardware has: m1",
+            r":3: transmission 'wrist': unknown actuator 'm2'; this hardware has: m1",
         ),
-        (["m", "spare"], robot(simple()), "actuator 'spare' has no <transmission>; actuators that have one: m$"),
+        (["m", "spare"], robot(simple()), "actuator 'spare' has no <transmission>; actuators with a transmission: m$"),
         (["m"], None, "robot_description is not set"),
     ],
 )

@@ -368,7 +368,7 @@ def test_motions_of_different_joints_run_at_the_same_time_and_those_of_the_same_
         time.sleep(0.01)
     execution.execute(motion("wheel", (0.0, [0.3]), (1.0, [0.5])), threading.Event())
     assert [part.controller.name for part in controllers.sent] == [ARM.name, WHEEL.name]
-    with pytest.raises(PlanningError, match="another motion of .*elbow.* is under way"):
+    with pytest.raises(PlanningError, match="another motion of .*elbow.* is running"):
         execution.execute(moving, threading.Event())
     execution.close()
     first.join(5.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The interface of robots to controllers: `RobotHW`, handles, interfaces, limits and transmissions."""
+"""The interface between robots and controllers: `RobotHW`, handles, interfaces, limits and transmissions."""
 
 from modular_framework_control.hardware_interface.handles import (
     ActuatorHandle,

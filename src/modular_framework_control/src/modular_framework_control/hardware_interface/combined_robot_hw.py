@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Several pieces of hardware that controllers see as one robot: an arm and its gripper, two arms, ..."""
+"""Several hardware parts, such as an arm and a gripper, combined into one robot for controllers."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class HardwarePart:
     """One entry of `robot_hardware`.
 
     Attributes:
-        name: its name in the list, which is also the namespace of its parameters.
-        hardware: the instance of the class that its `type` names.
-        resources: its joints by the type name of the interface.
+        name: Name in the list, and namespace of the part's parameters.
+        hardware: Hardware of the class in the parameter `type`.
+        resources: Joints by type name of the interface.
     """
 
     name: str
@@ -38,8 +38,8 @@ class HardwarePart:
     resources: dict[str, frozenset[str]]
 
     def concerned(self, controllers: Iterable[ControllerInfo]) -> list[ControllerInfo]:
-        """The controllers that claim something of this hardware, with those claims only."""
-        kept: list[ControllerInfo] = []
+        """Returns the controllers with claims on this part, reduced to these claims."""
+        result: list[ControllerInfo] = []
         for controller in controllers:
             claims = [
                 InterfaceResources(
@@ -48,36 +48,36 @@ class HardwarePart:
                 )
                 for claim in controller.claimed_resources
             ]
-            mine = tuple(claim for claim in claims if claim.resources)
-            if mine:
-                kept.append(ControllerInfo(controller.name, controller.type, mine))
-        return kept
+            own_claims = tuple(claim for claim in claims if claim.resources)
+            if own_claims:
+                result.append(ControllerInfo(controller.name, controller.type, own_claims))
+        return result
 
 
 class CombinedRobotHW(RobotHW):
-    """Several pieces of hardware as one robot.
+    """Several hardware parts as one robot.
 
     Parameters, in the namespace given to `init`: `robot_hardware`, a list of names; for each name a namespace with
-    `type` (package/Class, see plugins.py) and whatever that hardware reads.
+    `type` (package/Class, see plugins.py) and the parameters of this part.
 
-    The interfaces of all parts are combined class by class. A joint may be in different interfaces of different parts;
-    two parts may not command it through the same interface. If two parts measure it, the state of the later one in the
-    list is used, with a warning. Each part decides about the claims on its own joints only; of a joint that several
-    parts command, one controller may claim one interface.
+    The interfaces of all parts are combined by class. A joint may be in different interfaces of different parts, but
+    two parts must not command it through the same interface. If two parts measure a joint, the state of the later part
+    is used, with a warning. Each part decides on claims on its own joints; if several parts command a joint, one
+    controller may claim it through one interface.
 
     Args:
-        make: makes hardware of a type name; by default from the plugins of the workspace.
+        make: Function that creates hardware of a type name; by default from the plugins of the workspace.
     """
 
     def __init__(self, make: Callable[[str], RobotHW] | None = None) -> None:
         super().__init__()
         self._make = make if make is not None else robot_hw_of_type
         self._parts: list[HardwarePart] = []
-        self._raised: dict[tuple[str, str], str] = {}
+        self._raised_errors: dict[tuple[str, str], str] = {}
 
     @property
     def parts(self) -> tuple[HardwarePart, ...]:
-        """The hardware in the order of the list."""
+        """The parts, in the order of the list."""
         return tuple(self._parts)
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
@@ -96,7 +96,7 @@ class CombinedRobotHW(RobotHW):
         for part in reversed(self._parts):
             try:
                 part.hardware.close()
-            except Exception as error:  # a user's hardware may raise anything; the others must be closed all the same
+            except Exception as error:  # a user's hardware may raise anything; the other parts must still be closed
                 LOGGER.exception("hardware '%s': close() raised %s: %s", part.name, type(error).__name__, error)
 
     @property
@@ -110,16 +110,17 @@ class CombinedRobotHW(RobotHW):
         return "; ".join(fault.reason for fault in self.faults())
 
     def faults(self) -> Sequence[HardwareFault]:
-        if self._raised:
+        if self._raised_errors:
             return [*self._raised_faults(), *self._reported_faults()]
         return self._reported_faults()
 
     def _raised_faults(self) -> Iterator[HardwareFault]:
         for part in self._parts:
             for what in ("read", "write"):
-                if (part.name, what) in self._raised:
+                if (part.name, what) in self._raised_errors:
                     yield HardwareFault(
-                        f"hardware '{part.name}': {self._raised[part.name, what]}", part.hardware.commanded_joints
+                        f"hardware '{part.name}': {self._raised_errors[part.name, what]}",
+                        part.hardware.commanded_joints,
                     )
 
     def _reported_faults(self) -> list[HardwareFault]:
@@ -130,22 +131,22 @@ class CombinedRobotHW(RobotHW):
         ]
 
     def _make_part(self, name: str, root_nh: NodeHandle, part_nh: NodeHandle) -> HardwarePart:
-        where = f"entry '{name}' of robot_hardware"
+        location = f"entry '{name}' of robot_hardware"
         type_name = part_nh.get_param("type")
         if not isinstance(type_name, str) or not type_name:
             raise ParameterError(
-                f"{where}: parameter {join_names(part_nh.namespace, 'type')} is {type_name!r}; "
+                f"{location}: parameter {join_names(part_nh.namespace, 'type')} is {type_name!r}; "
                 "expected the name of a hardware class, package/Class"
             )
         try:
             hardware = self._make(type_name)
             initialised = hardware.init(root_nh, part_nh)
         except PluginError as error:
-            raise ParameterError(f"{where}: type '{type_name}': {error}") from error
+            raise ParameterError(f"{location}: type '{type_name}': {error}") from error
         except Exception as error:  # a user's hardware may raise anything
-            raise ParameterError(f"{where}: type '{type_name}' raised {type(error).__name__}: {error}") from error
+            raise ParameterError(f"{location}: type '{type_name}' raised {type(error).__name__}: {error}") from error
         if initialised is not True:
-            raise ParameterError(f"{where}: type '{type_name}' did not initialise; its own message above says why")
+            raise ParameterError(f"{location}: type '{type_name}' did not initialise; see its own message above")
         resources = {interface.type_name: frozenset(interface.names) for interface in hardware.interfaces}
         return HardwarePart(name, hardware, resources)
 
@@ -171,23 +172,23 @@ class CombinedRobotHW(RobotHW):
     def _cycle(
         self, part: HardwarePart, what: str, step: Callable[[float, float], None], time_s: float, period_s: float
     ) -> None:
-        """Reads or writes one part; an exception is a fault of this part until the same step succeeds again."""
+        """Reads or writes one part; an exception is a fault of this part until the same step succeeds."""
         try:
             step(time_s, period_s)
-        except Exception as error:  # a user's hardware may raise anything; the others must go on
-            self._raised[part.name, what] = f"{what}() raised {type(error).__name__}: {error}"
+        except Exception as error:  # a user's hardware may raise anything; the other parts must continue
+            self._raised_errors[part.name, what] = f"{what}() raised {type(error).__name__}: {error}"
         else:
-            if self._raised:
-                self._raised.pop((part.name, what), None)
+            if self._raised_errors:
+                self._raised_errors.pop((part.name, what), None)
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
-        everything = list(controllers)
-        answers = ((part.name, part.hardware.check_for_conflict(part.concerned(everything))) for part in self._parts)
-        within = "; ".join(f"{name}: {answer}" for name, answer in answers if answer)
-        return within or super().check_for_conflict(self._claims_on_shared_joints(everything))
+        infos = list(controllers)
+        conflicts = ((part.name, part.hardware.check_for_conflict(part.concerned(infos))) for part in self._parts)
+        within_parts = "; ".join(f"{name}: {conflict}" for name, conflict in conflicts if conflict)
+        return within_parts or super().check_for_conflict(self._claims_on_shared_joints(infos))
 
     def _claims_on_shared_joints(self, controllers: Iterable[ControllerInfo]) -> Iterator[ControllerInfo]:
-        """The controllers with their claims on joints that several parts command; a part sees only its own claims."""
+        """Yields the controllers with their claims on joints that several parts command, which no part checks."""
         commanded = Counter(name for part in self._parts for name in part.hardware.commanded_joints)
         for controller in controllers:
             yield ControllerInfo(
@@ -200,27 +201,27 @@ class CombinedRobotHW(RobotHW):
             )
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
-        for part, mine in self._concerned_by(start, stop):
-            if part.hardware.prepare_switch(*mine) is not True:
+        for part, claims_of_part in self._concerned_by(start, stop):
+            if part.hardware.prepare_switch(*claims_of_part) is not True:
                 LOGGER.error(
                     "hardware '%s' refused to prepare a switch (start: %s; stop: %s)",
                     part.name,
-                    *(", ".join(controller.name for controller in side) or "none" for side in mine),
+                    *(", ".join(controller.name for controller in side) or "none" for side in claims_of_part),
                 )
                 return False
         return True
 
     def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
-        for part, mine in self._concerned_by(start, stop):
-            part.hardware.do_switch(*mine)
+        for part, claims_of_part in self._concerned_by(start, stop):
+            part.hardware.do_switch(*claims_of_part)
 
     def _concerned_by(
         self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]
     ) -> Iterator[tuple[HardwarePart, tuple[list[ControllerInfo], list[ControllerInfo]]]]:
         for part in self._parts:
-            mine = part.concerned(start), part.concerned(stop)
-            if any(mine):
-                yield part, mine
+            claims_of_part = part.concerned(start), part.concerned(stop)
+            if any(claims_of_part):
+                yield part, claims_of_part
 
     def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
         results: set[SwitchState] = set()
@@ -228,7 +229,9 @@ class CombinedRobotHW(RobotHW):
             if controller is None:
                 results.add(part.hardware.switch_result())
             else:
-                results.update(part.hardware.switch_result(mine) for mine in part.concerned([controller]))
+                results.update(
+                    part.hardware.switch_result(claims_of_part) for claims_of_part in part.concerned([controller])
+                )
         for state in (SwitchState.ERROR, SwitchState.ONGOING):
             if state in results:
                 return state
@@ -238,19 +241,19 @@ class CombinedRobotHW(RobotHW):
 def _combined(
     interface_class: type[HardwareInterface[Any]], offers: Sequence[tuple[HardwarePart, HardwareInterface[Any]]]
 ) -> HardwareInterface[Any]:
-    """One interface with the handles of several parts."""
+    """Returns one interface with the handles of several parts."""
     handles: dict[str, Any] = {}
     owners: dict[str, str] = {}
     for part, interface in offers:
         for handle in interface.handles:
             if handle.name in owners:
-                both = (
+                conflict = (
                     f"{interface_class.type_name}: joint '{handle.name}' is in hardware '{owners[handle.name]}' "
                     f"and in '{part.name}'"
                 )
                 if interface_class.claims_resources:
-                    raise HardwareInterfaceError(f"robot_hardware: {both}; only one of them may command it")
-                LOGGER.warning("%s; the latter is used", both)
+                    raise HardwareInterfaceError(f"robot_hardware: {conflict}; only one part may command it")
+                LOGGER.warning("%s; the latter is used", conflict)
             owners[handle.name] = part.name
             handles[handle.name] = handle
     combined = interface_class()
@@ -260,10 +263,10 @@ def _combined(
 
 
 def robot_hw_of_type(type_name: str, index: PluginIndex | None = None) -> RobotHW:
-    """New hardware of a class that a package offers, not yet initialised.
+    """Returns new, uninitialized hardware of a plugin class.
 
     Raises:
-        PluginError: no such class, or it cannot be loaded; says what is known.
+        PluginError: The class is unknown or cannot be loaded.
     """
     hardware: RobotHW = (index or PluginIndex(ROBOT_HW_BASE)).load(type_name, RobotHW)()
     return hardware

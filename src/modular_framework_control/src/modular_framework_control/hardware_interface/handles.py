@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Handles: plain objects that hardware and controllers share, one per joint, sensor or speed scaling.
+"""Handles, the plain objects that hardware and controllers share, one per joint, sensor or speed scaling.
 
-The `RobotHW` makes each handle once and keeps it; reading and writing it is reading and writing attributes.
+The `RobotHW` creates each handle once; hardware and controllers then read and write its attributes.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ Vector = tuple[float, float, float]
 
 
 class JointStateHandle:
-    """Measured state of one joint; the `RobotHW` writes it in `read()`, all others only read it.
+    """Measured state of one joint, written only by `RobotHW.read()`.
 
     Attributes:
-        name: joint name as in the robot description.
-        position: [rad] or [m]; not a number until it is measured.
-        velocity: [rad/s] or [m/s].
-        effort: [Nm] or [N].
-        stale: whether these values are older than a few cycles of the device; controllers judge no goal by them.
+        name: Joint name as in the robot description.
+        position: Position [rad|m]; NaN until measured.
+        velocity: Velocity [rad/s|m/s].
+        effort: Effort [Nm|N].
+        stale: Whether these values are older than a few device cycles; controllers then do not evaluate goals.
     """
 
     __slots__ = ("name", "position", "velocity", "effort", "stale")
@@ -39,17 +39,17 @@ class JointStateHandle:
 
 
 class JointHandle:
-    """A joint that can be commanded: the measured state seen through `state`, and one command beside it.
+    """A joint that can be commanded, with its measured state and one command.
 
     Attributes:
-        state: the handle registered with the JointStateInterface (shared, not copied).
-        command: in the unit of the interface: position [rad|m], velocity [rad/s|m/s] or effort [Nm|N]; not a number
-            until the control loop or a controller commands something (`RobotHW.seed_commands`).
-        max_effort: upper bound of the effort used to follow the command [Nm|N]; 0 means the hardware's default.
-            Only hardware with `supports_max_effort` uses it.
-        supports_max_effort: set by the RobotHW when it can bound the effort of this joint.
-        limits: enforced for this joint, set by the limiter; None: none are enforced.
-        held: set by `hold`; the limiter continues from that command, and clears it.
+        state: Handle in the JointStateInterface (shared, not copied).
+        command: Position [rad|m], velocity [rad/s|m/s] or effort [Nm|N], depending on the interface; NaN until the
+            control loop (`RobotHW.seed_commands`) or a controller sets a command.
+        max_effort: Maximum effort for following the command [Nm|N], 0 for the hardware's default; only used by hardware
+            with `supports_max_effort`.
+        supports_max_effort: Whether the hardware can bound the effort of this joint.
+        limits: Limits that the limiter enforces; None if no limits are enforced.
+        held: Flag set by `hold`; the limiter continues from the held command and clears the flag.
     """
 
     __slots__ = ("state", "command", "max_effort", "supports_max_effort", "limits", "held")
@@ -79,11 +79,11 @@ class JointHandle:
         return self.state.effort
 
     def hold(self, position: float) -> None:
-        """Commands a position-controlled joint to stop at its present position, whatever the last command was.
+        """Commands a position-controlled joint to stop at its current position, regardless of the last command.
 
         Args:
-            position: the measured one [rad|m]; of a continuous joint, in the turn of its last command. If it is not a
-                number, the last command stays.
+            position: Measured position [rad|m]; for a continuous joint, within the revolution of its last command. If
+                the position is not a number, the last command stays.
         """
         if math.isfinite(position):
             self.command = position
@@ -94,20 +94,20 @@ class JointHandle:
 
 
 def unmeasured(handles: Iterable[JointHandle]) -> str:
-    """Names the joints whose measured position is not a finite number; "" if there are none."""
+    """Returns a description of joints whose measured positions are not finite, or ""."""
     faults = [
         f"joint '{handle.name}' is measured at {handle.position}"
         for handle in handles
         if not math.isfinite(handle.position)
     ]
-    return f"{', '.join(faults)}; expected a position: see why the hardware reads none" if faults else ""
+    return f"{', '.join(faults)}; expected a position: check the hardware's measurements" if faults else ""
 
 
 class PosVelJointHandle(JointHandle):
-    """A joint that takes a position with the velocity there.
+    """A joint that takes a position with a velocity.
 
     Attributes:
-        command_velocity: [rad/s|m/s], beside the position in `command`.
+        command_velocity: Commanded velocity at the position in `command` [rad/s|m/s].
     """
 
     __slots__ = ("command_velocity",)
@@ -118,10 +118,10 @@ class PosVelJointHandle(JointHandle):
 
 
 class PosVelAccJointHandle(PosVelJointHandle):
-    """A joint that takes a position with the velocity and the acceleration there.
+    """A joint that takes a position with a velocity and an acceleration.
 
     Attributes:
-        command_acceleration: [rad/s^2|m/s^2].
+        command_acceleration: Commanded acceleration at the position in `command` [rad/s^2|m/s^2].
     """
 
     __slots__ = ("command_acceleration",)
@@ -132,16 +132,19 @@ class PosVelAccJointHandle(PosVelJointHandle):
 
 
 class ActuatorHandle:
-    """One actuator, beyond the transmission that moves a joint; see `RobotTransmissions`.
+    """One actuator of a transmission, see `RobotTransmissions`.
+
+    `RobotHW.read()` writes the measured values. Commands are computed from the joints' commands, and are NaN without
+    command.
 
     Attributes:
-        name: as in the <transmission> of the robot description.
-        position: measured [rad] or [m]; the `RobotHW` writes it in `read()`, as velocity and effort.
-        velocity: measured [rad/s] or [m/s].
-        effort: measured [Nm] or [N].
-        command_position: computed from the position commands of the joints [rad] or [m]; NaN while there is none.
-        command_velocity: likewise of velocity commands [rad/s] or [m/s].
-        command_effort: likewise of effort commands [Nm] or [N].
+        name: Name as in the <transmission> of the robot description.
+        position: Measured position [rad|m].
+        velocity: Measured velocity [rad/s|m/s].
+        effort: Measured effort [Nm|N].
+        command_position: Commanded position [rad|m].
+        command_velocity: Commanded velocity [rad/s|m/s].
+        command_effort: Commanded effort [Nm|N].
     """
 
     __slots__ = ("name", "position", "velocity", "effort", "command_position", "command_velocity", "command_effort")
@@ -156,12 +159,12 @@ class ActuatorHandle:
 
 
 class SpeedScalingHandle:
-    """Speed scaling of a robot: the value of its speed slider, 0 while it is paused or stopped.
+    """Speed scaling of a robot, the value of its speed slider and 0 while the robot is paused or stopped.
 
     Attributes:
-        name: of the handle, "speed_scaling_factor" for one robot.
-        joints: the joints it is about.
-        factor: share of the planned speed, 0 to 1; the `RobotHW` writes it in `read()`.
+        name: Name of the handle, "speed_scaling_factor" for a single robot.
+        joints: Scaled joints.
+        factor: Fraction of the planned speed, 0 to 1, written by `RobotHW.read()`.
     """
 
     __slots__ = ("name", "joints", "factor")
@@ -176,10 +179,10 @@ class ForceTorqueSensorHandle:
     """Measurement of a force-torque sensor.
 
     Attributes:
-        name: of the sensor; it is also the name of its topic.
-        frame_id: frame in which force and torque are given.
-        force: x, y, z [N]; the `RobotHW` assigns a new array in `read()`, so that readers never see a mix.
-        torque: x, y, z [Nm]; likewise.
+        name: Name of the sensor and of its topic.
+        frame_id: Frame of force and torque.
+        force: Force x, y, z [N]; `RobotHW.read()` assigns a new tuple, so that readers never see mixed values.
+        torque: Torque x, y, z [Nm], assigned likewise.
     """
 
     __slots__ = ("name", "frame_id", "force", "torque")
@@ -195,13 +198,13 @@ class ImuSensorHandle:
     """Measurement of an inertial measurement unit.
 
     Attributes:
-        name: of the sensor; it is also the name of its topic.
-        frame_id: frame in which everything is given.
-        orientation: quaternion xyzw.
-        angular_velocity: x, y, z [rad/s].
-        linear_acceleration: x, y, z [m/s^2].
-        orientation_covariance, angular_velocity_covariance, linear_acceleration_covariance: 9 numbers, row by row; all
-            0 when they are not known, the first -1 when the quantity is not measured.
+        name: Name of the sensor and of its topic.
+        frame_id: Frame of all quantities.
+        orientation: Quaternion xyzw.
+        angular_velocity: Angular velocity x, y, z [rad/s].
+        linear_acceleration: Linear acceleration x, y, z [m/s^2].
+        orientation_covariance, angular_velocity_covariance, linear_acceleration_covariance: 3x3 matrices, row-major;
+            all elements 0 if unknown, first element -1 if the quantity is not measured.
     """
 
     __slots__ = (

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hardware interfaces as in ros_control: through their handles a controller reads and commands a robot.
+"""Hardware interfaces as in ros_control, whose handles let controllers read and command a robot.
 
-A `RobotHW` makes one handle per joint. A controller gets the handle from an interface by name, once, and then reads and
-writes plain attributes. Interfaces that command joints record which handles were taken (a *claim*), so that two
-controllers never command the same joint through interfaces that exclude each other.
+A `RobotHW` creates one handle per joint. A controller gets the handle from an interface once, by name, and then reads
+and writes plain attributes. Command interfaces record requested handles as *claims*, so that two controllers never
+command the same joint through conflicting interfaces.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from modular_framework_control.hardware_interface.handles import (
 
 
 class HardwareInterfaceError(Exception):
-    """A resource does not exist in the hardware, or was registered twice."""
+    """A resource is unknown to the hardware, or was registered twice."""
 
 
 class _Named(Protocol):
@@ -31,19 +31,19 @@ class _Named(Protocol):
 
     @property
     def name(self) -> str:
-        """Name under which it is found."""
+        """Name of the handle."""
 
 
 HandleT = TypeVar("HandleT", bound=_Named)
 
 
 class HardwareInterface(Generic[HandleT]):
-    """A set of handles of one kind, found by joint name.
+    """Handles of one type, by joint name.
 
     Attributes:
-        type_name: the name written in URDF transmissions and in `ControllerState.claimed_resources`.
-        claims_resources: whether getting a handle claims its joint.
-        noun: what a handle is of, in messages.
+        type_name: Name in URDF transmissions and in `ControllerState.claimed_resources`.
+        claims_resources: Whether getting a handle claims its joint.
+        noun: Noun for a handle in messages.
     """
 
     type_name: ClassVar[str] = "hardware_interface/HardwareInterface"
@@ -55,10 +55,10 @@ class HardwareInterface(Generic[HandleT]):
         self._claims: dict[str, None] = {}
 
     def register_handle(self, handle: HandleT) -> HandleT:
-        """Adds a handle; returns it for chaining.
+        """Registers a handle and returns it.
 
         Raises:
-            HardwareInterfaceError: a handle of that name is already registered.
+            HardwareInterfaceError: A handle with the same name is already registered.
         """
         if handle.name in self._handles:
             raise HardwareInterfaceError(
@@ -69,10 +69,10 @@ class HardwareInterface(Generic[HandleT]):
         return handle
 
     def get_handle(self, name: str) -> HandleT:
-        """The handle of joint `name`; claims the joint if this interface claims.
+        """Returns the handle of a joint, and claims the joint if `claims_resources` is set.
 
         Raises:
-            HardwareInterfaceError: no such joint; the message lists those there are.
+            HardwareInterfaceError: The joint is unknown; the message lists known joints.
         """
         try:
             handle = self._handles[name]
@@ -90,31 +90,31 @@ class HardwareInterface(Generic[HandleT]):
 
     @property
     def handles(self) -> list[HandleT]:
-        """All handles in the order of registration; reading them claims nothing (for the RobotHW itself)."""
+        """All handles in the order of registration, without claims (for the RobotHW itself)."""
         return list(self._handles.values())
 
     def take_claims(self) -> tuple[str, ...]:
-        """Returns the joints claimed since the last call, in the order of the claims, and clears them."""
+        """Returns and clears the joints claimed since the last call, in the order of the claims."""
         claims = tuple(self._claims)
         self._claims.clear()
         return claims
 
     def seed_commands(self) -> None:
-        """Gives every joint without a command one that keeps it at rest."""
+        """Sets a command of rest for every joint without a command."""
 
 
 class JointStateInterface(HardwareInterface[JointStateHandle]):
-    """Read access to joint states; any number of controllers may share it."""
+    """Read access to joint states, which any number of controllers may share."""
 
     type_name = "hardware_interface/JointStateInterface"
 
 
 class _JointCommandInterface(HardwareInterface[JointHandle]):
-    """Handles with a command; a joint belongs to one running controller at a time.
+    """Handles with a command; only one running controller may claim a joint.
 
     Attributes:
-        handle_class: class of its handles.
-        commands_positions: whether commands are positions; velocities and efforts are 0 at rest.
+        handle_class: Class of the handles.
+        commands_positions: Whether commands are positions; velocity and effort commands are 0 at rest.
     """
 
     claims_resources = True
@@ -162,7 +162,7 @@ class PosVelAccJointInterface(_JointCommandInterface):
 
 
 class SpeedScalingInterface(HardwareInterface[SpeedScalingHandle]):
-    """Speed scaling of robots; read by controllers that slow their trajectory clocks accordingly."""
+    """Speed scaling of robots, for controllers that slow their trajectory clocks accordingly."""
 
     type_name = "scaled_controllers/SpeedScalingInterface"
     noun = "speed scaling"
@@ -204,10 +204,10 @@ INTERFACES_BY_NAME: dict[str, type[AnyInterface]] = {
 
 
 def interface_from_name(type_name: str) -> type[AnyInterface]:
-    """The interface class for a name as written in a URDF transmission, with or without the package part.
+    """Returns the interface class for a name in a URDF transmission, with or without package prefix.
 
     Raises:
-        HardwareInterfaceError: unknown name; the message lists the known ones.
+        HardwareInterfaceError: The name is unknown; the message lists known names.
     """
     full_name = type_name if "/" in type_name else f"hardware_interface/{type_name}"
     if full_name not in INTERFACES_BY_NAME:
@@ -218,7 +218,7 @@ def interface_from_name(type_name: str) -> type[AnyInterface]:
 
 @dataclass(frozen=True, slots=True)
 class InterfaceResources:
-    """The joints that a controller claims in one interface, in the order of the claims."""
+    """Joints that a controller claims in one interface, in the order of the claims."""
 
     hardware_interface: str
     resources: tuple[str, ...]
@@ -226,7 +226,7 @@ class InterfaceResources:
 
 @dataclass(frozen=True, slots=True)
 class ControllerInfo:
-    """A controller, as the hardware gets it with a switch."""
+    """Description of a controller for the hardware in a switch."""
 
     name: str
     type: str

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Limits of joints, from the robot description and from parameters `joint_limits/<joint>/...`, checked.
+"""Joint limits from the robot description and from the parameters `joint_limits/<joint>/...`.
 
-The names are those of ros_control: `has_position_limits`, `min_position`, `max_position`, `angle_wraparound`,
+The parameters are those of ros_control: `has_position_limits`, `min_position`, `max_position`, `angle_wraparound`,
 `has_velocity_limits`, `max_velocity`, `has_acceleration_limits`, `max_acceleration`, `has_effort_limits`, `max_effort`,
 and for soft limits `has_soft_limits`, `soft_lower_limit`, `soft_upper_limit`, `k_position`, `k_velocity`. As in
-ros_control, a value without its `has_...: true` is not in force, and a group that is not complete changes nothing;
-since limits are there for safety, the log says so.
+ros_control, a value without `has_...: true` and an incomplete group are ignored, with a warning.
 """
 
 from __future__ import annotations
@@ -21,23 +20,23 @@ from modular_framework_urdf.robot import Joint, SafetyController
 LOGGER = logging.getLogger("rosout.joint_limits")
 INFINITY = math.inf
 POINT_MARGIN = 1e-3
-"""How far a goal may lie beyond a position limit [rad|m]: rounding of angles."""
+"""Tolerance of goals beyond a position limit [rad|m], for rounding of angles."""
 MEASURED_FRACTION, MEASURED_MARGIN = 0.01, 0.01
-"""A measured position beyond a limit by less than both, of the range and [rad|m], is the accuracy of the hardware."""
+"""Accuracy of measured positions at limits, as a fraction of the range and [rad|m]; the smaller value applies."""
 SOFT_LIMIT_KEYS = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
 
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Limits of one joint; infinite where there is none.
+    """Limits of one joint; infinite if unlimited.
 
     Attributes:
-        min_position: [rad] or [m].
-        max_position: [rad] or [m].
-        max_velocity: largest absolute velocity [rad/s] or [m/s].
-        max_effort: largest absolute effort [Nm] or [N].
-        continuous: whether the joint turns without end, so that positions 2 pi apart are the same.
-        max_acceleration: largest absolute acceleration [rad/s^2] or [m/s^2].
+        min_position: Minimum position [rad|m].
+        max_position: Maximum position [rad|m].
+        max_velocity: Maximum absolute velocity [rad/s|m/s].
+        max_effort: Maximum absolute effort [Nm|N].
+        continuous: Whether the joint is continuous, so that positions 2 pi apart are equal.
+        max_acceleration: Maximum absolute acceleration [rad/s^2|m/s^2].
     """
 
     min_position: float = -INFINITY
@@ -48,24 +47,24 @@ class JointLimits:
     max_acceleration: float = INFINITY
 
     def range_from(self, position: float) -> tuple[float, float]:
-        """Smallest and largest position [rad|m] for a joint at `position`, which may stay outside or come back."""
+        """Returns the minimum and maximum position [rad|m], widened to include the joint's current `position`."""
         return min(self.min_position, position), max(self.max_position, position)
 
     def is_beyond(self, position: float) -> bool:
-        """Whether a measured `position` [rad|m] lies outside the range by more than hardware is accurate."""
+        """Returns whether a measured `position` [rad|m] is outside the range by more than the accuracy of hardware."""
         margin = min(MEASURED_MARGIN, MEASURED_FRACTION * (self.max_position - self.min_position))
         return position < self.min_position - margin or position > self.max_position + margin
 
 
 @dataclass(frozen=True, slots=True)
 class SoftJointLimits:
-    """A range inside the limits, which a joint approaches the slower the nearer it is.
+    """A range inside the limits, whose ends a joint approaches at decreasing speed.
 
     Attributes:
-        min_position: [rad] or [m].
-        max_position: [rad] or [m].
-        k_position: velocity allowed per distance to the end of the range [1/s].
-        k_velocity: effort allowed per distance to that velocity [Nm s/rad] or [N s/m].
+        min_position: Minimum position [rad|m].
+        max_position: Maximum position [rad|m].
+        k_position: Allowed velocity per distance to the end of the range [1/s].
+        k_velocity: Allowed effort per difference to this velocity [Nm s/rad|N s/m].
     """
 
     min_position: float
@@ -75,19 +74,19 @@ class SoftJointLimits:
 
 
 def limits_from_urdf(robot_description: str) -> dict[str, JointLimits]:
-    """Limits of every movable joint of a URDF text.
+    """Returns the limits of all movable joints in a URDF.
 
     Raises:
-        ParameterError: the text is not XML, or a limit is not a number.
+        ParameterError: The text is not XML, or a limit is not a number.
     """
     return {joint.name: _limits_of(joint) for joint in parse_description(robot_description).movable_joints()}
 
 
 def soft_limits_from_urdf(robot_description: str) -> dict[str, SoftJointLimits]:
-    """Soft limits of every movable joint of a URDF text that has a <safety_controller>.
+    """Returns the soft limits of all movable joints with a <safety_controller> in a URDF.
 
     Raises:
-        ParameterError: the text is not XML, or a value is not a number.
+        ParameterError: The text is not XML, or a value is not a number.
     """
     return {
         joint.name: _soft_limits_of(joint.safety, joint.kind == "continuous")
@@ -118,16 +117,21 @@ def _limits_of(joint: Joint) -> JointLimits:
 
 
 def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) -> JointLimits:
-    """`limits` with what `joint_limits/<name>/` says put in its place; `has_..._limits: false` removes a limit.
+    """Returns the limits overridden by `joint_limits/<name>/`; `has_..._limits: false` removes a limit.
+
+    Args:
+        name: Name of the joint.
+        limits: Limits from the robot description.
+        root_nh: Namespace of `joint_limits`.
 
     Raises:
-        ParameterError: a value of the wrong type, or a range that ends before it begins.
+        ParameterError: A value has the wrong type, or the range is empty.
     """
     handle = root_nh.child(f"joint_limits/{name}")
     bounds = _complete(handle, "has_position_limits", ("min_position", "max_position"))
     if bounds is not None:
         limits = replace(limits, min_position=bounds[0], max_position=bounds[1])
-    elif _given(handle, "has_position_limits") is False:
+    elif _flag(handle, "has_position_limits") is False:
         continuous = read_bool(handle, "angle_wraparound", limits.continuous)
         limits = replace(limits, min_position=-INFINITY, max_position=INFINITY, continuous=continuous)
     if limits.min_position > limits.max_position:
@@ -137,50 +141,55 @@ def limits_with_parameters(name: str, limits: JointLimits, root_nh: NodeHandle) 
         )
     return replace(
         limits,
-        max_velocity=_largest(handle, "velocity", limits.max_velocity),
-        max_acceleration=_largest(handle, "acceleration", limits.max_acceleration),
-        max_effort=_largest(handle, "effort", limits.max_effort),
+        max_velocity=_maximum(handle, "velocity", limits.max_velocity),
+        max_acceleration=_maximum(handle, "acceleration", limits.max_acceleration),
+        max_effort=_maximum(handle, "effort", limits.max_effort),
     )
 
 
-def _given(handle: NodeHandle, key: str) -> bool | None:
+def _flag(handle: NodeHandle, key: str) -> bool | None:
     return read_bool(handle, key, False) if handle.has_param(key) else None
 
 
-def _complete(handle: NodeHandle, has: str, keys: tuple[str, ...], minimum: float | None = None) -> list[float] | None:
-    """The numbers of `keys`, if `has` is true and all of them are set; None, and a warning, when only some are."""
+def _complete(handle: NodeHandle, flag: str, keys: tuple[str, ...], minimum: float | None = None) -> list[float] | None:
+    """Returns the values of `keys` if `has` is true and all are set; else None, with a warning if some are set."""
     present = [key for key in keys if handle.has_param(key)]
-    if _given(handle, has):
+    if _flag(handle, flag):
         if len(present) == len(keys):
             return [read_number(handle, key, 0.0, minimum) for key in keys]
         LOGGER.warning(
-            "parameters %s: %s is true, but of %s only %s are set; they are ignored, set all of them",
+            "parameters %s: %s is true, but of %s only %s are set and ignored; set all of them",
             handle.namespace,
-            has,
+            flag,
             ", ".join(keys),
             ", ".join(present) or "none",
         )
-    elif present and not handle.has_param(has):
+    elif present and not handle.has_param(flag):
         LOGGER.warning(
-            "parameters %s: %s without %s: true; they are ignored, set it", handle.namespace, ", ".join(present), has
+            "parameters %s: %s without %s: true are ignored; set it", handle.namespace, ", ".join(present), flag
         )
     return None
 
 
-def _largest(handle: NodeHandle, what: str, known: float) -> float:
-    largest = _complete(handle, f"has_{what}_limits", (f"max_{what}",), 0.0)
-    if largest is not None:
-        return largest[0]
-    return INFINITY if _given(handle, f"has_{what}_limits") is False else known
+def _maximum(handle: NodeHandle, quantity: str, default: float) -> float:
+    values = _complete(handle, f"has_{quantity}_limits", (f"max_{quantity}",), 0.0)
+    if values is not None:
+        return values[0]
+    return INFINITY if _flag(handle, f"has_{quantity}_limits") is False else default
 
 
 def soft_limits_with_parameters(
     name: str, limits: SoftJointLimits | None, root_nh: NodeHandle
 ) -> SoftJointLimits | None:
-    """`limits`, or what `joint_limits/<name>/` puts in their place; None when neither is there.
+    """Returns the soft limits in `joint_limits/<name>/`, else `limits`.
+
+    Args:
+        name: Name of the joint.
+        limits: Soft limits from the robot description, or None.
+        root_nh: Namespace of `joint_limits`.
 
     Raises:
-        ParameterError: a value is not a number, or the range is none.
+        ParameterError: A value is not a number or negative, or the range is empty.
     """
     handle = root_nh.child(f"joint_limits/{name}")
     values = _complete(handle, "has_soft_limits", SOFT_LIMIT_KEYS)
@@ -194,7 +203,7 @@ def soft_limits_with_parameters(
         )
     if min(k_position, k_velocity) < 0.0:
         raise ParameterError(
-            f"parameters {handle.namespace}: k_position is {k_position} and k_velocity {k_velocity}; "
+            f"parameters {handle.namespace}: k_position is {k_position} and k_velocity is {k_velocity}; "
             "neither may be negative"
         )
     return SoftJointLimits(lower, upper, k_position, k_velocity)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps joint commands within the limits of the robot, whatever a controller commands.
+"""Enforcement of joint limits on the commands of controllers.
 
-A hardware does so first thing in `write`: with one object per command handle (`limit_handle`), or for all its handles
-at once (`JointLimitGuard`). The rules for positions, velocities and efforts, with and without soft limits, are those of
-ros_control's joint_limits_interface.
+Hardware enforces limits at the start of `write`, with one limiter per command handle (`limit_handle`) or for all
+handles at once (`JointLimitGuard`). The rules for positions, velocities and efforts, with and without soft limits, are
+those of ros_control's joint_limits_interface.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from modular_framework_ros.node_handle import NodeHandle
 
 
 class JointLimiter(Protocol):
-    """Protocol of the objects that keep the command of one handle within limits."""
+    """Protocol of limiters for the command of one handle."""
 
     handle: Any
 
@@ -41,21 +41,21 @@ class JointLimiter(Protocol):
         """Clears the last command, after the joint was moved by other means."""
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replaces the command by the nearest allowed one; `period_s` [s] is the time since the last call."""
+        """Replaces the command by the nearest allowed command; `period_s` is the time since the last call."""
 
 
 class PositionJointSaturation:
-    """Saturates position commands: inside the range, and no faster than the velocity limit from one cycle to the next.
+    """Saturates position commands to the position range and to the velocity limit.
 
-    With soft limits the speed towards an end of the soft range is also at most `k_position` times the distance to it.
-    It limits the change from the last command, not from the measured position, which lags behind. Only the command of
-    `JointHandle.hold` is passed on at once, because it is the measured position. A joint outside its range stays where
-    it is, and a command brings it back, no faster than the velocity limit.
+    With soft limits, the speed towards an end of the soft range is also at most `k_position` times the distance. The
+    change is limited relative to the last command instead of the measured position, which lags behind. Only the command
+    of `JointHandle.hold` passes unlimited, because it is the measured position. A joint outside its range stays there
+    until a command moves it back within the velocity limit.
 
     Args:
-        handle: the joint.
-        limits: its limits.
-        soft: its soft limits, if any.
+        handle: Joint.
+        limits: Limits of the joint.
+        soft: Soft limits of the joint, or None.
     """
 
     __slots__ = ("handle", "limits", "soft", "_last_command")
@@ -71,10 +71,10 @@ class PositionJointSaturation:
         self._last_command = math.nan
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replaces `handle.command` by the nearest allowed one; a command that is not a number keeps the last one.
+        """Replaces `handle.command` by the nearest allowed command; for NaN, the last command stays.
 
         Args:
-            period_s: time since the last call [s].
+            period_s: Time since the last call.
         """
         limits, handle, last = self.limits, self.handle, self._last_command
         command = handle.command
@@ -87,28 +87,28 @@ class PositionJointSaturation:
         if command != command:
             command = last
         if period_s <= 0.0:
-            lowest = highest = last
+            lower = upper = last
         elif self.soft is None:
-            reach = limits.max_velocity * period_s
-            lowest, highest = last - reach, last + reach
+            max_step = limits.max_velocity * period_s
+            lower, upper = last - max_step, last + max_step
         else:
-            slowest, fastest = soft_velocities(last, limits, self.soft)
-            lowest, highest = last + slowest * period_s, last + fastest * period_s
-        smallest, largest = limits.range_from(last)
-        if command > largest:
-            command = largest
-        elif command < smallest:
-            command = smallest
-        if command > highest:
-            command = highest
-        elif command < lowest:
-            command = lowest
+            min_velocity, max_velocity = soft_velocities(last, limits, self.soft)
+            lower, upper = last + min_velocity * period_s, last + max_velocity * period_s
+        min_position, max_position = limits.range_from(last)
+        if command > max_position:
+            command = max_position
+        elif command < min_position:
+            command = min_position
+        if command > upper:
+            command = upper
+        elif command < lower:
+            command = lower
         self._last_command = command
         handle.command = command
 
 
 class PosVelJointSaturation(PositionJointSaturation):
-    """Saturates positions as above, and the velocities (and accelerations) commanded with them to their largest."""
+    """Saturates positions as above, and the commanded velocities (and accelerations) to their maxima."""
 
     __slots__ = ()
 
@@ -121,16 +121,16 @@ class PosVelJointSaturation(PositionJointSaturation):
 
 
 class _Saturation:
-    """Bounds the velocities or efforts of one joint; stores the controller's command and the one it became.
+    """Base class for velocity and effort limits of one joint, which stores requested and limited command.
 
-    A controller that stops commands 0 once. The limited command that replaced it must not become the command of the
-    next cycle, so the 0 stays in force until a controller commands something else. That differs from a position, where
-    the limited command is where the joint is to stay.
+    A stopping controller commands 0 only once. The limited command that replaces this 0 must not become the request of
+    the next cycle, so the 0 stays active until a controller sets a new command. For positions, in contrast, the joint
+    stays at the limited command.
 
     Args:
-        handle: the joint.
-        limits: its limits.
-        soft: its soft limits, if any.
+        handle: Joint.
+        limits: Limits of the joint.
+        soft: Soft limits of the joint, or None.
     """
 
     __slots__ = ("handle", "limits", "soft", "_command", "_limited")
@@ -143,44 +143,46 @@ class _Saturation:
         self._limited: float | None = None
 
     def reset(self) -> None:
-        """Clears the limited command, after the joint was moved by other means; the command of the controller stays."""
+        """Clears the limited command, after the joint was moved by other means; the controller's command stays."""
         self.handle.command = self._commanded()
         self._limited = None
 
     def _commanded(self) -> float:
-        """Returns the last command of a controller; 0 if that is not a number."""
+        """Returns the last command of a controller, with NaN replaced by 0."""
         command = self.handle.command
         if command is not self._limited:
             self._command = command if command == command else 0.0
         return self._command
 
     def _set_limited(self, command: float) -> None:
-        self._limited = self.handle.command = command + 0.0  # a new object: `is` finds commands of others
+        self._limited = self.handle.command = (
+            command + 0.0
+        )  # a new object, so that `is` detects commands of controllers
 
 
 class VelocityJointSaturation(_Saturation):
     """Saturates velocity commands.
 
-    Largest velocity, largest change from one command to the next, the first one from the measured velocity; at an end
-    of the range only velocities back into it, whatever change that takes. With soft limits at most `k_position` times
-    the distance to their end. Not a number becomes 0.
+    The limits are the maximum velocity and the maximum change from the last command, initially from the measured
+    velocity. At an end of the range, only velocities back into the range are allowed, regardless of the change. With
+    soft limits, the velocity is at most `k_position` times the distance to their end. NaN becomes 0.
     """
 
     __slots__ = ()
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replaces `handle.command` by the nearest allowed one."""
+        """Replaces `handle.command` by the nearest allowed command."""
         limits, state = self.limits, self.handle.state
         command, position = self._commanded(), state.position
         if self.soft is None:
-            lowest, highest = -limits.max_velocity, limits.max_velocity
+            lower, upper = -limits.max_velocity, limits.max_velocity
         else:
-            lowest, highest = soft_velocities(position, limits, self.soft)
+            lower, upper = soft_velocities(position, limits, self.soft)
         if limits.max_acceleration < math.inf:
             change = limits.max_acceleration * max(0.0, period_s)
             last = state.velocity if self._limited is None else self._limited
-            lowest, highest = max(lowest, last - change), min(highest, last + change)
-        command = max(lowest, min(highest, command))
+            lower, upper = max(lower, last - change), min(upper, last + change)
+        command = max(lower, min(upper, command))
         if position >= limits.max_position:
             command = min(command, 0.0)
         if position <= limits.min_position:
@@ -191,47 +193,53 @@ class VelocityJointSaturation(_Saturation):
 class EffortJointSaturation(_Saturation):
     """Saturates effort commands.
 
-    Largest effort; none that drives a joint further out of its range or beyond its largest velocity. With soft limits
-    at most `k_velocity` times what is left to the velocity that is allowed there. Not a number becomes 0.
+    The limits are the maximum effort, and 0 towards the outside for a joint outside its range or beyond its maximum
+    velocity. With soft limits, the effort is at most `k_velocity` times the difference to the velocity allowed there.
+    NaN becomes 0.
     """
 
     __slots__ = ()
 
     def enforce_limits(self, period_s: float) -> None:
-        """Replaces `handle.command` by the nearest allowed one."""
+        """Replaces `handle.command` by the nearest allowed command."""
         del period_s
         limits, state = self.limits, self.handle.state
         position, velocity = state.position, state.velocity
-        lowest, highest = -limits.max_effort, limits.max_effort
+        lower, upper = -limits.max_effort, limits.max_effort
         if self.soft is not None:
-            slowest, fastest = soft_velocities(position, limits, self.soft)
-            if slowest > -math.inf:
-                lowest = _clamped(self.soft.k_velocity * (slowest - velocity), limits.max_effort)
-            if fastest < math.inf:
-                highest = _clamped(self.soft.k_velocity * (fastest - velocity), limits.max_effort)
+            min_velocity, max_velocity = soft_velocities(position, limits, self.soft)
+            if min_velocity > -math.inf:
+                lower = _clamped(self.soft.k_velocity * (min_velocity - velocity), limits.max_effort)
+            if max_velocity < math.inf:
+                upper = _clamped(self.soft.k_velocity * (max_velocity - velocity), limits.max_effort)
         if position < limits.min_position or velocity < -limits.max_velocity:
-            lowest = max(lowest, 0.0)
+            lower = max(lower, 0.0)
         if position > limits.max_position or velocity > limits.max_velocity:
-            highest = min(highest, 0.0)
-        self._set_limited(max(lowest, min(highest, self._commanded())))
+            upper = min(upper, 0.0)
+        self._set_limited(max(lower, min(upper, self._commanded())))
 
 
 def _clamped(value: float, bound: float) -> float:
-    """`value` within `bound` on both sides of 0; 0 when it is not a number."""
+    """Returns `value` clamped to +-`bound`, with NaN replaced by 0."""
     return max(-bound, min(bound, value)) if value == value else 0.0
 
 
 def soft_velocities(position: float, limits: JointLimits, soft: SoftJointLimits) -> tuple[float, float]:
-    """Smallest and largest velocity allowed at `position`: none while that is not a number.
+    """Returns the minimum and maximum velocity allowed at `position`; both are 0 for NaN.
 
-    Rest is always allowed, so that a joint beyond a soft limit is not moved by it.
+    Rest is always allowed, so that a soft limit never moves a joint.
+
+    Args:
+        position: Position of the joint [rad|m].
+        limits: Limits of the joint.
+        soft: Soft limits of the joint.
     """
     if position != position:
         return 0.0, 0.0
-    largest = limits.max_velocity
-    lowest = -largest if soft.min_position == -math.inf else soft.k_position * (soft.min_position - position)
-    highest = largest if soft.max_position == math.inf else soft.k_position * (soft.max_position - position)
-    return max(-largest, min(0.0, lowest)), min(largest, max(0.0, highest))
+    bound = limits.max_velocity
+    lower = -bound if soft.min_position == -math.inf else soft.k_position * (soft.min_position - position)
+    upper = bound if soft.max_position == math.inf else soft.k_position * (soft.max_position - position)
+    return max(-bound, min(0.0, lower)), min(bound, max(0.0, upper))
 
 
 def limit_handle(
@@ -243,10 +251,10 @@ def limit_handle(
     """Returns the limiter for the commanded quantity of a handle, and sets `handle.limits`.
 
     Args:
-        interface_class: interface the handle belongs to.
-        handle: the joint.
-        limits: its limits.
-        soft_limits: its soft limits, if any.
+        interface_class: Interface of the handle.
+        handle: Joint.
+        limits: Limits of the joint.
+        soft_limits: Soft limits of the joint, or None.
     """
     handle.limits = limits
     if issubclass(interface_class, VelocityJointInterface):
@@ -259,16 +267,14 @@ def limit_handle(
 
 
 def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[JointLimits]:
-    """Returns the known limits of joints.
-
-    Those their hardware enforces; where it enforces none, those of `robot_description` and `joint_limits/<joint>/...`.
+    """Returns the known limits of joints: enforced limits, else those of `robot_description` and `joint_limits`.
 
     Args:
-        handles: the joints.
-        root_nh: where `robot_description` and `joint_limits` are found, if they are there.
+        handles: Joints.
+        root_nh: Namespace of `robot_description` and `joint_limits/<joint>/...`, which are optional.
 
     Raises:
-        ParameterError: a limit makes no sense; says which parameter.
+        ParameterError: A limit is invalid; the message names the parameter.
     """
     unknown = [handle.name for handle in handles if handle.limits is None]
     description = root_nh.get_param("robot_description") if unknown else None
@@ -282,23 +288,23 @@ def limits_of(handles: Sequence[JointHandle], root_nh: NodeHandle) -> list[Joint
 
 
 def missing_limits(robot_hw: RobotHW) -> str:
-    """Names the joints whose hardware does not limit what is commanded, and the limits they lack; "" if none does."""
+    """Returns a description of command handles without limits, or ""."""
     missing = []
     for interface, handle in robot_hw.command_handles:
         limits = handle.limits if handle.limits is not None else JointLimits()
         if isinstance(interface, EffortJointInterface):
-            lacks = ["effort"] if limits.max_effort == math.inf else []
+            kinds = ["effort"] if limits.max_effort == math.inf else []
         else:
-            lacks = ["velocity"] if limits.max_velocity == math.inf else []
+            kinds = ["velocity"] if limits.max_velocity == math.inf else []
             if not limits.continuous and math.inf in (-limits.min_position, limits.max_position):
-                lacks.append("position")
-        if lacks:
-            missing.append(f"{' and '.join(lacks)} of joint '{handle.name}' ({interface.type_name})")
+                kinds.append("position")
+        if kinds:
+            missing.append(f"{' and '.join(kinds)} of joint '{handle.name}' ({interface.type_name})")
     return ", ".join(missing)
 
 
 def outside_limits(robot_hw: RobotHW) -> dict[str, str]:
-    """Returns the joints that are held outside their range, and a description of each."""
+    """Returns descriptions of joints outside their ranges, by joint name."""
     return {
         handle.name: f"joint '{handle.name}' is held at {handle.position:.6g}, outside its range "
         f"{handle.limits.min_position:.6g} to {handle.limits.max_position:.6g}, until a goal brings it back"
@@ -308,17 +314,17 @@ def outside_limits(robot_hw: RobotHW) -> dict[str, str]:
 
 
 class JointLimitGuard:
-    """Keeps all commands of a hardware within the limits of `robot_description` and of `joint_limits/<joint>/...`.
+    """Enforces the limits of `robot_description` and `joint_limits/<joint>/...` on all commands of a hardware.
 
     Args:
-        robot_hw: hardware whose command interfaces are registered.
-        root_nh: where `robot_description` and `joint_limits` are found, if they are there.
+        robot_hw: Hardware with registered command interfaces.
+        root_nh: Namespace of `robot_description` and `joint_limits`, which are optional.
 
     Attributes:
-        limits: limits by joint name, of every joint that can be commanded.
+        limits: Limits of all joints with commands, by joint name.
 
     Raises:
-        ParameterError: a limit makes no sense; says which parameter.
+        ParameterError: A limit is invalid; the message names the parameter.
     """
 
     def __init__(self, robot_hw: RobotHW, root_nh: NodeHandle) -> None:
@@ -334,12 +340,12 @@ class JointLimitGuard:
             self._limiters.append(limit_handle(type(interface), handle, self.limits[name], soft_limits))
 
     def enforce(self, period_s: float) -> None:
-        """Replaces every command by the nearest allowed one; `period_s` [s] is the time since the last call."""
+        """Replaces every command by the nearest allowed command; `period_s` is the time since the last call."""
         for limiter in self._limiters:
             limiter.enforce_limits(period_s)
 
     def reset(self, joints: Iterable[str] | None = None) -> None:
-        """Clears the last commands (of these joints), after they were moved by other means."""
+        """Clears the last commands of all or of the given joints, after they were moved by other means."""
         names = self.limits.keys() if joints is None else set(joints)
         for limiter in self._limiters:
             if limiter.handle.name in names:

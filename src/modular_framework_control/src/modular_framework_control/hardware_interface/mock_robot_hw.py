@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mock hardware: joints that follow their commands exactly, for demonstrations and tests without robot or physics."""
+"""Mock hardware whose joints follow their commands exactly, for demonstrations and tests without robot or physics."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ LOGGER = logging.getLogger("rosout.mock_robot_hw")
 
 
 class MockRobotHW(RobotHW):
-    """Joints that do, one cycle later, exactly what they were commanded to do.
+    """Joints that follow their commands exactly, one cycle later.
 
-    A position command is reached; a velocity command is integrated once, an effort command twice, as of joints
-    with inertia 1 and without friction or gravity. Joints stop at once at the ends of their range, those that begin
-    outside at their initial position.
+    A position command is reached, a velocity command is integrated once, and an effort command twice, as for joints
+    with inertia 1 and without friction or gravity. Joints stop at once at the ends of their ranges, or at their initial
+    position if this is outside.
 
-    Parameters: see `parameters/MockRobotHW.yaml`; limits come from `robot_description` in the
-    root namespace and from `joint_limits`, when they are there.
+    Parameters: `parameters/MockRobotHW.yaml`; optional limits from `robot_description` in the root namespace and from
+    `joint_limits`.
     """
 
     def __init__(self) -> None:
@@ -42,9 +42,9 @@ class MockRobotHW(RobotHW):
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         try:
             parameters = parameters_below("modular_framework_control", "MockRobotHW", robot_hw_nh, root_nh)
-            names, initial, wanted = parameters.values("~joints", "~initial_positions", "~command_interface")
+            names, initial, requested = parameters.values("~joints", "~initial_positions", "~command_interface")
             positions = [float(initial.get(name, 0.0)) for name in names]
-            interface_class = next(kind for kind in COMMAND_INTERFACES if wanted in (kind.__name__, kind.type_name))
+            interface_class = next(kind for kind in COMMAND_INTERFACES if requested in (kind.__name__, kind.type_name))
             self._by_velocity = interface_class is VelocityJointInterface
             self._by_effort = interface_class is EffortJointInterface
             self._register(interface_class, names, positions)
@@ -66,28 +66,28 @@ class MockRobotHW(RobotHW):
 
     def read(self, time_s: float, period_s: float) -> None:
         if self._by_velocity or self._by_effort:
-            self._move_on(period_s)
+            self._integrate(period_s)
             return
         for handle, position in zip(self._handles, self._sent, strict=True):
             state = handle.state
-            if self._sent_period_s > 0.0:  # without time the velocity does not change
+            if self._sent_period_s > 0.0:  # in a cycle of zero length the velocity stays
                 state.velocity = (position - state.position) / self._sent_period_s
             state.position = position
 
-    def _move_on(self, period_s: float) -> None:
-        """Integrates the commanded velocities or efforts over `period_s` [s]."""
+    def _integrate(self, period_s: float) -> None:
+        """Integrates the commanded velocities or efforts over `period_s`."""
         for handle, sent, limit in zip(self._handles, self._sent, self._limits, strict=True):
             state, velocity = handle.state, sent
             if self._by_effort:
                 state.effort = sent
                 velocity = state.velocity + sent * period_s
-            lowest, highest = limit.range_from(state.position)
-            position = min(max(state.position + velocity * period_s, lowest), highest)
+            min_position, max_position = limit.range_from(state.position)
+            position = min(max(state.position + velocity * period_s, min_position), max_position)
             if period_s > 0.0:
                 state.velocity = (position - state.position) / period_s
             state.position = position
 
     def write(self, time_s: float, period_s: float) -> None:
         self._guard.enforce(period_s)
-        self._sent_period_s = period_s  # the period that the controllers used; the next one may differ
+        self._sent_period_s = period_s  # the period used by the controllers; the next period may differ
         self._sent = [handle.command for handle in self._handles]

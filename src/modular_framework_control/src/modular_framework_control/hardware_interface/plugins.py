@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds classes that other packages offer under a name `package/Class`: hardware and controllers of users.
+"""Plugins: hardware and controller classes of other packages under names `package/Class`.
 
-A package offers its classes as ROS packages offer plugins: an `<export>` tag in its package.xml names a description,
+As for other ROS plugins, an `<export>` tag in the package.xml of a package names a description,
 
     <export><modular_framework_control plugin="${prefix}/plugins.xml"/></export>
 
-and the description names, per Python module, the classes in it:
+and the description lists the classes of each Python module:
 
     <library path="my_package.my_module">
       <class name="my_package/MyHW" type="MyHW" base_class_type="hardware_interface::RobotHW"/>
@@ -26,25 +26,25 @@ from modular_framework_urdf import xml_text
 
 EXPORT_TAG = "modular_framework_control"
 CPP_EXPORT_TAGS = ("hardware_interface", "controller_interface")
-"""Tags under which packages offer C++ classes to ros_control."""
+"""Export tags for C++ classes of ros_control."""
 ROBOT_HW_BASE = "hardware_interface::RobotHW"
 CONTROLLER_BASE = "controller_interface::ControllerBase"
 
 
 class PluginError(Exception):
-    """A class is not offered by any package, cannot be loaded, or is not what it should be."""
+    """A class is unknown, cannot be loaded, or has the wrong base class."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plugin:
-    """One class that a package offers.
+    """A class in a plugin description.
 
     Attributes:
-        name: what users write, package/Class.
-        base: its base class, as in `base_class_type`.
-        module: Python module it is in, or library of a C++ class.
-        class_name: its name in that module.
-        origin: the description that offers it.
+        name: Name for users, package/Class.
+        base: Base class as in `base_class_type`.
+        module: Python module, or library of a C++ class.
+        class_name: Name of the class in the module.
+        origin: File of the description.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Plugin:
 
     @property
     def is_cpp(self) -> bool:
-        """Whether it is a C++ class of a library, whatever tag offers it."""
+        """Whether the plugin is a C++ class, under any export tag."""
         return "::" in self.class_name or "/" in self.module or self.module.endswith(".so")
 
 
@@ -67,28 +67,28 @@ def _packages_of_workspace() -> Mapping[str, Path]:
 
 
 class PluginIndex:
-    """The classes of one base that packages offer; searched once, at the first use.
+    """The plugins of one base class, searched at the first use.
 
     Args:
         base: ROBOT_HW_BASE or CONTROLLER_BASE.
-        packages: gives the folder of each package by name; those of the sourced workspace when not given.
+        packages: Function that returns package folders by name; by default of the sourced workspace.
     """
 
     def __init__(self, base: str, packages: Callable[[], Mapping[str, Path]] | None = None) -> None:
         self._base = base
         self._packages = packages if packages is not None else _packages_of_workspace
-        self._found: dict[str, Plugin] | None = None
+        self._plugins_by_name: dict[str, Plugin] | None = None
         self._faults: list[str] = []
         self._stale: set[str] = set()
 
     @property
     def names(self) -> list[str]:
-        """Names of the classes on offer, sorted."""
+        """Sorted names of the plugins."""
         return sorted(self._plugins())
 
     @property
     def faults(self) -> list[str]:
-        """Faults of the descriptions that could not be read in full."""
+        """Faults in plugin descriptions."""
         self._plugins()
         return list(self._faults)
 
@@ -96,15 +96,15 @@ class PluginIndex:
         return name in self._plugins()
 
     def load(self, name: str, expected: type[Any]) -> type[Any]:
-        """Imports the class offered under `name`.
+        """Imports a plugin class.
 
         Args:
-            name: package/Class.
-            expected: class that it must be derived from.
+            name: Name of the plugin, package/Class.
+            expected: Required base class.
 
         Raises:
-            PluginError: no package offers it (the message lists what is offered and which descriptions are faulty), its
-                module cannot be imported, or it is something else.
+            PluginError: The plugin is unknown (the message lists known plugins and faulty descriptions), the module
+                cannot be imported, or the base class is wrong.
         """
         plugin = self._plugins().get(name)
         if plugin is None:
@@ -117,28 +117,28 @@ class PluginIndex:
             )
         if plugin.is_cpp:
             raise _cpp_error(plugin, expected)
-        where = f"{plugin.class_name} of {plugin.module} (offered as {name} by {plugin.origin})"
+        location = f"{plugin.class_name} of {plugin.module} (offered as {name} by {plugin.origin})"
         try:
             loaded = getattr(self._module(plugin.module), plugin.class_name)
         except Exception as error:  # a user's module may raise anything when it is imported
-            raise PluginError(f"cannot load {where}: {type(error).__name__}: {error}") from error
+            raise PluginError(f"cannot load {location}: {type(error).__name__}: {error}") from error
         if not isinstance(loaded, type) or not issubclass(loaded, expected):
             raise PluginError(
-                f"{where} is no {expected.__name__}; derive it from {expected.__module__}.{expected.__name__}"
+                f"{location} is not a {expected.__name__}; derive it from {expected.__module__}.{expected.__name__}"
             )
         return loaded
 
     def _refuse_cpp_class(self, name: str, expected: type[Any]) -> None:
-        """Raises PluginError if a package offers a C++ class under `name`."""
+        """Raises PluginError if `name` is a C++ class of a package."""
         for package, folder in sorted(self._packages().items()):
             for plugin in self._of_package(package, folder, [], CPP_EXPORT_TAGS):
                 if plugin.name == name:
                     raise _cpp_error(plugin, expected)
 
     def reload(self) -> None:
-        """Makes the next use search again, also for modules that were installed or changed since their import."""
-        self._stale |= {plugin.module for plugin in (self._found or {}).values()}
-        self._found = None
+        """Searches again at the next use, and reimports modules that were changed since their import."""
+        self._stale |= {plugin.module for plugin in (self._plugins_by_name or {}).values()}
+        self._plugins_by_name = None
         importlib.invalidate_caches()
 
     def _module(self, name: str) -> ModuleType:
@@ -147,17 +147,17 @@ class PluginIndex:
         return importlib.reload(sys.modules[name]) if stale else importlib.import_module(name)
 
     def _plugins(self) -> dict[str, Plugin]:
-        if self._found is None:
-            found: dict[str, Plugin] = {}
+        if self._plugins_by_name is None:
+            plugins_by_name: dict[str, Plugin] = {}
             faults: list[str] = []
             for package, folder in sorted(self._packages().items()):
                 for plugin in self._of_package(package, folder, faults, (EXPORT_TAG,)):
-                    first = found.setdefault(plugin.name, plugin)
+                    first = plugins_by_name.setdefault(plugin.name, plugin)
                     if first is not plugin:
                         faults.append(f"{plugin.origin}: {plugin.name} is already offered by {first.origin}")
-            self._faults, self._found = faults, found
-            return found
-        return self._found
+            self._faults, self._plugins_by_name = faults, plugins_by_name
+            return plugins_by_name
+        return self._plugins_by_name
 
     def _of_package(self, package: str, folder: Path, faults: list[str], tags: Sequence[str]) -> list[Plugin]:
         manifest = folder / "package.xml"
@@ -195,10 +195,10 @@ def _descriptions(package: str, manifest: Path, faults: list[str], tags: Sequenc
 
 
 def read_description(path: Path) -> list[Plugin]:
-    """The classes a description names.
+    """Returns the classes in a plugin description.
 
     Raises:
-        PluginError: no such file, not XML, or entries that lack something; all of them are named.
+        PluginError: The file is missing or not XML, or entries are incomplete; the message lists all faults.
     """
     try:
         root = xml_text.read(path)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Base class of every robot, simulated or real, that controllers drive.
+"""Base class of simulated and real robots for controllers.
 
-Hardware is one subclass: a constructor without parameters, `init` that registers its interfaces, `read`
-that fills the joint states and `write` that sends the commands. The owner of the loop calls once per cycle:
-`hw.read(t, dt)`, `controller_manager.update(t, dt)`, `hw.write(t, dt)`. A joint that no controller has commanded yet is
-commanded to stay where it was measured first.
+A hardware class has a constructor without parameters, `init` to register its interfaces, `read` to update the joint
+states, and `write` to send the commands. The owner of the loop calls once per cycle: `hw.read(t, dt)`,
+`controller_manager.update(t, dt)`, `hw.write(t, dt)`. A joint that no controller has commanded yet is commanded to stay
+at its first measured position.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ class SwitchState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class HardwareFault:
-    """The reason why some joints cannot be moved at the moment.
+    """The reason why joints cannot be moved currently.
 
     Attributes:
-        reason: for a human: "protective stop", "link to 10.0.0.2 lost".
-        joints: the joints concerned.
+        reason: Reason for users, such as "protective stop" or "link to 10.0.0.2 lost".
+        joints: Names of the affected joints.
     """
 
     reason: str
@@ -49,15 +49,15 @@ class HardwareFault:
 
 
 class RobotHW:
-    """Base of all robot hardware, without joints.
-
-    Attributes:
-        announces_ready: whether this hardware itself publishes True on its `topic_to_wait_for`; if not, the node that
-            runs it publishes it once its loop runs.
+    """Base class of robot hardware, without joints.
 
     `init`, `close`, `prepare_switch` and `check_for_conflict` run on a thread that may wait; `read`, `write`, `fault`,
     `do_switch` and `switch_result` run in the control loop and must neither block nor raise for an expected condition.
-    Threads and processes started there inherit the priority of the loop, so start them in `init`.
+    Start threads and processes in `init`, because threads started in the control loop inherit its priority.
+
+    Attributes:
+        announces_ready: Whether the hardware itself publishes True on its `topic_to_wait_for`; otherwise the node
+            publishes it once the control loop runs.
     """
 
     announces_ready: ClassVar[bool] = False
@@ -69,30 +69,30 @@ class RobotHW:
         """Reads parameters, connects, and registers the interfaces.
 
         Args:
-            root_nh: the namespace of the robot (robot_description is found there).
-            robot_hw_nh: the namespace of this hardware's own parameters.
+            root_nh: Namespace of the robot, with robot_description.
+            robot_hw_nh: Namespace of the hardware's own parameters.
 
         Returns:
-            Whether the hardware can be used; the reason of a False is logged by the hardware.
+            Whether the hardware can be used; before returning False, the hardware logs the reason.
         """
         del root_nh, robot_hw_nh
         return True
 
     def register_interface(self, interface: HardwareInterface[Any]) -> None:
-        """Offers `interface` to the controllers; called from `init`.
+        """Registers an interface for controllers, during `init`.
 
         Raises:
-            HardwareInterfaceError: an interface of this class is already registered.
+            HardwareInterfaceError: An interface of this class is already registered.
         """
         if type(interface) in self._interfaces:
             raise HardwareInterfaceError(f"{type(self).__name__}: {interface.type_name} is registered twice")
         self._interfaces[type(interface)] = interface
 
     def get(self, interface_class: type[InterfaceT]) -> InterfaceT:
-        """The registered interface of that class.
+        """Returns the registered interface of a class.
 
         Raises:
-            HardwareInterfaceError: this hardware has none; the message lists those it has.
+            HardwareInterfaceError: The interface is not registered; the message lists registered interfaces.
         """
         interface = self.find(interface_class)
         if interface is None:
@@ -101,7 +101,7 @@ class RobotHW:
         return interface
 
     def find(self, interface_class: type[InterfaceT]) -> InterfaceT | None:
-        """The registered interface of that class, or None."""
+        """Returns the registered interface of a class, or None."""
         return cast("InterfaceT | None", self._interfaces.get(interface_class))
 
     @property
@@ -115,44 +115,44 @@ class RobotHW:
         return sorted(interface.type_name for interface in self._interfaces.values())
 
     def read(self, time_s: float, period_s: float) -> None:
-        """Fills the joint states with what is measured at `time_s` [s], `period_s` [s] after the last call."""
+        """Updates the joint states with measurements at `time_s`, `period_s` after the last call."""
 
     def seed_commands(self) -> None:
-        """Commands joints without a command to rest, where they are measured; the owner of the loop calls it."""
+        """Commands joints without a command to rest at their measured positions; called by the owner of the loop."""
         for interface in self._interfaces.values():
             interface.seed_commands()
 
     def write(self, time_s: float, period_s: float) -> None:
-        """Sends the commands of the joint handles; `period_s` [s] is the time since the last call."""
+        """Sends the commands of the joint handles; `period_s` is the time since the last call."""
 
     def close(self) -> None:
-        """Disconnects, and ends what `init` began, once the control loop has ended. May be called twice."""
+        """Disconnects and stops threads and processes after the control loop has ended; may be called twice."""
 
     def fault(self) -> str:
-        """Returns why this hardware cannot follow commands (a lost link, a protective stop); "" if it can.
+        """Returns the reason why the hardware cannot follow commands (lost link, protective stop), or "".
 
-        Called in every cycle, after `read`. The manager notifies the controllers that command its joints: their goals
-        end with this reason, and they hold until it is "" again.
+        This method runs in every cycle after `read`. The manager notifies the controllers of the joints, whose goals
+        end with this reason and which hold the joints until the reason is "".
         """
         return ""
 
     @property
     def initialised(self) -> bool:
-        """Whether what `init` began (a calibration) is done; controllers are loaded from then on."""
+        """Whether work started by `init` (such as a calibration) is done, so that controllers can be loaded."""
         return True
 
     def warning(self) -> str:
-        """Returns what may keep joints from following though they are commanded (a slow link); "" for nothing."""
+        """Returns a possible cause of joints not following their commands (such as a slow link), or ""."""
         return ""
 
     def faults(self) -> Sequence[HardwareFault]:
-        """Returns the fault with its joints; hardware made of several parts has one entry per part with a fault."""
+        """Returns the fault with its joints; combined hardware returns one fault per faulty part."""
         reason = self.fault()
         return (HardwareFault(reason, self.commanded_joints),) if reason else ()
 
     @property
     def command_handles(self) -> list[tuple[HardwareInterface[Any], Any]]:
-        """The handles that controllers command, each with its interface."""
+        """Command handles with their interfaces."""
         return [
             (interface, handle)
             for interface in self._interfaces.values()
@@ -166,10 +166,10 @@ class RobotHW:
         return frozenset(handle.name for _, handle in self.command_handles)
 
     def check_for_conflict(self, controllers: Iterable[ControllerInfo]) -> str:
-        """Returns why these controllers may not run together; "" when they may.
+        """Returns the reason why controllers may not run together, or "".
 
-        The rule of the base class: a joint may be claimed once, by one controller through one interface. Hardware with
-        another rule overrides this.
+        By default, only one controller may claim a joint, through one interface. Hardware with a different rule
+        overrides this method.
         """
         owners: dict[str, tuple[str, str]] = {}
         conflicts: dict[str, None] = {}
@@ -191,24 +191,24 @@ class RobotHW:
         return "; ".join(conflicts)
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
-        """Prepares a switch, on a thread that may wait; False refuses it."""
+        """Prepares a switch on a thread that may wait; returns False to refuse the switch."""
         del start, stop
         return True
 
     def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
-        """Begins the switch, in the control loop, before controllers are stopped and started."""
+        """Starts the switch in the control loop, before controllers are stopped and started."""
 
     def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
-        """State of the switch begun by `do_switch`, of all controllers or of one that is to start."""
+        """Returns the state of the switch started by `do_switch`, of all controllers or of one starting controller."""
         del controller
         return SwitchState.DONE
 
 
 def speed_scaling_handles(robot_hw: RobotHW, joints: Iterable[str]) -> tuple[SpeedScalingHandle, ...]:
-    """Returns the speed scaling handles of these joints; none if nothing scales their speed."""
+    """Returns the speed scaling handles of joints; empty without speed scaling."""
     interface = robot_hw.find(SpeedScalingInterface)
-    wanted = set(joints)
-    return () if interface is None else tuple(h for h in interface.handles if not wanted.isdisjoint(h.joints))
+    names = set(joints)
+    return () if interface is None else tuple(h for h in interface.handles if not names.isdisjoint(h.joints))
 
 
 __all__ = ["ControllerInfo", "HardwareFault", "InterfaceResources", "RobotHW", "SwitchState", "speed_scaling_handles"]

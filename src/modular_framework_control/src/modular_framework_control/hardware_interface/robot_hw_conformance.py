@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Conformance suite of `RobotHW`: what controllers rely on, for every hardware.
+"""Conformance suite of `RobotHW`, with the requirements of controllers on every hardware.
 
-Subclass `RobotHWConformance` in a test module under a name that begins with Test and say how the hardware is made;
-pytest finds the rest. Each test applies to the joints that take commands of its kind: positions (also with velocities
-and accelerations), velocities, efforts. Hardware that takes long to make may be handed out again by `make_robot_hw`,
-unless `close_after_test` is True.
+To use the suite, define in a test module a subclass of `RobotHWConformance` whose name starts with Test and implement
+its abstract methods. Each test applies to joints with matching commands: positions (also with velocities and
+accelerations), velocities or efforts. Unless `close_after_test` is True, `make_robot_hw` may return the same hardware
+again.
 
-What belongs to the control loop is called from a thread of its own, as the loop does.
+Methods for the control loop are called from a separate thread, as in the real loop.
 """
 
 from __future__ import annotations
@@ -33,35 +33,35 @@ from modular_framework_control.hardware_interface.robot_hw import RobotHW, Switc
 
 ResultT = TypeVar("ResultT")
 POSITIONS = tuple(interface for interface in COMMAND_INTERFACES if interface.commands_positions)
-SHARES_OF_RANGE = (0.15, 0.5, 0.8)
-"""Where joints stand at the start, as shares of their range; joint by joint another one."""
+START_FRACTIONS = (0.15, 0.5, 0.8)
+"""Start positions as fractions of the joint range; consecutive joints use different fractions."""
 START_REACH = 1.0
-"""Largest distance of such a position from the middle of the range, or from 0 without a range [rad|m]."""
+"""Maximum distance of a start position from the middle of the range, or from 0 without a range [rad|m]."""
 HOSTILE_COMMANDS = (1e9, -1e9, math.inf, -math.inf, math.nan)
 STATE_AGE_S = 0.1
-"""How old a state of hardware that moves by itself may be when it is read [s]: a link polls, a computer is busy."""
+"""Maximum age of the states of real-time hardware [s], due to polling links and busy computers."""
 OVERSPEED = 1.5
-"""Largest mean speed as a multiple of the limit: an effort takes time to brake."""
+"""Maximum mean speed as a multiple of the limit, because braking by an effort takes time."""
 TIMED_CYCLES = 50
-SLOW_CYCLES_SHARE = 0.2
-"""Share of cycles that may take longer than the period: the machine may have been busy."""
-TIMELY_SHARE = 0.7
-"""Share of the time that a jump takes at the velocity limit; a joint that needs less exceeded the limit."""
+SLOW_CYCLES_FRACTION = 0.2
+"""Fraction of cycles that may exceed the period on a busy machine."""
+MIN_DURATION_FRACTION = 0.7
+"""Minimum duration of a jump as a fraction of its duration at the velocity limit."""
 
 
 class RobotHWConformance(ABC):
     """Tests of one hardware.
 
     Attributes:
-        period_s: cycle of the control loop [s].
-        settle_s: how long a joint may take for a step of `step` [s].
-        ready_s: how long the hardware may take until it has no fault [s].
-        step: size of the steps [rad|m].
-        jump: size of the step whose speed is watched, less where a joint has no room for it; it takes many cycles at
-            the greatest velocity [rad|m].
-        tolerance: how near a joint must come, and how far an idle one may stray [rad|m].
-        real_time: whether the hardware moves by itself, so that each cycle must take its time.
-        close_after_test: whether what `make_robot_hw` gave is closed after each test.
+        period_s: Period of the control loop.
+        settle_s: Maximum time of a joint for a step of `step`.
+        ready_s: Maximum time of the hardware until it has no fault.
+        step: Size of the steps [rad|m].
+        jump: Size of the step for the velocity limit, smaller for joints without room; must take many cycles at the
+            maximum velocity [rad|m].
+        tolerance: Tolerance for reaching a position, and for the motion of an idle joint [rad|m].
+        real_time: Whether the hardware moves in real time.
+        close_after_test: Whether the hardware is closed after each test.
     """
 
     period_s = 0.004
@@ -75,45 +75,45 @@ class RobotHWConformance(ABC):
 
     @abstractmethod
     def make_robot_hw(self, positions: Mapping[str, float] | None = None) -> RobotHW:
-        """Initialised hardware, at rest, with room to move in every joint.
+        """Returns initialized hardware at rest, with room to move for every joint.
 
         Args:
-            positions: where the joints stand before the hardware is initialised [rad|m], by name, within the limits;
-                the hardware must then be new. None for positions of its choice.
+            positions: Joint positions before initialization, by name and within the limits, for new hardware [rad|m];
+                None for any positions.
         """
 
     @abstractmethod
     def limits(self) -> Mapping[str, JointLimits]:
-        """Limits of the joints of that hardware, by name."""
+        """Returns the limits of the joints, by name."""
 
     def advance(self, period_s: float) -> None:
-        """Advances time between two cycles: real time for real hardware, physics for simulated hardware."""
+        """Advances time between two cycles, real time for real hardware and physics for simulated hardware."""
         if self.real_time:
             time.sleep(period_s)
 
     def setup_method(self) -> None:
-        """Called by pytest before each test."""
+        """Runs before each test."""
         self._made: list[RobotHW] = []
         self._time_s = 0.0
         self._read_s = math.nan
         self._loop = ThreadPoolExecutor(1, "loop")
 
     def teardown_method(self) -> None:
-        """Called by pytest after each test."""
+        """Runs after each test."""
         self._loop.shutdown()
         if self.close_after_test:
             for robot_hw in self._made:
                 robot_hw.close()
 
     def _in_loop(self, call: Callable[..., ResultT], *arguments: Any) -> ResultT:
-        """Calls in the thread of the loop; returns what it returns."""
+        """Calls a function in the thread of the loop and returns the result."""
         return self._loop.submit(call, *arguments).result()
 
     def _read(self, robot_hw: RobotHW) -> None:
         self._in_loop(robot_hw.read, self._time_s, self.period_s)
 
     def _cycle(self, robot_hw: RobotHW, commands: Mapping[JointHandle, float]) -> None:
-        """Reads, commands as the loop and controllers do, writes; then time passes."""
+        """Reads, commands and writes as the loop and controllers do, then advances time."""
         self._in_loop(self._cycle_in_loop, robot_hw, commands)
         self._time_s += self.period_s
         self.advance(self.period_s)
@@ -146,7 +146,7 @@ class RobotHWConformance(ABC):
         return robot_hw
 
     def _hold(self, robot_hw: RobotHW) -> None:
-        """Holds the joints, as a controller that starts does: the test before may have commanded anything."""
+        """Holds the joints as a starting controller does, because the previous test may have commanded anything."""
         robot_hw.read(self._time_s, self.period_s)
         for _, handles in self._commanded(robot_hw, POSITIONS):
             for handle in handles:
@@ -157,7 +157,7 @@ class RobotHWConformance(ABC):
     def _commanded(
         robot_hw: RobotHW, interfaces: Sequence[type[CommandInterface]] = COMMAND_INTERFACES
     ) -> Iterator[tuple[CommandInterface, list[JointHandle]]]:
-        """The interfaces of the hardware among `interfaces`, with their handles."""
+        """Yields the hardware's interfaces among `interfaces`, with their handles."""
         for interface_class in interfaces:
             interface = robot_hw.find(interface_class)
             if interface is not None and interface.handles:
@@ -166,7 +166,7 @@ class RobotHWConformance(ABC):
     def _claimed(
         self, *interfaces: type[CommandInterface]
     ) -> Iterator[tuple[RobotHW, list[JointHandle], dict[JointHandle, float]]]:
-        """Hardware that is ready, the joints of each interface it has among `interfaces`, and commands of rest."""
+        """Yields ready hardware, the joints of each of its interfaces among `interfaces`, and commands of rest."""
         robot_hw = self._ready()
         for interface, handles in self._commanded(robot_hw, interfaces):
             claim = InterfaceResources(interface.type_name, tuple(handle.name for handle in handles))
@@ -180,18 +180,18 @@ class RobotHWConformance(ABC):
             )
 
     def _start_positions(self, offset: int) -> dict[str, float]:
-        """Positions within the limits, of each joint at another share of its range."""
+        """Returns positions within the limits, at different fractions of the joints' ranges."""
         positions = {}
         for index, (name, limit) in enumerate(self.limits().items()):
             bounded = math.isfinite(limit.min_position + limit.max_position)
             middle = 0.5 * (limit.min_position + limit.max_position) if bounded else 0.0
             reach = min(START_REACH, limit.max_position - middle)
-            share = SHARES_OF_RANGE[(index + offset) % len(SHARES_OF_RANGE)]
-            positions[name] = middle + reach * (2.0 * share - 1.0)
+            fraction = START_FRACTIONS[(index + offset) % len(START_FRACTIONS)]
+            positions[name] = middle + reach * (2.0 * fraction - 1.0)
         return positions
 
     def _target(self, handle: JointHandle, distance: float) -> float:
-        """A position that far away, upward where there is room; else the range's farther end."""
+        """Returns a position at a distance, upwards if possible, at most the farther end of the range."""
         limit = self.limits()[handle.name]
         up, down = limit.max_position - handle.position, handle.position - limit.min_position
         if up >= distance or up >= down:
@@ -220,22 +220,24 @@ class RobotHWConformance(ABC):
             assert limit.min_position - self.tolerance <= handle.position <= limit.max_position + self.tolerance, handle
 
     def test_wherever_it_stands_at_the_start_it_stays_until_it_is_commanded(self) -> None:
-        for offset in range(len(SHARES_OF_RANGE)):
-            wanted = self._start_positions(offset)
-            robot_hw = self._ready(wanted)
-            states = [robot_hw.get(JointStateInterface).get_handle(name) for name in wanted]
-            still = {handle.name for _, handles in self._commanded_at_rest(robot_hw) for handle in handles}
+        for offset in range(len(START_FRACTIONS)):
+            starts = self._start_positions(offset)
+            robot_hw = self._ready(starts)
+            states = [robot_hw.get(JointStateInterface).get_handle(name) for name in starts]
+            resting = {handle.name for _, handles in self._commanded_at_rest(robot_hw) for handle in handles}
             for _ in range(round(0.5 / self.period_s)):
                 for state in states:
-                    away = abs(state.position - wanted[state.name])
-                    assert state.name not in still or away <= self.tolerance, f"{state} moved from {wanted[state.name]}"
+                    error = abs(state.position - starts[state.name])
+                    assert state.name not in resting or error <= self.tolerance, (
+                        f"{state} moved from {starts[state.name]}"
+                    )
                 self._cycle(robot_hw, {})
             rates = self._commanded(robot_hw, (VelocityJointInterface, EffortJointInterface))
             assert all(handle.command == 0.0 for _, handles in rates for handle in handles)
             robot_hw.close()
 
     def _commanded_at_rest(self, robot_hw: RobotHW) -> Iterator[tuple[CommandInterface, list[JointHandle]]]:
-        """The interfaces whose joints stay where they are without a command; an effort of 0 may let them fall."""
+        """Yields the interfaces whose joints stay without a command; with an effort of 0, joints may fall."""
         return self._commanded(robot_hw, (*POSITIONS, VelocityJointInterface))
 
     def test_at_rest_it_has_no_fault(self) -> None:
@@ -247,19 +249,19 @@ class RobotHWConformance(ABC):
         robot_hw = self._ready()
         durations_s: dict[str, list[float]] = {"read": [], "write": []}
         for _ in range(TIMED_CYCLES):
-            for name, taken_s in durations_s.items():
-                begun_s = time.perf_counter()
+            for name, durations in durations_s.items():
+                start_s = time.perf_counter()
                 self._in_loop(getattr(robot_hw, name), self._time_s, self.period_s)
-                taken_s.append(time.perf_counter() - begun_s)
+                durations.append(time.perf_counter() - start_s)
                 if name == "read":
                     self._in_loop(robot_hw.seed_commands)
             self._time_s += self.period_s
             self.advance(self.period_s)
-        for name, taken_s in durations_s.items():
-            usual_s = sorted(taken_s)[-1 - round(SLOW_CYCLES_SHARE * TIMED_CYCLES)]
-            assert usual_s <= self.period_s, (
-                f"{name}() takes {usual_s * 1e3:.1f} ms or more in every fifth cycle, the period is "
-                f"{self.period_s * 1e3:g} ms; it must not wait: do that on a thread of its own, started in init()"
+        for name, durations in durations_s.items():
+            typical_s = sorted(durations)[-1 - round(SLOW_CYCLES_FRACTION * TIMED_CYCLES)]
+            assert typical_s <= self.period_s, (
+                f"{name}() takes {typical_s * 1e3:.1f} ms or more in every fifth cycle, the period is "
+                f"{self.period_s * 1e3:g} ms; it must not wait: wait in a separate thread, started in init()"
             )
 
     def test_commanded_to_hold_it_stays(self) -> None:
@@ -295,22 +297,24 @@ class RobotHWConformance(ABC):
             for handle in limited:
                 goals[handle] = self._target(handle, self.jump)
                 jump = abs(goals[handle] - handle.position)
-                least_s = TIMELY_SHARE * (jump - 2.0 * self.tolerance) / limits[handle.name].max_velocity
-                assert least_s >= 5 * self.period_s, (
+                min_duration_s = (
+                    MIN_DURATION_FRACTION * (jump - 2.0 * self.tolerance) / limits[handle.name].max_velocity
+                )
+                assert min_duration_s >= 5 * self.period_s, (
                     f"a jump of {jump} of {handle.name} takes too few cycles; give a greater one, more room at the "
                     "start, a smaller tolerance or a shorter period"
                 )
-                assert self._duration_of_jump(robot_hw, handle, goals) >= least_s, handle
+                assert self._duration_of_jump(robot_hw, handle, goals) >= min_duration_s, handle
 
     def _duration_of_jump(self, robot_hw: RobotHW, handle: JointHandle, goals: Mapping[JointHandle, float]) -> float:
-        """Returns how long the joint takes from its start position to its goal [s]; fails if it does not arrive."""
-        start, left_s = handle.position, math.nan
+        """Returns the duration of a joint's motion to its goal [s]; fails if the joint does not arrive."""
+        start, start_s = handle.position, math.nan
         for _ in range(round((self.settle_s + self.jump / self.limits()[handle.name].max_velocity) / self.period_s)):
             self._cycle(robot_hw, goals)
             if abs(handle.position - start) <= self.tolerance:
-                left_s = self._read_s
+                start_s = self._read_s
             if abs(handle.position - goals[handle]) <= self.tolerance:
-                return self._read_s - left_s
+                return self._read_s - start_s
         raise AssertionError(f"{handle.name} has not come from {start} to {goals[handle]}, but to {handle.position}")
 
     def test_commands_beyond_the_limits_or_no_numbers_keep_it_within_them(self) -> None:
@@ -328,7 +332,7 @@ class RobotHWConformance(ABC):
         )
 
     def _assert_that_joints_move(self, interface: type[CommandInterface], size: Callable[[JointLimits], float]) -> None:
-        """Commands each joint by `size` of its limits to where there is room, then 0."""
+        """Commands each joint by `size` of its limits towards free room, then by 0."""
         for robot_hw, handles, commands in self._claimed(interface):
             for handle in handles:
                 start, target = handle.position, self._target(handle, self.step)
@@ -353,11 +357,11 @@ class RobotHWConformance(ABC):
                 self._assert_no_faster_than_the_limit(robot_hw, handles, command)
 
     def _assert_no_faster_than_the_limit(self, robot_hw: RobotHW, handles: list[JointHandle], command: float) -> None:
-        """Commands all joints so for a while."""
+        """Commands all joints by `command` for some time and checks speeds and efforts."""
         self._cycle(robot_hw, dict.fromkeys(handles, command))
         starts, began_s = [handle.position for handle in handles], self._read_s
-        age_s, watched_s = (STATE_AGE_S, 0.4) if self.real_time else (0.0, 0.1)
-        for _ in range(round(watched_s / self.period_s)):
+        age_s, duration_s = (STATE_AGE_S, 0.4) if self.real_time else (0.0, 0.1)
+        for _ in range(round(duration_s / self.period_s)):
             self._cycle(robot_hw, dict.fromkeys(handles, command))
             for handle, start in zip(handles, starts, strict=True):
                 limit = self.limits()[handle.name]

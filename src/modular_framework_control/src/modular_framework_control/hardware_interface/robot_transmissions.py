@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joints of a `RobotHW` whose actuators are known: the handles of both, and the conversion between them in each cycle.
+"""Joints of a `RobotHW` that are moved by actuators through transmissions: handles, and conversions in each cycle.
 
 def init(self, root_nh, robot_hw_nh):
     self._transmissions = RobotTransmissions(self, root_nh, ["motor_1", "motor_2"])
@@ -8,13 +8,13 @@ def init(self, root_nh, robot_hw_nh):
 
 def read(self, time_s, period_s):
     for motor in self._transmissions.actuators.values():
-        motor.position, motor.velocity, motor.effort = ...      # what is measured
+        motor.position, motor.velocity, motor.effort = ...      # measured values
     self._transmissions.propagate_states()
 
 def write(self, time_s, period_s):
     self._guard.enforce(period_s)
     self._transmissions.propagate_commands()
-    ... = motor.command_position                                # what is sent
+    ... = motor.command_position                                # value to send
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ CommandedInterface = PositionJointInterface | VelocityJointInterface | EffortJoi
 
 @dataclass(frozen=True, slots=True)
 class _CommandPath:
-    """The commands of one kind of one transmission: from its joints to its actuators."""
+    """Conversion of one kind of command of one transmission, from joints to actuators."""
 
     joints: tuple[JointHandle, ...]
     actuators: tuple[ActuatorHandle, ...]
@@ -48,22 +48,23 @@ class _CommandPath:
 
 
 class RobotTransmissions:
-    """The transmissions of `robot_description` whose actuators a hardware has.
+    """The transmissions of `robot_description` for the actuators of a hardware.
 
-    Makes the joints of these transmissions: they are in the JointStateInterface of the hardware, and in those
-    interfaces that the transmissions name; interfaces that are not there yet are registered.
+    The constructor creates the joints of these transmissions, in the JointStateInterface of the hardware and in the
+    interfaces that the transmissions name; missing interfaces are registered.
 
     Args:
-        robot_hw: the hardware, in its `init`.
-        root_nh: where `robot_description` is found.
-        actuators: names of the actuators that the hardware has; transmissions of others are left to other hardware.
+        robot_hw: Hardware, during its `init`.
+        root_nh: Namespace of `robot_description`.
+        actuators: Names of the hardware's actuators; transmissions without these actuators are ignored.
 
     Attributes:
-        actuators: handles by name, in the order given.
+        actuators: Actuator handles by name, in the given order.
 
     Raises:
-        ParameterError: no description, or it is not XML.
-        TransmissionError: a transmission is faulty, an actuator has none, or one needs an actuator that is not there.
+        ParameterError: The description is missing or not XML.
+        TransmissionError: A transmission is faulty, an actuator has no transmission, or a transmission needs an unknown
+            actuator.
     """
 
     def __init__(self, robot_hw: RobotHW, root_nh: NodeHandle, actuators: Iterable[str]) -> None:
@@ -71,8 +72,8 @@ class RobotTransmissions:
         description = root_nh.get_param("robot_description")
         if not isinstance(description, str):
             raise ParameterError(
-                f"parameter {join_names(root_nh.namespace, 'robot_description')} is not set; the "
-                "transmissions are found there: load the robot description first"
+                f"parameter {join_names(root_nh.namespace, 'robot_description')} is not set, but needed for "
+                "transmissions; load the robot description first"
             )
         self._infos = [
             info for info in read_transmissions(description) if not self.actuators.keys().isdisjoint(info.actuators)
@@ -87,13 +88,13 @@ class RobotTransmissions:
     def _check_actuators(self) -> None:
         known = {name for info in self._infos for name in info.actuators}
         faults = [
-            f"{info.where}: actuator '{name}' is not there; this hardware has: {', '.join(self.actuators)}"
+            f"{info.where}: unknown actuator '{name}'; this hardware has: {', '.join(self.actuators)}"
             for info in self._infos
             for name in info.actuators
             if name not in self.actuators
         ]
         faults += [
-            f"robot_description: actuator '{name}' has no <transmission>; actuators that have one: "
+            f"robot_description: actuator '{name}' has no <transmission>; actuators with a transmission: "
             f"{', '.join(sorted(known)) or 'none'}"
             for name in self.actuators
             if name not in known
@@ -104,13 +105,13 @@ class RobotTransmissions:
     def _command_paths(self, robot_hw: RobotHW, info: TransmissionInfo) -> list[_CommandPath]:
         actuators = tuple(self.actuators[name] for name in info.actuators)
         transmission = info.transmission
-        ways: tuple[tuple[type[CommandedInterface], Callable[[Values], Values], str], ...] = (
+        conversions: tuple[tuple[type[CommandedInterface], Callable[[Values], Values], str], ...] = (
             (PositionJointInterface, transmission.actuator_positions, "command_position"),
             (VelocityJointInterface, transmission.actuator_velocities, "command_velocity"),
             (EffortJointInterface, transmission.actuator_efforts, "command_effort"),
         )
         paths = []
-        for interface_class, convert, attribute in ways:
+        for interface_class, convert, attribute in conversions:
             if interface_class in info.interfaces:
                 interface = _interface(robot_hw, interface_class)
                 joints = tuple(interface.register_handle(JointHandle(self._states[name])) for name in info.joints)
@@ -118,7 +119,7 @@ class RobotTransmissions:
         return paths
 
     def propagate_states(self) -> None:
-        """Computes the joint states from those of the actuators."""
+        """Computes the joint states from the actuator states."""
         for info in self._infos:
             actuators = [self.actuators[name] for name in info.actuators]
             joints = [self._states[name] for name in info.joints]
@@ -129,7 +130,7 @@ class RobotTransmissions:
                 joint.position, joint.velocity, joint.effort = position, velocity, effort
 
     def propagate_commands(self) -> None:
-        """Computes the commands of the actuators from those of the joints; not a number while a joint has none."""
+        """Computes the actuator commands from the joint commands; NaN if a joint has no command."""
         for path in self._paths:
             commands = path.convert([joint.command for joint in path.joints])
             for actuator, command in zip(path.actuators, commands, strict=True):
@@ -137,7 +138,7 @@ class RobotTransmissions:
 
 
 def _interface(robot_hw: RobotHW, kind: type[InterfaceT]) -> InterfaceT:
-    """The interface of that class; registered if it was not there."""
+    """Returns the interface of a class, registering a missing interface."""
     found = robot_hw.find(kind)
     if found is None:
         found = kind()

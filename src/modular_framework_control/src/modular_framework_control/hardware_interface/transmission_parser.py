@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the <transmission> elements of a robot description, in the layout of ros_control; names all faults at once."""
+"""Parser for the <transmission> elements of a robot description, in ros_control's format, that lists all faults."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class TransmissionInfo:
     """One transmission of a description.
 
     Attributes:
-        element: of the description.
-        transmission: its formulas.
-        actuators: names, in the order of the formulas.
-        joints: names, in the order of the formulas.
-        interfaces: through which its joints are seen and commanded.
+        element: Element of the description.
+        transmission: Conversion formulas.
+        actuators: Actuator names, in the order of the formulas.
+        joints: Joint names, in the order of the formulas.
+        interfaces: Hardware interfaces of the joints.
     """
 
     element: urdf.Transmission
@@ -57,23 +57,23 @@ class TransmissionInfo:
 
     @property
     def where(self) -> str:
-        """The beginning of messages about it."""
+        """Prefix of messages on this transmission."""
         return f"{WHERE}:{self.element.line}: transmission '{self.element.name}'"
 
 
 class _FaultError(Exception):
-    """One fault of one transmission."""
+    """A fault in one transmission."""
 
     def __init__(self, line: int, text: str) -> None:
         super().__init__(f"{WHERE}:{line}: {text}")
 
 
 def read_transmissions(description: str) -> list[TransmissionInfo]:
-    """The transmissions of a robot description, in their order.
+    """Returns the transmissions of a robot description, in their order.
 
     Raises:
-        TransmissionError: some are faulty; each is named, with the line, what was found and what is allowed.
-        ParameterError: the description is not XML.
+        TransmissionError: Transmissions are faulty; the message lists all faults with lines and allowed values.
+        ParameterError: The description is not XML.
     """
     infos: list[TransmissionInfo] = []
     faults: list[str] = []
@@ -83,14 +83,14 @@ def read_transmissions(description: str) -> list[TransmissionInfo]:
         except _FaultError as fault:
             faults.append(str(fault))
             continue
-        for kind, mine, taken in (
+        for kind, own_names, other_names in (
             ("transmission", {info.element.name}, {other.element.name for other in infos}),
             ("joint", set(info.joints), {name for other in infos for name in other.joints}),
             ("actuator", set(info.actuators), {name for other in infos for name in other.actuators}),
         ):
             faults += [
-                f"{info.where}: {kind} '{name}' is named by another transmission too; name each once"
-                for name in sorted(mine & taken)
+                f"{info.where}: {kind} '{name}' is also named by another transmission; names must be unique"
+                for name in sorted(own_names & other_names)
             ]
         infos.append(info)
     if faults:
@@ -99,7 +99,7 @@ def read_transmissions(description: str) -> list[TransmissionInfo]:
 
 
 class _Reader:
-    """Checks one <transmission>."""
+    """Reader for one <transmission>."""
 
     def __init__(self, transmission: urdf.Transmission) -> None:
         self._transmission, self._line = transmission, transmission.line
@@ -110,7 +110,7 @@ class _Reader:
         if not name:
             raise _FaultError(self._line, "<transmission> has no name; give it an attribute name")
         if kind not in (SIMPLE, DIFFERENTIAL, FOUR_BAR):
-            found = f"<type> is '{kind}'" if kind else "it has no <type>"
+            found = f"<type> is '{kind}'" if kind else "<type> is missing"
             raise _FaultError(self._line, f"{self._label}: {found}; allowed: {SIMPLE}, {DIFFERENTIAL}, {FOUR_BAR}")
         joints = self._in_order("joint", self._transmission.joints)
         actuators = self._in_order("actuator", self._transmission.actuators)
@@ -132,45 +132,45 @@ class _Reader:
         return pair((reductions[0], reductions[1]), (ratios[0], ratios[1]), (offsets[0], offsets[1]))
 
     def _in_order(self, tag: str, parts: tuple[TransmissionPart, ...]) -> list[TransmissionPart]:
-        """The joints or actuators, in the order of their roles where there are two."""
+        """Returns the joints or actuators, two of them in the order of their roles."""
         kind = self._transmission.kind
         count = 1 if kind == SIMPLE else 2
         if len(parts) != count:
-            raise _FaultError(self._line, f"{self._label}: it has {len(parts)} <{tag}>; {kind} has {count}")
+            raise _FaultError(self._line, f"{self._label}: got {len(parts)} <{tag}>; {kind} has {count}")
         for part in parts:
             if not part.name:
                 raise _FaultError(part.line, f"{self._label}: <{tag}> has no name; give it an attribute name")
         if count == 1:
             return list(parts)
         roles = {part.role: part for part in parts}
-        wanted = [f"{tag}1", f"{tag}2"]
-        if sorted(roles) != wanted:
+        expected = [f"{tag}1", f"{tag}2"]
+        if sorted(roles) != expected:
             found = ", ".join(f"'{part.role}'" for part in parts)
             raise _FaultError(
                 parts[0].line,
                 f"{self._label}: the roles of its <{tag}> are {found}; expected "
-                f"<role>{wanted[0]}</role> in one and <role>{wanted[1]}</role> in the other",
+                f"<role>{expected[0]}</role> in one and <role>{expected[1]}</role> in the other",
             )
-        return [roles[role] for role in wanted]
+        return [roles[role] for role in expected]
 
     def _reduction(self, part: TransmissionPart, default: float | None) -> float:
         return self._number(part, "mechanicalReduction", part.reduction, default)
 
-    def _number(self, part: TransmissionPart, tag: str, given: LocatedText | None, default: float | None) -> float:
-        """A number inside a joint or actuator; a reduction is not 0."""
+    def _number(self, part: TransmissionPart, tag: str, located: LocatedText | None, default: float | None) -> float:
+        """Returns a number of a joint or actuator; a reduction must not be 0."""
         label = f"{self._label}: <{tag}> of {part.tag} '{part.name}'"
-        if given is None:
+        if located is None:
             if default is None:
                 raise _FaultError(part.line, f"{label} is missing; give a number other than 0")
             return default
         try:
-            value = float(given.text)
+            value = float(located.text)
         except ValueError:
             value = math.nan
         nonzero = tag == "mechanicalReduction"
         if not math.isfinite(value) or (nonzero and value == 0.0):
             raise _FaultError(
-                given.line, f"{label} is '{given.text}'; expected a number" + (" other than 0" if nonzero else "")
+                located.line, f"{label} is '{located.text}'; expected a number" + (" other than 0" if nonzero else "")
             )
         return value
 
@@ -178,7 +178,7 @@ class _Reader:
         found = [self._interfaces_of(joint) for joint in joints]
         if any(set(other) != set(found[0]) for other in found):
             raise _FaultError(
-                self._line, f"{self._label}: its joints have different hardware interfaces; give all of them the same"
+                self._line, f"{self._label}: the joints have different hardware interfaces; give all joints the same"
             )
         return found[0]
 
@@ -187,9 +187,9 @@ class _Reader:
         if not joint.interfaces:
             raise _FaultError(joint.line, f"{label} is missing; give one of: {', '.join(INTERFACES)}")
         names = {}
-        for given in joint.interfaces:
-            name = given.text if "/" in given.text else f"hardware_interface/{given.text}"
+        for located in joint.interfaces:
+            name = located.text if "/" in located.text else f"hardware_interface/{located.text}"
             if name not in INTERFACES:
-                raise _FaultError(given.line, f"{label} is '{given.text}'; allowed: {', '.join(INTERFACES)}")
+                raise _FaultError(located.line, f"{label} is '{located.text}'; allowed: {', '.join(INTERFACES)}")
             names[name] = INTERFACES[name]
         return tuple(names.values())

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The transmissions of ros_control's transmission_interface: formulas between actuators and joints.
+"""The transmissions of ros_control's transmission_interface: conversions between actuators and joints.
 
-Each maps positions, velocities and efforts from actuators to joints and back; both ways are inverse to each other.
-Ratios are `n`, of actuators `n_a` and of joints `n_j`; a ratio above 1 reduces speed and raises effort, a negative one
-reverses the direction. Offsets are positions of the joints where the actuators are at 0.
+Each transmission maps positions, velocities and efforts from actuators to joints, and back by the inverse formulas.
+Ratios are `n`, for actuators `n_a` and for joints `n_j`; a ratio above 1 reduces speed and raises effort, a negative
+ratio reverses the direction. Offsets are the joint positions at actuator positions 0.
 """
 
 from __future__ import annotations
@@ -20,50 +20,50 @@ Pair = tuple[float, float]
 
 
 class TransmissionError(ParameterError):
-    """A transmission cannot be as it is described."""
+    """The description of a transmission is invalid."""
 
 
 class Transmission(ABC):
-    """Base: positions of joints and actuators [rad|m], their velocities [rad/s|m/s] and efforts [Nm|N].
+    """Base class; converts positions [rad|m], velocities [rad/s|m/s] and efforts [Nm|N].
 
     Attributes:
-        size: number of its actuators, and of its joints.
+        size: Number of actuators and of joints.
     """
 
     size: int
 
     @abstractmethod
     def joint_positions(self, actuators: Values) -> Values:
-        """Positions of the joints, by those of the actuators."""
+        """Returns joint positions from actuator positions."""
 
     @abstractmethod
     def joint_velocities(self, actuators: Values) -> Values:
-        """Velocities of the joints, by those of the actuators."""
+        """Returns joint velocities from actuator velocities."""
 
     @abstractmethod
     def joint_efforts(self, actuators: Values) -> Values:
-        """Efforts of the joints, by those of the actuators."""
+        """Returns joint efforts from actuator efforts."""
 
     @abstractmethod
     def actuator_positions(self, joints: Values) -> Values:
-        """Positions of the actuators, by those of the joints."""
+        """Returns actuator positions from joint positions."""
 
     @abstractmethod
     def actuator_velocities(self, joints: Values) -> Values:
-        """Velocities of the actuators, by those of the joints."""
+        """Returns actuator velocities from joint velocities."""
 
     @abstractmethod
     def actuator_efforts(self, joints: Values) -> Values:
-        """Efforts of the actuators, by those of the joints."""
+        """Returns actuator efforts from joint efforts."""
 
 
 @dataclass(frozen=True)
 class SimpleTransmission(Transmission):
-    """One actuator turns one joint by gears or a belt: x_a = n (x_j - offset), v_a = n v_j, tau_j = n tau_a.
+    """One actuator moves one joint by gears or a belt: x_a = n (x_j - offset), v_a = n v_j, tau_j = n tau_a.
 
     Attributes:
-        reduction: n.
-        offset: of the joint [rad|m].
+        reduction: Ratio n.
+        offset: Offset of the joint [rad|m].
     """
 
     reduction: float
@@ -94,12 +94,12 @@ class SimpleTransmission(Transmission):
 
 @dataclass(frozen=True)
 class _PairTransmission(Transmission):
-    """Two actuators move two joints; positions follow the formulas of velocities, with the offsets subtracted or added.
+    """Two actuators move two joints; positions follow the formulas of velocities with offsets.
 
     Attributes:
-        actuator_reduction: n_a1, n_a2.
-        joint_reduction: n_j1, n_j2.
-        offset: of the joints [rad|m].
+        actuator_reduction: Ratios n_a1, n_a2.
+        joint_reduction: Ratios n_j1, n_j2.
+        offset: Offsets of the joints [rad|m].
     """
 
     actuator_reduction: Pair
@@ -153,8 +153,8 @@ class FourBarLinkageTransmission(_PairTransmission):
     v_a1 = n_j1 n_a1 v_j1, v_a2 = n_a2 (v_j1 + n_j2 v_j2);
     tau_j1 = n_j1 n_a1 tau_a1, tau_j2 = n_j2 (n_a2 tau_a2 - tau_j1).
 
-    These are ros_control's formulas. Its efforts do not conserve power (that would be tau_j1 = n_j1 n_a1 tau_a1
-    + n_a2 tau_a2), but robot descriptions and gains are tuned for them.
+    These are ros_control's formulas. The efforts do not conserve power (which would need tau_j1 = n_j1 n_a1 tau_a1
+    + n_a2 tau_a2), but robot descriptions and gains are tuned for these formulas.
     """
 
     def joint_velocities(self, actuators: Values) -> Values:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot description, with the kind of error that controllers and hardware raise for wrong parameters."""
+"""Robot description parsing with ParameterError for faults."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ def parse_description(description: str, where: str = "robot_description") -> Rob
     """Reads a robot description.
 
     Args:
-        description: the XML text.
-        where: what to call it in messages.
+        description: XML text.
+        where: Name of the description in messages.
 
     Raises:
-        ParameterError: not well-formed XML, it has a DOCTYPE, or something in it is no number.
+        ParameterError: The text is not well-formed XML, has a DOCTYPE, or a value is not a number.
     """
     try:
         return read_urdf(description, where)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds the packages of the sourced workspace."""
+"""Packages of the sourced workspace."""
 
 from __future__ import annotations
 
@@ -9,6 +9,6 @@ import rospkg
 
 
 def packages_of_workspace() -> dict[str, Path]:
-    """Folder of each package, by name."""
+    """Returns the folder of each package, by name."""
     packages = rospkg.RosPack()
     return {name: Path(packages.get_path(name)) for name in packages.list()}
