@@ -177,7 +177,7 @@ class RealTimeRig(Rig):
         self._arm = arm
         self._due_s = time.monotonic()
         self._loop_time = LoopTime()
-        self._loop_time.longest_step_s = LONGEST_STEP_S
+        self._loop_time.max_step_s = LONGEST_STEP_S
         super().__init__(
             "ur_emulator", UrArmHardware(), _parameters({"robot_ip_address": arm.address}, "position"), 0.06
         )
