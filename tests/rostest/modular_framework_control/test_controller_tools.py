@@ -120,7 +120,7 @@ def test_a_spawner_starts_what_it_can_and_reports_what_it_cannot(tool: Callable[
     process = tool("spawner", "--timeout", "1", "--wait-for", "robot_awake", "states", "absent", "arm")
     awake = rospy.Publisher("robot_awake", Bool, queue_size=1, latch=True)
     for line in process.stdout:
-        if "topic /robot_awake has not said True for 1 s" in line:
+        if "topic /robot_awake has not published True for 1 s" in line:
             break
     awake.publish(True)
     wait_until({"states": "running", "arm": "running"})

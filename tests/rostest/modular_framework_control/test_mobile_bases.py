@@ -135,7 +135,7 @@ def test_a_second_publisher_brings_the_base_to_rest(cmd_vel: rospy.Publisher, ro
     finally:
         other.terminate()
         other.wait()
-    until(lambda: "2 publishers; only one is allowed" in robot.log(), "the reason in the log")
+    until(lambda: "got 2 publishers; expected one" in robot.log(), "the reason in the log")
 
     def drives() -> bool:
         cmd_vel.publish(twist(0.2, 0.0))

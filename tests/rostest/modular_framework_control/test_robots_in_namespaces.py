@@ -82,4 +82,4 @@ def test_readiness_and_figures_are_published_under_the_names_of_each(robots: Any
 
 
 def test_a_description_that_is_not_the_robots_is_not_taken_and_the_log_says_so(robots: Any) -> None:
-    assert "/robot_description is not taken, the robot's own is looked for: /right/robot_description" in robots.log()
+    assert "/robot_description is ignored, as this robot's parameter is /right/robot_description" in robots.log()

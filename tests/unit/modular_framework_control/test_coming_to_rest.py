@@ -131,7 +131,7 @@ def test_a_robot_whose_velocities_are_never_0_is_believed_after_a_while(make_nod
     node, robot_hw = make_node(1.0)
     robot_hw.noise = 1e-3
     assert moves_after(node, robot_hw)
-    assert 10 < len(robot_hw.written) <= robot_hw_node.RESTLESS_S * RATE + 2
+    assert 10 < len(robot_hw.written) <= robot_hw_node.MIN_WRITE_TIME_S * RATE + 2
 
 
 def test_a_robot_that_does_not_stop_is_not_waited_for_without_end(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The action server of a controller: passes goals to the control loop, and their status and results to the clients."""
+"""Passes action goals to a controller in the control loop, and their status and results to the clients."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from modular_framework_ros.action_server import SteadyActionServer
 
 @contextlib.contextmanager
 def released(lock: threading.RLock) -> Iterator[None]:
-    """Gives the lock, which the caller has acquired once, to others: a cancel must not wait until a goal is checked."""
+    """Releases a lock held once by the caller: a cancel request must not wait until a goal has been checked."""
     lock.release()
     try:
         yield
@@ -32,7 +32,7 @@ MakeResult = Callable[[RealtimeGoalHandle[Any]], Any]
 
 
 class GoalRefusedError(Exception):
-    """A goal is refused at once; carries the result to send."""
+    """Raised if a goal is rejected on arrival; carries the result to send."""
 
     def __init__(self, result: Any, text: str) -> None:
         super().__init__(text)
@@ -40,16 +40,16 @@ class GoalRefusedError(Exception):
 
 
 class ControllerActionServer:
-    """Serves one action of a controller with any number of goals, of which the newest is followed.
+    """Serves one action of a controller; a new goal preempts the previous goal.
 
     Args:
-        name: absolute action name.
-        action: the action's message class.
-        submit: hands a goal message and its goal handle to the controller, or raises GoalRefusedError.
-        cancel: asks the controller to end a goal handle.
-        make_result: result message of a finished goal handle.
-        outbox: thread that talks to ROS for the control loop.
-        is_fault: whether the log warns of a goal that ended as aborted or rejected.
+        name: Absolute action name.
+        action: Message class of the action.
+        submit: Callback that passes a goal message and its goal handle to the controller, or raises GoalRefusedError.
+        cancel: Callback that requests the controller to cancel a goal.
+        make_result: Callback that returns the result message of a finished goal.
+        outbox: Thread that publishes for the control loop.
+        is_fault: Callback that decides whether to log a warning for an aborted or rejected goal.
     """
 
     def __init__(
@@ -73,11 +73,11 @@ class ControllerActionServer:
         self._server.start()
 
     def close(self) -> None:
-        """Stops serving."""
+        """Shuts the action server down."""
         self._server.stop()
 
     def publish_feedback(self, goal_handle: RealtimeGoalHandle[Any], feedback: Any) -> None:
-        """Sends feedback to the client of `goal_handle`; nothing happens when the goal has ended meanwhile."""
+        """Sends feedback to the client of `goal_handle`, unless the goal has already ended."""
         goal = self._goals.get(goal_handle)
         if goal is not None:
             goal.publish_feedback(feedback)
@@ -96,7 +96,7 @@ class ControllerActionServer:
             del self._goals[goal_handle]
             rospy.logwarn("%s: goal rejected: %s", self._server.ns, error)
             goal.set_rejected(error.result, str(error))
-        except Exception as error:  # whatever is in the message, its sender gets an answer
+        except Exception as error:  # the client needs a reply to any message
             del self._goals[goal_handle]
             rospy.logerr("%s: goal rejected: %s: %s", self._server.ns, type(error).__name__, error)
             goal.set_rejected(None, f"{type(error).__name__}: {error}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command-line tool controller_group: controllers that belong together are started, and exchanged, together."""
+"""Starts and switches groups of controllers: the command-line tool controller_group."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Groups = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True, slots=True)
 class GroupPlan:
-    """The controllers to load, start and stop so that one group runs.
+    """Lists the controllers to load, start and stop so that one group runs.
 
     Attributes:
-        load: controllers of the group that are not loaded, in its order.
-        start: those that do not run, in its order.
-        stop: controllers that run and are in other groups only.
+        load: Controllers of the group that are not loaded, in the order of the group.
+        start: Controllers of the group that are not running, in the order of the group.
+        stop: Running controllers that belong only to other groups.
     """
 
     load: tuple[str, ...]
@@ -35,15 +35,15 @@ class GroupPlan:
 
 
 def read_groups(value: object) -> Groups:
-    """The parameter `controller_groups`, checked.
+    """Returns the checked value of the parameter `controller_groups`.
 
     Raises:
-        ControllerManagerClientError: not a mapping of names to lists of names.
+        ControllerManagerClientError: If `value` is not a mapping of names to lists of names.
     """
     where = f"parameter {rospy.resolve_name('controller_groups')}"
     if not isinstance(value, dict) or not value:
         raise ControllerManagerClientError(
-            f"{where}: got {value!r}; expected names of groups, each with the list of its controllers"
+            f"{where}: got {value!r}; expected a mapping of group names to lists of controllers"
         )
     for group, controllers in value.items():
         if not isinstance(controllers, list) or not all(isinstance(name, str) and name for name in controllers):
@@ -52,30 +52,30 @@ def read_groups(value: object) -> Groups:
 
 
 def plan_group(groups: Groups, group: str, states: Mapping[str, str]) -> GroupPlan:
-    """Computes what has to be done for `group`.
+    """Returns the controllers to load, start and stop for a group.
 
     Args:
-        groups: controllers of each group.
-        group: the wanted one.
-        states: state of each loaded controller by name.
+        groups: Controllers of each group.
+        group: Name of the requested group.
+        states: State of each loaded controller by name.
 
     Raises:
-        ControllerManagerClientError: no such group, or it has no controllers.
+        ControllerManagerClientError: If the group is unknown or has no controllers.
     """
     if not groups.get(group):
         raise ControllerManagerClientError(
             f"no controllers are defined for group '{group}'; known groups: {', '.join(sorted(groups))}"
         )
     wanted = tuple(dict.fromkeys(groups[group]))
-    others = dict.fromkeys(name for names in groups.values() for name in names if name not in wanted)
+    other_controllers = dict.fromkeys(name for names in groups.values() for name in names if name not in wanted)
     return GroupPlan(
         tuple(name for name in wanted if name not in states),
         tuple(name for name in wanted if states.get(name) != "running"),
-        tuple(name for name in others if states.get(name) == "running"),
+        tuple(name for name in other_controllers if states.get(name) == "running"),
     )
 
 
-def _list(groups: Groups) -> None:
+def _print_groups(groups: Groups) -> None:
     print(f"Number of groups: {len(groups)}")
     for group in sorted(groups):
         print(f"  {group}")
@@ -101,13 +101,13 @@ def _bring_up(groups: Groups, group: str, client: ControllerManagerClient, switc
 
 
 def controller_group_main() -> int:
-    """List groups of controllers, load and start one, or switch to one from the others."""
+    """List the groups of controllers, load and start one group, or switch from the other groups to one group."""
     parser = argparse.ArgumentParser(prog="controller_group", description=controller_group_main.__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="list the groups and their controllers")
     for name, text in (
         ("spawn", "load and start the controllers of a group"),
-        ("switch", "start the controllers of a group and stop those of the others, in one cycle"),
+        ("switch", "start the controllers of a group and stop those of the other groups, in one cycle"),
     ):
         commands.add_parser(name, help=text).add_argument("group", help="name of a group in controller_groups")
     arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
@@ -115,7 +115,7 @@ def controller_group_main() -> int:
     try:
         groups = read_groups(rospy.get_param("controller_groups", None))
         if arguments.command == "list":
-            _list(groups)
+            _print_groups(groups)
         else:
             _bring_up(groups, arguments.group, ControllerManagerClient(), arguments.command == "switch")
     except ControllerManagerClientError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics, actions and services of each controller, under the names of ros_controllers."""
+"""Opens the topics, actions and services of each controller under the names used by ros_controllers."""
 
 from __future__ import annotations
 
@@ -60,15 +60,15 @@ from modular_framework_ros.node_handle import join_names
 from modular_framework_ros.reconfiguration import Adjustable, Reconfiguration
 
 QUEUE_SIZE = 50
-"""Messages that wait for a subscriber: a simulation that runs faster than real time sends them in bursts."""
+"""Length of the publishers' queues: a simulation that runs faster than real time sends messages in bursts."""
 
 PID_GAINS = (
     Adjustable("p", -1e5, 1e5, "command per error"),
-    Adjustable("i", -1e5, 1e5, "command per error and second"),
-    Adjustable("d", -1e3, 1e3, "command per rate of the error"),
-    Adjustable("i_clamp_min", -1e5, 0.0, "smallest part of the integral in the command"),
-    Adjustable("i_clamp_max", 0.0, 1e5, "largest part of the integral in the command"),
-    Adjustable("antiwindup", False, True, "stop to add up errors at the bounds of the integral"),
+    Adjustable("i", -1e5, 1e5, "command per integral of the error"),
+    Adjustable("d", -1e3, 1e3, "command per derivative of the error"),
+    Adjustable("i_clamp_min", -1e5, 0.0, "minimum integral term of the command"),
+    Adjustable("i_clamp_max", 0.0, 1e5, "maximum integral term of the command"),
+    Adjustable("antiwindup", False, True, "clamp the integrated error itself"),
 )
 
 
@@ -90,10 +90,10 @@ class JointStateRosInterface:
 
 
 class JointTrajectoryRosInterface:
-    """The topics, action and service of a trajectory controller.
+    """Connects a trajectory controller to ROS.
 
-    Publishes `<name>/state`; subscribes `<name>/command`; serves `<name>/follow_joint_trajectory` (action) and
-    `<name>/query_state` (service).
+    Publishes `<name>/state`; subscribes to `<name>/command`; serves the action `<name>/follow_joint_trajectory` and
+    the service `<name>/query_state`.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class JointTrajectoryRosInterface:
         self._controller = controller
         self._name = join_names(namespace, name)
         self._loop_time = loop_time
-        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
+        with contextlib.ExitStack() as opened:  # closes the opened connections if a later one fails
             self._state = rospy.Publisher(f"{self._name}/state", JointTrajectoryControllerState, queue_size=QUEUE_SIZE)
             opened.callback(self._state.unregister)
             self._action = ControllerActionServer(
@@ -127,7 +127,7 @@ class JointTrajectoryRosInterface:
         )
 
     def close(self) -> None:
-        """Closes topics, action and service."""
+        """Closes the topics, the action and the service."""
         self._opened.close()
 
     def _submit(self, message: FollowJointTrajectoryGoal, goal_handle: TrajectoryGoalHandle) -> None:
@@ -163,7 +163,7 @@ def _trajectory_result(goal_handle: RealtimeGoalHandle[TrajectoryErrorCode]) -> 
 
 
 class GripperRosInterface:
-    """The action and the topic of a gripper controller.
+    """Connects a gripper controller to ROS.
 
     Serves `<name>/gripper_cmd` (control_msgs/GripperCommand action); publishes `<name>/state`
     (control_msgs/JointControllerState).
@@ -173,7 +173,7 @@ class GripperRosInterface:
         self, controller: GripperActionController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
     ) -> None:
         self._controller = controller
-        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
+        with contextlib.ExitStack() as opened:  # closes the opened connections if a later one fails
             state = rospy.Publisher(join_names(namespace, f"{name}/state"), JointControllerState, queue_size=QUEUE_SIZE)
             opened.callback(state.unregister)
             self._action = ControllerActionServer(
@@ -193,7 +193,7 @@ class GripperRosInterface:
         controller.on_feedback = lambda goal_handle, state: outbox.put_droppable(self._feedback, goal_handle, state)
 
     def close(self) -> None:
-        """Closes topic and action."""
+        """Closes the topic and the action."""
         self._opened.close()
 
     def _submit(self, message: GripperCommandGoal, goal_handle: GripperGoalHandle) -> None:
@@ -207,7 +207,7 @@ class GripperRosInterface:
 
 
 def _is_gripper_fault(goal_handle: RealtimeGoalHandle[GripperState]) -> bool:
-    """Whether a goal did not end with stalled fingers, which may hold an object: the sender decides what that is."""
+    """Returns whether the goal failed; stalled fingers may hold an object, so only the client can judge them."""
     return goal_handle.result is None or not goal_handle.result.stalled
 
 
@@ -230,25 +230,25 @@ _ROS_INTERFACES: tuple[tuple[type[Controller], Any], ...] = (
 def attach_ros(
     controller: Controller, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
 ) -> Callable[[], None]:
-    """Opens the topics, actions and services of a controller, and dynamic_reconfigure of its gains.
+    """Opens the topics, actions and services of a controller, and dynamic_reconfigure servers for its gains.
 
     Args:
-        controller: an initialised controller; one of a class unknown here gets the latter only.
-        namespace: absolute namespace of the robot.
-        name: name of the controller.
-        outbox: thread that talks to ROS for the control loop.
-        loop_time: says how stamps of messages and the time of the control loop differ.
+        controller: Initialised controller; for a class from another package, only the gains are served.
+        namespace: Absolute namespace of the robot.
+        name: Name of the controller.
+        outbox: Thread that publishes for the control loop.
+        loop_time: Offset between the stamps of messages and the time of the control loop.
 
     Returns:
-        What closes them.
+        Callback that closes all of them.
     """
-    with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
+    with contextlib.ExitStack() as opened:  # closes the opened connections if a later one fails
         for controller_class, ros_interface in _ROS_INTERFACES:
             if isinstance(controller, controller_class):
                 opened.callback(ros_interface(controller, namespace, name, outbox, loop_time).close)
                 break
-        for below, pid in controller.pids.items():
-            gains = Reconfiguration(join_names(namespace, f"{name}/{below}"), PID_GAINS, pid, "gains")
+        for pid_name, pid in controller.pids.items():
+            gains = Reconfiguration(join_names(namespace, f"{name}/{pid_name}"), PID_GAINS, pid, "gains")
             opened.callback(gains.close)
             gains.connect()
         return opened.pop_all().close

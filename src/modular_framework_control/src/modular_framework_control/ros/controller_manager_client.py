@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Asks a controller manager for something over ROS, and says which service failed when it does not answer."""
+"""Calls the services of a controller manager, and names the service in each error."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from modular_framework_ros.node_handle import join_names
 
 
 class ControllerManagerClientError(Exception):
-    """The controller manager is not there, does not answer, or refused."""
+    """Raised if the controller manager is absent, does not respond or refuses a request."""
 
 
 class RefusedError(ControllerManagerClientError):
-    """The controller manager refused a request."""
+    """Raised if the controller manager refuses a request."""
 
 
 class ControllerManagerClient:
-    """The services of one controller manager.
+    """Calls the services of one controller manager.
 
     Args:
-        namespace: namespace of the robot; "" for that of the node.
-        timeout_s: how long to wait for a service [s of real time]; infinite waits for ever, 0 not at all.
-        ended: set to end all waits.
-        await_clock: whether the time counts only from when the simulated clock, if it is to be used, has begun.
+        namespace: Namespace of the robot; "" for the namespace of the node.
+        timeout_s: Maximum wait for a service in real time [s]; may be infinite, 0 for no wait.
+        ended: Event that ends all waits.
+        await_clock: Whether the timeout starts only once a simulated clock, if used, has started.
     """
 
     def __init__(
@@ -54,22 +54,28 @@ class ControllerManagerClient:
         self._await_clock = await_clock
 
     def last_calls(self) -> ControllerManagerClient:
-        """A client for clean-up at shutdown; it does not wait for a service that has gone."""
+        """Returns a client for the shutdown, which does not wait for a missing service."""
         return ControllerManagerClient(self.namespace, timeout_s=0.0)
 
     def load(self, name: str) -> None:
         """Loads a controller."""
-        self._ask("load_controller", LoadController, f"controller '{name}' was not loaded", name)
+        self._request("load_controller", LoadController, f"controller '{name}' was not loaded", name)
 
     def unload(self, name: str) -> None:
         """Unloads a controller."""
-        self._ask("unload_controller", UnloadController, f"controller '{name}' was not unloaded", name)
+        self._request("unload_controller", UnloadController, f"controller '{name}' was not unloaded", name)
 
     def switch(
         self, start: Sequence[str], stop: Sequence[str], strictness: int = SwitchControllerRequest.STRICT
     ) -> None:
-        """Stops and starts controllers."""
-        self._ask(
+        """Stops and starts controllers.
+
+        Args:
+            start: Controllers to start.
+            stop: Controllers to stop.
+            strictness: STRICT or BEST_EFFORT of SwitchControllerRequest.
+        """
+        self._request(
             "switch_controller",
             SwitchController,
             f"controllers were not switched (start {list(start)}, stop {list(stop)})",
@@ -81,31 +87,31 @@ class ControllerManagerClient:
         )
 
     def list_controllers(self) -> list[ControllerState]:
-        """All loaded controllers."""
+        """Returns all loaded controllers."""
         controllers: list[ControllerState] = self._call("list_controllers", ListControllers).controller
         return controllers
 
     def list_controller_types(self) -> list[str]:
-        """Known controller types."""
+        """Returns the known controller types."""
         types: list[str] = self._call("list_controller_types", ListControllerTypes).types
         return types
 
     def reload_libraries(self, force_kill: bool) -> None:
-        """Searches again for controller classes."""
-        self._ask(
+        """Reloads the controller classes; `force_kill` unloads the loaded controllers first."""
+        self._request(
             "reload_controller_libraries",
             ReloadControllerLibraries,
             "controller libraries were not reloaded",
             force_kill,
         )
 
-    def _ask(self, service: str, kind: Any, failure: str, *arguments: Any) -> None:
-        if not self._call(service, kind, *arguments).ok:
-            raise RefusedError(f"{failure}; the log of the controller manager says why")
+    def _request(self, service: str, service_class: Any, failure: str, *arguments: Any) -> None:
+        if not self._call(service, service_class, *arguments).ok:
+            raise RefusedError(f"{failure}; see the log of the controller manager")
 
-    def _call(self, service: str, kind: Any, *arguments: Any) -> Any:
+    def _call(self, service: str, service_class: Any, *arguments: Any) -> Any:
         name = join_names(self.namespace, f"controller_manager/{service}")
-        proxy = rospy.ServiceProxy(name, kind)
+        proxy = rospy.ServiceProxy(name, service_class)
         if self._timeout_s > 0.0:
             self._wait_for(proxy, name)
         try:
@@ -136,5 +142,5 @@ class ControllerManagerClient:
 
 
 def _simulation_is_starting() -> bool:
-    """Whether there is no simulated time yet: a simulation that loads a large world takes a while."""
+    """Returns whether simulated time has not started yet, such as while a large world is being loaded."""
     return not rospy.rostime.is_wallclock() and rospy.get_rostime().is_zero()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The functions of ros_control's module controller_manager.controller_manager_interface: ask, and print the answer.
+"""Provides the functions of ros_control's module controller_manager.controller_manager_interface.
 
-Each waits for its service without a timeout, prints the text of the public tool and returns whether the manager did
-it. Why it refused is on the log.
+Each function waits for its service without a timeout, prints the text of the public tool and returns whether the
+request succeeded. The cause of a failure is logged.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import rospy
 from modular_framework_control.ros.controller_manager_client import ControllerManagerClient, RefusedError
 
 Client = ControllerManagerClient | None
-"""The manager to ask; None is that of the node's namespace."""
+"""Controller manager to call; None for the manager in the namespace of the node."""
 
 
 def _client_or_default(client: Client) -> ControllerManagerClient:
@@ -23,13 +23,13 @@ def _client_or_default(client: Client) -> ControllerManagerClient:
 
 
 def list_controller_types(client: Client = None) -> None:
-    """Prints the known types of controllers, one a line."""
+    """Prints the known controller types, one per line."""
     for name in _client_or_default(client).list_controller_types():
         print(name)
 
 
 def list_controllers(client: Client = None) -> None:
-    """Prints the loaded controllers, one a line."""
+    """Prints the loaded controllers, one per line."""
     states = _client_or_default(client).list_controllers()
     if not states:
         print("No controllers are loaded in mechanism control")
@@ -40,12 +40,12 @@ def list_controllers(client: Client = None) -> None:
 
 def load_controller(name: str, client: Client = None) -> bool:
     """Loads a controller."""
-    return _answer(lambda: _client_or_default(client).load(name), f"Loaded '{name}'", f"Error when loading '{name}'")
+    return _succeeds(lambda: _client_or_default(client).load(name), f"Loaded '{name}'", f"Error when loading '{name}'")
 
 
 def unload_controller(name: str, client: Client = None) -> bool:
     """Unloads a controller."""
-    return _answer(
+    return _succeeds(
         lambda: _client_or_default(client).unload(name),
         f"Unloaded '{name}' successfully",
         f"Error when unloading '{name}'",
@@ -58,7 +58,7 @@ def start_controller(name: str, client: Client = None) -> bool:
 
 
 def start_controllers(names: Sequence[str], client: Client = None) -> bool:
-    """Starts controllers, all of them or none."""
+    """Starts all named controllers or none."""
     return start_stop_controllers(start_controllers=names, client=client)
 
 
@@ -68,35 +68,41 @@ def stop_controller(name: str, client: Client = None) -> bool:
 
 
 def stop_controllers(names: Sequence[str], client: Client = None) -> bool:
-    """Stops controllers, all of them or none."""
+    """Stops all named controllers or none."""
     return start_stop_controllers(stop_controllers=names, client=client)
 
 
 def start_stop_controllers(
     start_controllers: Sequence[str] = (), stop_controllers: Sequence[str] = (), client: Client = None
 ) -> bool:
-    """Starts and stops controllers in one switch, all of them or none."""
+    """Starts and stops controllers in one switch: all of them or none.
+
+    Args:
+        start_controllers: Controllers to start.
+        stop_controllers: Controllers to stop.
+        client: Controller manager to call.
+    """
     start, stop = list(start_controllers), list(stop_controllers)
-    done = [f"{word} {names} successfully" for word, names in (("Started", start), ("Stopped", stop)) if names]
-    return _answer(
+    success_text = [f"{word} {names} successfully" for word, names in (("Started", start), ("Stopped", stop)) if names]
+    return _succeeds(
         lambda: _client_or_default(client).switch(start, stop),
-        "\n".join(done),
+        "\n".join(success_text),
         f"Error when starting {start} and stopping {stop}",
     )
 
 
 def reload_libraries(force_kill: bool, restore: bool = False, client: Client = None) -> bool:
-    """Searches again for controller classes.
+    """Reloads the controller classes.
 
     Args:
-        force_kill: stop and unload the controllers that are loaded, which otherwise prevent it.
-        restore: load and start again what was there before.
-        client: the manager to ask.
+        force_kill: Whether to stop and unload the loaded controllers, which otherwise prevent the reload.
+        restore: Whether to load and start the former controllers again.
+        client: Controller manager to call.
     """
     manager = _client_or_default(client)
     print("Restore:", restore)
-    before = manager.list_controllers() if restore else []
-    if not _answer(
+    former_states = manager.list_controllers() if restore else []
+    if not _succeeds(
         lambda: manager.reload_libraries(force_kill),
         "Successfully reloaded libraries",
         "Failed to reload libraries. Do you still have controllers loaded?",
@@ -105,25 +111,25 @@ def reload_libraries(force_kill: bool, restore: bool = False, client: Client = N
     if not restore:
         return True
 
-    def bring_back() -> None:
-        for state in before:
+    def restore_controllers() -> None:
+        for state in former_states:
             manager.load(state.name)
-        manager.switch([state.name for state in before if state.state == "running"], [])
+        manager.switch([state.name for state in former_states if state.state == "running"], [])
 
-    return _answer(
-        bring_back,
+    return _succeeds(
+        restore_controllers,
         "Controllers restored to original state",
         "Failed to restore the controllers to their original state",
     )
 
 
-def _answer(action: Callable[[], None], done: str, failed: str) -> bool:
+def _succeeds(action: Callable[[], None], success_text: str, failure_text: str) -> bool:
     try:
         action()
     except RefusedError as error:
-        print(failed)
+        print(failure_text)
         rospy.logerr("%s", error)
         return False
-    if done:
-        print(done)
+    if success_text:
+        print(success_text)
     return True

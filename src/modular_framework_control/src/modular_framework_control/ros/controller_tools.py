@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Command-line tools for controllers: spawner, unspawner and controller_manager, as users of ros_control know them."""
+"""Provides ros_control's command-line tools for controllers: spawner, unspawner and controller_manager."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ INHIBIT_PERIOD_S = 1.0
 
 
 def spawner_main() -> int:
-    """Load and start controllers, wait for the end of this process, then stop and unload them in reverse.
+    """Load and start controllers until this process ends, then stop and unload them in reverse order.
 
-    If some cannot be loaded, that is reported, the others are started, and the exit code is 1.
+    If a controller cannot be loaded, the tool logs an error, starts the other controllers, and exits with code 1.
     """
     parser = argparse.ArgumentParser(prog="spawner", description=spawner_main.__doc__)
     parser.add_argument("--stopped", action="store_true", help="load the controllers but do not start them")
-    parser.add_argument("--wait-for", metavar="TOPIC", help="wait until this std_msgs/Bool topic says True")
-    _add_common(parser)
+    parser.add_argument("--wait-for", metavar="TOPIC", help="wait until this std_msgs/Bool topic publishes True")
+    _add_common_arguments(parser)
     return _run(parser, "spawner", _spawn)
 
 
 def unspawner_main() -> int:
-    """Keep controllers stopped, even if something starts them, until the end of this process; then start them again."""
+    """Keep controllers stopped, even if another process starts them, until this process ends; then start them again."""
     parser = argparse.ArgumentParser(prog="unspawner", description=unspawner_main.__doc__)
-    _add_common(parser)
+    _add_common_arguments(parser)
     return _run(parser, "unspawner", _unspawn)
 
 
@@ -59,19 +59,19 @@ def controller_manager_main() -> int:
         help="also lc, lt, sp, kl for list, list-types, spawn, kill",
     )
     parser.add_argument(
-        "--restore", action="store_true", help="with reload-libraries: load and start again what was there before"
+        "--restore", action="store_true", help="with reload-libraries: load and start the former controllers again"
     )
-    _add_common(parser, names="*")
-    return _run(parser, "controller_manager", _command)
+    _add_common_arguments(parser, names="*")
+    return _run(parser, "controller_manager", _run_command)
 
 
-def _add_common(parser: argparse.ArgumentParser, names: str = "+") -> None:
+def _add_common_arguments(parser: argparse.ArgumentParser, names: str = "+") -> None:
     parser.add_argument("--namespace", default="", help="namespace of the robot")
     parser.add_argument(
-        "--timeout", type=float, default=30.0, help="seconds to wait for the controller manager; 0 or less: for ever"
+        "--timeout", type=float, default=30.0, help="seconds to wait for the controller manager; 0 or less: no limit"
     )
-    parser.add_argument("--no-timeout", action="store_true", help="wait for ever")
-    parser.add_argument("--shutdown-timeout", type=float, help="accepted, not used")
+    parser.add_argument("--no-timeout", action="store_true", help="wait without a limit")
+    parser.add_argument("--shutdown-timeout", type=float, help="accepted but not used")
     parser.add_argument("controllers", nargs=names, help="names, or YAML files whose keys are names")
 
 
@@ -102,10 +102,10 @@ def _run(
 
 
 def names_of(arguments: Sequence[str]) -> list[str]:
-    """Controller names: a word is a name, an existing YAML file is replaced by its keys (or by its list of names).
+    """Returns controller names: each argument, or the keys or the list of an existing YAML file.
 
     Raises:
-        ControllerManagerClientError: a file that holds no names.
+        ControllerManagerClientError: If a file does not contain names.
     """
     names: list[str] = []
     for argument in arguments:
@@ -137,13 +137,13 @@ def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended
     try:
         for name in arguments.controllers if not ended.is_set() else ():
             rospy.loginfo("Loading controller: %s", name)
-            if _done(lambda name=name: client.load(name), f"Failed to load {name}"):
+            if _succeeds(lambda name=name: client.load(name), f"Failed to load {name}"):
                 loaded.append(name)
             else:
                 failed.append(name)
         rospy.loginfo("Controller Spawner: Loaded controllers: %s", ", ".join(loaded))
         if loaded and not arguments.stopped:
-            if _done(lambda: client.switch(loaded, []), f"Failed to start controllers: {', '.join(loaded)}"):
+            if _succeeds(lambda: client.switch(loaded, []), f"Failed to start controllers: {', '.join(loaded)}"):
                 rospy.loginfo("Started controllers: %s", ", ".join(loaded))
             else:
                 failed += loaded
@@ -154,7 +154,7 @@ def _spawn(client: ControllerManagerClient, arguments: argparse.Namespace, ended
         raise ControllerManagerClientError(f"not spawned: {', '.join(failed)}")
 
 
-def _done(action: Callable[[], None], failure: str) -> bool:
+def _succeeds(action: Callable[[], None], failure: str) -> bool:
     try:
         action()
     except ControllerManagerClientError as error:
@@ -164,7 +164,7 @@ def _done(action: Callable[[], None], failure: str) -> bool:
 
 
 def _set_parameters(path: Path, namespace: str) -> None:
-    """Makes what a file says of its controllers their parameters."""
+    """Sets the parameters that a file contains for its controllers."""
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     for name, parameters in content.items() if isinstance(content, dict) else ():
         if isinstance(parameters, dict) and parameters:
@@ -172,7 +172,7 @@ def _set_parameters(path: Path, namespace: str) -> None:
 
 
 def _clean_up(client: ControllerManagerClient, loaded: Sequence[str]) -> None:
-    """Stops and unloads the controllers; if the manager has ended meanwhile, nothing is left to do."""
+    """Stops and unloads the controllers, unless the manager has already ended."""
     if not loaded:
         return
     rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")
@@ -209,14 +209,14 @@ def _unspawn(client: ControllerManagerClient, arguments: argparse.Namespace, end
 
 
 def _wait_for_topic(topic: str, warn_after_s: float, ended: threading.Event) -> None:
-    """Waits until the topic says True or `ended` is set; warns once if there is no message for `warn_after_s` [s]."""
+    """Waits until the topic publishes True or `ended` is set; warns once after `warn_after_s` [s]."""
     ready = threading.Event()
     subscriber = rospy.Subscriber(topic, Bool, lambda message: ready.set() if message.data else None)
     warn_at_s = time.monotonic() + warn_after_s
     while not ready.wait(0.1) and not ended.is_set():
         if time.monotonic() > warn_at_s:
             rospy.logwarn(
-                "Controller Spawner: topic %s has not said True for %.0f s; waiting for it still",
+                "Controller Spawner: topic %s has not published True for %.0f s; still waiting",
                 rospy.resolve_name(topic),
                 warn_after_s,
             )
@@ -236,19 +236,21 @@ _PER_CONTROLLER: dict[str, tuple[_Step, ...]] = {
 }
 
 
-def _command(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
+def _run_command(client: ControllerManagerClient, arguments: argparse.Namespace, ended: threading.Event) -> None:
     del ended
     if arguments.command in _PER_CONTROLLER:
         if not arguments.controllers:
             raise ControllerManagerClientError(f"{arguments.command}: name at least one controller")
-        done = [step(name, client) for step in _PER_CONTROLLER[arguments.command] for name in arguments.controllers]
-        if not all(done):
+        successes = [
+            step(name, client) for step in _PER_CONTROLLER[arguments.command] for name in arguments.controllers
+        ]
+        if not all(successes):
             raise ControllerManagerClientError(
-                f"{arguments.command}: not done for all of: {', '.join(arguments.controllers)}"
+                f"{arguments.command}: failed for at least one of: {', '.join(arguments.controllers)}"
             )
     elif arguments.command == "list":
         interface.list_controllers(client)
     elif arguments.command == "list-types":
         interface.list_controller_types(client)
     elif not interface.reload_libraries(True, arguments.restore, client):
-        raise ControllerManagerClientError("reload-libraries: not done")
+        raise ControllerManagerClientError("reload-libraries: failed")

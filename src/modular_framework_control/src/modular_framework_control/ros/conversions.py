@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Conversions between messages and the types of the controllers.
+"""Converts between ROS messages and the types of the controllers.
 
-Messages are stamped by the ROS clock, controllers use the time of the control loop: the former is `ahead_s` [s]
-ahead of the latter (see `LoopTime`).
+Messages carry ROS time, controllers use the time of the control loop: ROS time is ahead by `ahead_s` [s] (see
+`LoopTime`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from modular_framework_control.trajectory.trajectory_goal import TrajectoryError
 
 
 def trajectory_from_msg(message: CompactJointTrajectory, ahead_s: float = 0.0) -> JointTrajectory:
-    """A trajectory as it was received; it is not checked here."""
+    """Returns a trajectory from its message, without checks."""
     stamp = message.header.stamp
     return JointTrajectory(tuple(message.joint_names), message.points, stamp.to_sec() - ahead_s if stamp else 0.0)
 
@@ -44,7 +44,7 @@ def _tolerances_from_msg(messages: Sequence[Any]) -> dict[str, JointTolerance]:
 
 
 def goal_from_msg(message: FollowJointTrajectoryGoal, ahead_s: float = 0.0) -> TrajectoryGoal:
-    """A control_msgs/FollowJointTrajectoryGoal as received in a CompactTrajectoryActionGoal; it is not checked here."""
+    """Returns a trajectory goal from the message of a CompactTrajectoryActionGoal, without checks."""
     return TrajectoryGoal(
         trajectory_from_msg(message.trajectory, ahead_s),
         _tolerances_from_msg(message.path_tolerance),
@@ -54,7 +54,7 @@ def goal_from_msg(message: FollowJointTrajectoryGoal, ahead_s: float = 0.0) -> T
 
 
 def trajectory_result_to_msg(code: TrajectoryErrorCode, text: str) -> FollowJointTrajectoryResult:
-    """Result of a trajectory goal."""
+    """Returns the result message of a trajectory goal."""
     return FollowJointTrajectoryResult(error_code=int(code), error_string=text)
 
 
@@ -64,7 +64,14 @@ def _point(state: Array) -> JointTrajectoryPoint:
 
 
 def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Sequence[str], ahead_s: float = 0.0) -> Any:
-    """Writes a snapshot into a JointTrajectoryControllerState or a FollowJointTrajectoryFeedback; returns it."""
+    """Writes a snapshot into a message, and returns the message.
+
+    Args:
+        message: Message of type JointTrajectoryControllerState or FollowJointTrajectoryFeedback.
+        snapshot: State of a trajectory controller.
+        joint_names: Joints of the controller.
+        ahead_s: Offset of the stamp from the time of the loop [s].
+    """
     message.header.stamp = genpy.Time.from_sec(snapshot.time_s + ahead_s)
     message.joint_names = list(joint_names)
     message.desired = _point(snapshot.desired)
@@ -77,22 +84,28 @@ def fill_snapshot(message: Any, snapshot: TrajectorySnapshot, joint_names: Seque
 def snapshot_to_msg(
     snapshot: TrajectorySnapshot, joint_names: Sequence[str], ahead_s: float = 0.0
 ) -> JointTrajectoryControllerState:
-    """State of a trajectory controller."""
+    """Returns the state message of a trajectory controller.
+
+    Args:
+        snapshot: State of the controller.
+        joint_names: Joints of the controller.
+        ahead_s: Offset of the stamp from the time of the loop [s].
+    """
     return fill_snapshot(JointTrajectoryControllerState(), snapshot, joint_names, ahead_s)
 
 
 def gripper_result_to_msg(state: GripperState) -> GripperCommandResult:
-    """Result of a gripper goal."""
+    """Returns the result message of a gripper goal."""
     return GripperCommandResult(state.position, state.effort, state.stalled, state.reached_goal)
 
 
 def gripper_feedback_to_msg(state: GripperState) -> GripperCommandFeedback:
-    """Feedback of a gripper goal."""
+    """Returns the feedback message of a gripper goal."""
     return GripperCommandFeedback(state.position, state.effort, state.stalled, state.reached_goal)
 
 
 def joint_state_to_msg(snapshot: JointStateSnapshot, ahead_s: float = 0.0) -> JointState:
-    """A sensor_msgs/JointState."""
+    """Returns joint states as a sensor_msgs/JointState."""
     message = JointState(
         name=snapshot.names, position=snapshot.positions, velocity=snapshot.velocities, effort=snapshot.efforts
     )
@@ -101,7 +114,7 @@ def joint_state_to_msg(snapshot: JointStateSnapshot, ahead_s: float = 0.0) -> Jo
 
 
 def controller_report_to_msg(report: ControllerReport) -> ControllerState:
-    """One line of list_controllers; interfaces have the names of C++ there."""
+    """Returns an entry of list_controllers; interfaces have their C++ names in the message."""
     claims = [
         HardwareInterfaceResources(claim.hardware_interface.replace("/", "::"), list(claim.resources))
         for claim in report.info.claimed_resources
@@ -110,7 +123,7 @@ def controller_report_to_msg(report: ControllerReport) -> ControllerState:
 
 
 def controller_statistics_to_msg(report: ControllerReport, ahead_s: float = 0.0) -> ControllerStatistics:
-    """Update times of one controller; `variance_time`, a duration, is the square root of their variance."""
+    """Returns the update times of a controller; the duration `variance_time` is the root of their variance."""
     figures = report.statistics
     updated, overrun = (
         genpy.Time.from_sec(time_s + ahead_s if time_s else 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes, and waits for, the readiness of hardware for controllers: the topics `topic_to_wait_for`."""
+"""Announces and awaits hardware that is ready for controllers, on the topics named by `topic_to_wait_for`."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from modular_framework_ros.parameter_declarations import parameters_below
 
 WAIT_PERIOD_S = 0.05
 USUAL_START_S = 10.0
-"""A fault that a start takes longer than this to clear is logged [s]."""
+"""Start time after which a fault that still persists is logged [s]."""
 
 
 class HardwareNotReadyError(Exception):
-    """Hardware did not announce in time that it is ready; names the hardware and its topic."""
+    """Raised if hardware is not ready in time; names the hardware and its topic."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReadyTopics:
-    """Which topics announce which hardware as ready.
+    """Holds the topics that announce hardware as ready.
 
     Attributes:
-        awaited: topic by hardware, of hardware that announces itself.
-        announced: topics on which the node announces hardware that does not announce itself.
+        awaited: Topic by name of the hardware, for hardware whose driver announces itself.
+        announced: Topics on which the node announces the other hardware.
     """
 
     awaited: Mapping[str, str]
@@ -39,10 +39,10 @@ class ReadyTopics:
 
 
 def ready_topics_of(robot_hw: RobotHW, robot_hw_nh: NodeHandle) -> ReadyTopics:
-    """The topics of initialised hardware: of each part when it is a combination, and its own.
+    """Returns the topics of initialised hardware, including those of the parts of combined hardware.
 
     Raises:
-        ParameterError: `topic_to_wait_for` is not the name of a topic.
+        ParameterError: If `topic_to_wait_for` is not a topic name.
     """
     listed = {robot_hw_nh.namespace: (robot_hw, robot_hw_nh)}
     if isinstance(robot_hw, CombinedRobotHW):
@@ -60,11 +60,11 @@ def ready_topics_of(robot_hw: RobotHW, robot_hw_nh: NodeHandle) -> ReadyTopics:
 
 
 class HardwareReadiness:
-    """Waits for hardware that announces itself, and announces the rest.
+    """Waits for hardware that announces itself, and announces the other hardware.
 
     Args:
-        topics: of the hardware that is awaited and of the hardware to announce; all are std_msgs/Bool, latched.
-        robot_hw: the hardware.
+        topics: Topics to wait for and to announce on; all are latched and carry std_msgs/Bool.
+        robot_hw: Hardware of the robot.
     """
 
     def __init__(self, topics: ReadyTopics, robot_hw: RobotHW) -> None:
@@ -74,7 +74,7 @@ class HardwareReadiness:
         self._publishers: list[rospy.Publisher] = []
 
     def connect(self) -> None:
-        """Subscribes the topics of awaited hardware."""
+        """Subscribes to the topics of the awaited hardware."""
         for name, topic in self._topics.awaited.items():
             self._subscribers.append(rospy.Subscriber(topic, Bool, self._on_ready, self._ready[name], queue_size=1))
 
@@ -84,17 +84,17 @@ class HardwareReadiness:
             event.set()
 
     def wait(self, timeout_s: float, ended: threading.Event, fault: Callable[[], str]) -> None:
-        """Waits until all hardware is ready and every awaited one has published True, or the node is shut down.
+        """Waits until all hardware is initialised and every awaited topic has published True, or until shutdown.
 
         Args:
-            timeout_s: how long to wait for all of them together [s of real time].
-            ended: set to end the wait.
-            fault: returns the fault of the hardware; logged when it lasts.
+            timeout_s: Maximum wait in real time [s].
+            ended: Event that ends the wait.
+            fault: Callback that returns the fault of the hardware; a persistent fault is logged.
 
         Raises:
-            HardwareNotReadyError: not all have; names each that has not.
+            HardwareNotReadyError: If the time has passed; names the hardware that is not ready.
         """
-        begun_s, logged = time.monotonic(), ""
+        begun_s, logged_fault = time.monotonic(), ""
         while not (self._robot_hw.initialised and all(event.is_set() for event in self._ready.values())):
             time.sleep(WAIT_PERIOD_S)
             if rospy.is_shutdown() or ended.is_set():
@@ -103,11 +103,11 @@ class HardwareReadiness:
             if waited_s > timeout_s:
                 raise HardwareNotReadyError(
                     f"waited {timeout_s:g} s in vain for {self._missing()}; "
-                    f"{cause or 'is the hardware switched on and connected?'} (~ready_timeout gives it longer)"
+                    f"{cause or 'is the hardware switched on and connected?'} (~ready_timeout extends the wait)"
                 )
-            if cause != logged and waited_s > USUAL_START_S:
-                rospy.logwarn("hardware not ready: %s", cause or "no fault any more")
-                logged = cause
+            if cause != logged_fault and waited_s > USUAL_START_S:
+                rospy.logwarn("hardware not ready: %s", cause or "the fault has ended")
+                logged_fault = cause
 
     def _missing(self) -> str:
         topics = [
@@ -118,7 +118,7 @@ class HardwareReadiness:
         return f"True on {', '.join(topics)}" if topics else "the hardware"
 
     def announce(self) -> None:
-        """Publishes True, latched, for the hardware that does not do so itself."""
+        """Publishes a latched True for the hardware that does not announce itself."""
         for topic in sorted(self._topics.announced):
             self._publishers.append(rospy.Publisher(topic, Bool, queue_size=1, latch=True))
             self._publishers[-1].publish(True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The topics of controllers whose commands arrive on a topic `command`."""
+"""Connects controllers that receive joint commands on a topic `command`."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from modular_framework_ros.node_handle import join_names
 
 
 class JointCommandRosInterface:
-    """The topics of a controller that is commanded joint by joint.
+    """Opens the topics of a controller of single joint commands.
 
-    Subscribes `<name>/command`: std_msgs/Float64 for one joint, std_msgs/Float64MultiArray for several. Publishes
-    `<name>/state` (control_msgs/JointControllerState) of controllers that have gains for one joint.
+    Subscribes to `<name>/command`: std_msgs/Float64 for one joint, std_msgs/Float64MultiArray for several joints.
+    Publishes `<name>/state` (control_msgs/JointControllerState) for a PID controller of one joint.
     """
 
     def __init__(
@@ -32,9 +32,9 @@ class JointCommandRosInterface:
     ) -> None:
         self._controller = controller
         self._topic = join_names(namespace, f"{name}/command")
-        kind = Float64 if controller.single else Float64MultiArray
-        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
-            opened.callback(rospy.Subscriber(self._topic, kind, self._on_command, queue_size=1).unregister)
+        message_class = Float64 if controller.single else Float64MultiArray
+        with contextlib.ExitStack() as opened:  # closes the opened topics if a later one fails
+            opened.callback(rospy.Subscriber(self._topic, message_class, self._on_command, queue_size=1).unregister)
             if isinstance(controller, GainsController) and controller.single:
                 state = rospy.Publisher(join_names(namespace, f"{name}/state"), JointControllerState, queue_size=1)
                 opened.callback(state.unregister)
@@ -56,7 +56,7 @@ class JointCommandRosInterface:
 
 
 def joint_control_to_msg(snapshot: JointControlSnapshot, ahead_s: float) -> JointControllerState:
-    """Converts the state of a controller of one joint; the stamp is `ahead_s` [s] ahead of the loop's time."""
+    """Converts the state of a single-joint controller; the stamp is the time of the loop plus `ahead_s` [s]."""
     gains = snapshot.gains
     message = JointControllerState(
         set_point=snapshot.set_point,

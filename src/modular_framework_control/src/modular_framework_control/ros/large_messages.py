@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Receives large messages in pieces, so that the control loop never waits long for Python's interpreter.
+"""Receives large messages in pieces, so that the control loop never waits long for Python's interpreter lock.
 
-rospy copies a received message, and frees its buffer, in single calls that hold the interpreter for milliseconds if the
-message is large.
+rospy copies a received message and frees its buffer in single calls, which hold the interpreter lock for milliseconds
+if the message is large.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any
 
 from rospy.impl.tcpros_base import TCPROSTransport
 
-_PIECE = 1 << 16  # bytes
+_PIECE_BYTES = 1 << 16  # bytes
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
-_KEPT_BYTES = 64 << 20
-_MAPPED_BYTES = 1 << 20
+_TRIM_THRESHOLD_BYTES = 64 << 20
+_MMAP_THRESHOLD_BYTES = 1 << 20
 
 
 class ReceiveBuffer:
-    """What a connection has received, in the pieces in which that came; in place of rospy's BytesIO."""
+    """Stores the bytes received by a connection piece by piece; replaces rospy's BytesIO."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -36,7 +36,7 @@ class ReceiveBuffer:
         self._position = position
 
     def write(self, data: bytes) -> None:
-        """Puts `data` at the position; what was behind that is dropped."""
+        """Writes `data` at the position and drops all bytes after the position."""
         self.truncate(self._position)
         self._pieces.append(bytes(data))
         self._position = self._size = self._size + len(data)
@@ -51,9 +51,9 @@ class ReceiveBuffer:
                 self._size = size
 
     def read(self, size: int) -> Any:
-        """Returns the next `size` bytes; of many bytes, a map of memory that is sliced like bytes."""
+        """Returns the next `size` bytes; above 64 KiB, as a memory map that can be sliced like bytes."""
         begin, self._position = self._position, min(self._position + size, self._size)
-        if self._position - begin <= _PIECE:
+        if self._position - begin <= _PIECE_BYTES:
             return b"".join(self._parts(begin, self._position))
         message = mmap.mmap(-1, self._position - begin, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
         for part in self._parts(begin, self._position):
@@ -77,11 +77,11 @@ class ReceiveBuffer:
 def receive_in_pieces() -> None:
     """Makes all later connections of this process receive large messages in pieces.
 
-    The C library keeps the memory of the pieces: to give memory back interrupts all processors that run the process.
+    The C library keeps the freed memory: returning it to the system would interrupt every processor of the process.
     """
     library = ctypes.CDLL(None)
-    library.mallopt(_M_MMAP_THRESHOLD, _MAPPED_BYTES)
-    library.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+    library.mallopt(_M_MMAP_THRESHOLD, _MMAP_THRESHOLD_BYTES)
+    library.mallopt(_M_TRIM_THRESHOLD, _TRIM_THRESHOLD_BYTES)
     initialise = TCPROSTransport.__init__
 
     def initialise_with_pieces(transport: Any, *arguments: Any, **fields: Any) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes how well the control loop keeps its rate, and whether the hardware has a fault."""
+"""Publishes the timing of the control loop and the faults of the hardware as diagnostics."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ class LoopReport:
 
     The service `~reset_statistics` (std_srvs/Empty) resets the statistics.
 
-    The status is a warning when cycles were late since the last message, joints stand outside their range or the
-    hardware warns, an error when the hardware has a fault.
+    The level is ERROR if the hardware has a fault. Otherwise, the level is WARN if cycles were late since the last
+    message, a joint is outside its position limits or the hardware reports a warning.
     Values: `rate` [1/s], `cycles`, `missed`, `overruns`, `late_p50_us`, `late_p99_us`, `late_max_us`, `work_mean_us`,
-    `work_max_us`, `no_processor_us` (total time that the loop was due and had no processor),
+    `work_max_us`, `no_processor_us` (total time for which the loop was due but had no processor),
     `no_processor_max_us` (the longest such time), `fault`, `outside_limits`.
 
     Args:
-        statistics: figures that the loop writes.
-        period_s: period of the loop [s].
-        robot_hw: what the loop drives.
-        health: returns the fault of the hardware and its warning; "" for none.
+        statistics: Timing statistics written by the loop.
+        period_s: Period of the loop [s].
+        robot_hw: Hardware driven by the loop.
+        health: Callback that returns the fault and the warning of the hardware; each is "" if absent.
     """
 
     def __init__(
@@ -45,20 +45,20 @@ class LoopReport:
         self._statistics = statistics
         self._period_s = period_s
         self._robot_hw = robot_hw
-        self._outside: frozenset[str] = frozenset()
+        self._joints_outside: frozenset[str] = frozenset()
         self._health = health
         self._late = 0
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._work, name="loop_report", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="loop_report", daemon=True)
 
     def connect(self) -> None:
-        """Opens topic and service, and begins to publish."""
+        """Opens the topic and the service, and starts publishing."""
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
         self._service = rospy.Service("~reset_statistics", Empty, self._on_reset)
         self._thread.start()
 
     def close(self) -> None:
-        """Ends the publishing; may be called twice."""
+        """Stops publishing; may be called twice."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join(2.0)
@@ -71,7 +71,7 @@ class LoopReport:
         self._late = 0
         return EmptyResponse()
 
-    def _work(self) -> None:
+    def _run(self) -> None:
         reported, due_s = ("", ""), time.monotonic() + REPORT_PERIOD_S
         while not self._ended.wait(WATCH_PERIOD_S) and not rospy.is_shutdown():
             health, now_s = self._health(), time.monotonic()
@@ -84,15 +84,15 @@ class LoopReport:
         late_since_last, self._late = late > self._late, late
         outside = self._report_joints_outside()
         text = (
-            f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles took too long, "
-            f"{figures.missed} were left out"
+            f"{1.0 / self._period_s:g} Hz: {figures.overruns} of {figures.cycles} cycles overran, "
+            f"{figures.missed} were skipped"
         )
         if late_since_last:
             rospy.logwarn_throttle(
                 OVERRUN_WARNING_PERIOD_S,
-                f"control loop at {text}; the longest took {figures.work_max_s * 1e3:.1f} ms, its "
-                f"period is {self._period_s * 1e3:.1f} ms; it was without a processor for "
-                f"{figures.no_processor_max_s * 1e3:.1f} ms at most",
+                f"control loop at {text}; the longest cycle took {figures.work_max_s * 1e3:.1f} ms, the "
+                f"period is {self._period_s * 1e3:.1f} ms; the loop waited for a processor for up to "
+                f"{figures.no_processor_max_s * 1e3:.1f} ms",
             )
         status = DiagnosticStatus(
             name=f"{rospy.get_name().lstrip('/')}: control loop",
@@ -121,10 +121,10 @@ class LoopReport:
         publish(self._publisher, message)
 
     def _report_joints_outside(self) -> str:
-        """Describes the joints outside their range; logs those that were inside before."""
+        """Describes the joints outside their limits; logs each joint that has just left them."""
         outside = outside_limits(self._robot_hw)
-        new = [text for name, text in outside.items() if name not in self._outside]
+        new = [text for name, text in outside.items() if name not in self._joints_outside]
         if new:
             rospy.logwarn("%s", "; ".join(new))
-        self._outside = frozenset(outside)
+        self._joints_outside = frozenset(outside)
         return "; ".join(outside.values())

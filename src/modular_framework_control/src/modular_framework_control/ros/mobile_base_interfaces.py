@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics and adjustable settings of controllers of mobile bases, under the names of ros_controllers."""
+"""Opens the topics and dynamic_reconfigure servers of mobile base controllers under the names of ros_controllers."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ DIFF_DRIVE_SETTINGS = (
     Adjustable("left_wheel_radius_multiplier", 0.5, 1.5, "factor of the radius of the left wheels"),
     Adjustable("right_wheel_radius_multiplier", 0.5, 1.5, "factor of the radius of the right wheels"),
     Adjustable("wheel_separation_multiplier", 0.5, 1.5, "factor of the wheel separation"),
-    Adjustable("publish_rate", 0.0, 2000.0, "of the odometry [Hz]; 0: none"),
+    Adjustable("publish_rate", 0.0, 2000.0, "rate of the odometry [Hz]; 0: none"),
     Adjustable("enable_odom_tf", False, True, "publish the frame of the base on tf"),
 )
 
 
 class MobileBaseRosInterface:
-    """The topics of every mobile base.
+    """Opens the topics common to all mobile bases.
 
-    Subscribes `<name>/cmd_vel` (geometry_msgs/Twist); publishes `<name>/odom` (nav_msgs/Odometry) and, where that is
-    switched on, the frame of the base on `/tf`.
+    Subscribes to `<name>/cmd_vel` (geometry_msgs/Twist); publishes `<name>/odom` (nav_msgs/Odometry) and, if enabled,
+    the frame of the base on `/tf`.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class MobileBaseRosInterface:
     ) -> None:
         self._controller, self._name = controller, join_names(namespace, name)
         self._outbox, self._loop_time = outbox, loop_time
-        with contextlib.ExitStack() as opened:  # what is open when one cannot be opened is closed again
+        with contextlib.ExitStack() as opened:  # closes the opened topics if a later one fails
             self._open(opened)
             self._opened = opened.pop_all()
 
@@ -75,16 +75,16 @@ class MobileBaseRosInterface:
 
         self._controller.on_odometry = report
 
-    def _advertise(self, opened: contextlib.ExitStack, topic: str, kind: Any) -> rospy.Publisher:
-        publisher = rospy.Publisher(self._topic(topic), kind, queue_size=QUEUE_SIZE)
+    def _advertise(self, opened: contextlib.ExitStack, topic: str, message_class: Any) -> rospy.Publisher:
+        publisher = rospy.Publisher(self._topic(topic), message_class, queue_size=QUEUE_SIZE)
         opened.callback(publisher.unregister)
         return publisher
 
     def _topic(self, topic: str) -> str:
         return topic if topic.startswith("/") else f"{self._name}/{topic}"
 
-    def _subscribe(self, opened: contextlib.ExitStack, topic: str, kind: Any, command_of: Any) -> None:
-        """Hands each message of a topic to the controller, as what `command_of` makes of it."""
+    def _subscribe(self, opened: contextlib.ExitStack, topic: str, message_class: Any, command_of: Any) -> None:
+        """Passes each message of a topic, converted by `command_of`, to the controller."""
         name = self._topic(topic)
         subscribers: list[rospy.Subscriber] = []  # a message may arrive before the subscriber is stored
 
@@ -94,9 +94,9 @@ class MobileBaseRosInterface:
                 self._controller.drop_command()
                 rospy.logerr_throttle(
                     1.0,
-                    f"{name}: {publishers} publishers; only one is allowed, as "
-                    f"{self._name}/allow_multiple_cmd_vel_publishers is false: the base is brought "
-                    "to rest; end the others",
+                    f"{name}: got {publishers} publishers; expected one, as "
+                    f"{self._name}/allow_multiple_cmd_vel_publishers is false; the base stops: "
+                    "end the other publishers",
                 )
                 return
             try:
@@ -104,16 +104,15 @@ class MobileBaseRosInterface:
             except ControllerError as error:
                 rospy.logwarn_throttle(1.0, f"{name} ignored: {error}")
 
-        subscribers.append(rospy.Subscriber(name, kind, on_message, queue_size=1))
+        subscribers.append(rospy.Subscriber(name, message_class, on_message, queue_size=1))
         opened.callback(subscribers[0].unregister)
 
 
 class DiffDriveRosInterface(MobileBaseRosInterface):
-    """Topics and settings of a base with differential drive, besides those of every mobile base.
+    """Opens the common topics and those of a differential drive, and its dynamic_reconfigure server in `<name>`.
 
-    Publishes, where that is switched on, `<name>/cmd_vel_out` (geometry_msgs/TwistStamped) and
-    `<name>/wheel_joint_controller_state` (control_msgs/JointTrajectoryControllerState); serves dynamic_reconfigure in
-    `<name>`.
+    Publishes, if enabled, `<name>/cmd_vel_out` (geometry_msgs/TwistStamped) and `<name>/wheel_joint_controller_state`
+    (control_msgs/JointTrajectoryControllerState).
     """
 
     _controller: DiffDriveController
@@ -137,16 +136,16 @@ class DiffDriveRosInterface(MobileBaseRosInterface):
 
 
 class FourWheelSteeringRosInterface(MobileBaseRosInterface):
-    """Topics of a base with four steered wheels, besides those of every mobile base.
+    """Opens the common topics and those of a base with four steered wheels.
 
-    Subscribes `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
+    Subscribes to `<name>/cmd_four_wheel_steering` (four_wheel_steering_msgs/FourWheelSteering); publishes
     `<name>/odom_steer` (four_wheel_steering_msgs/FourWheelSteeringStamped).
     """
 
     _controller: FourWheelSteeringController
 
     def _open(self, opened: contextlib.ExitStack) -> None:
-        # Imported here, as no other controller needs this package of messages.
+        # Imported here, as no other controller needs this message package.
         from four_wheel_steering_msgs.msg import FourWheelSteering, FourWheelSteeringStamped
 
         super()._open(opened)
@@ -164,12 +163,18 @@ class FourWheelSteeringRosInterface(MobileBaseRosInterface):
 
 
 def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> Odometry:
-    """Converts the pose and velocity of the base; the stamp is `ahead_s` [s] ahead of the loop's time."""
+    """Returns the pose and the velocity of the base as a message.
+
+    Args:
+        snapshot: Odometry of the base.
+        frames: Frame names and covariances.
+        ahead_s: Offset of the stamp from the time of the loop [s].
+    """
     message = Odometry()
     message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     message.header.frame_id, message.child_frame_id = frames.odom, frames.base
     message.pose.pose.position.x, message.pose.pose.position.y = snapshot.x, snapshot.y
-    message.pose.pose.orientation = _about_z(snapshot.heading)
+    message.pose.pose.orientation = _rotation_about_z(snapshot.heading)
     message.twist.twist.linear.x, message.twist.twist.linear.y = snapshot.linear, snapshot.lateral
     message.twist.twist.angular.z = snapshot.angular
     for covariance, diagonal in (
@@ -181,17 +186,23 @@ def odometry_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: flo
 
 
 def transform_to_msg(snapshot: OdometrySnapshot, frames: BaseFrames, ahead_s: float) -> TFMessage:
-    """The frame of the base in that of the odometry."""
+    """Returns the transform from the odometry frame to the base frame.
+
+    Args:
+        snapshot: Odometry of the base.
+        frames: Frame names.
+        ahead_s: Offset of the stamp from the time of the loop [s].
+    """
     transform = TransformStamped(child_frame_id=frames.base)
     transform.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     transform.header.frame_id = frames.odom
     transform.transform.translation.x, transform.transform.translation.y = snapshot.x, snapshot.y
-    transform.transform.rotation = _about_z(snapshot.heading)
+    transform.transform.rotation = _rotation_about_z(snapshot.heading)
     return TFMessage([transform])
 
 
 def velocity_to_msg(stamp_s: float, velocity: BaseVelocity) -> TwistStamped:
-    """The velocity that is commanded at `stamp_s` of the ROS clock [s]."""
+    """Returns the velocity command as a message stamped with ROS time `stamp_s` [s]."""
     message = TwistStamped()
     message.header.stamp = rospy.Time.from_sec(stamp_s)
     message.twist.linear.x, message.twist.angular.z = velocity.linear, velocity.angular
@@ -199,7 +210,14 @@ def velocity_to_msg(stamp_s: float, velocity: BaseVelocity) -> TwistStamped:
 
 
 def fill_steering(message: Any, snapshot: SteeringSnapshot, frame_id: str, ahead_s: float) -> Any:
-    """Writes speed of the base and angles of its axles into a FourWheelSteeringStamped; returns it."""
+    """Writes the speed of the base and the angles of its axles into a message, and returns the message.
+
+    Args:
+        message: Message of type FourWheelSteeringStamped.
+        snapshot: Speed and axle angles.
+        frame_id: Name of the odometry frame.
+        ahead_s: Offset of the stamp from the time of the loop [s].
+    """
     message.header.stamp = rospy.Time.from_sec(snapshot.time_s + ahead_s)
     message.header.frame_id = frame_id
     data = message.data
@@ -210,7 +228,13 @@ def fill_steering(message: Any, snapshot: SteeringSnapshot, frame_id: str, ahead
 
 
 def wheels_to_msg(stamp_s: float, names: list[str], states: list[WheelState]) -> JointTrajectoryControllerState:
-    """Converts states and commands of the wheels; efforts are not commanded, hence NaN."""
+    """Returns the states and commands of the wheels as a message; commanded efforts are NaN.
+
+    Args:
+        stamp_s: Stamp of the message in ROS time [s].
+        names: Joint names of the wheels.
+        states: States and commands, one per wheel.
+    """
     message = JointTrajectoryControllerState(joint_names=names)
     message.header.stamp = rospy.Time.from_sec(stamp_s)
     unknown = [math.nan] * len(states)
@@ -228,5 +252,5 @@ def wheels_to_msg(stamp_s: float, names: list[str], states: list[WheelState]) ->
     return message
 
 
-def _about_z(angle: float) -> Quaternion:
+def _rotation_about_z(angle: float) -> Quaternion:
     return Quaternion(0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The control loop of a robot that is not simulated: hardware, controller manager and time in one node."""
+"""Runs the control loop of a real robot: hardware, controller manager and timing in one node."""
 
 from __future__ import annotations
 
@@ -37,29 +37,29 @@ from modular_framework_ros.shutdown import hold_shutdown
 COMBINED_TYPE = "modular_framework_control/CombinedRobotHW"
 CLOCK_TOLERANCE_S = 1e-6
 REST_VELOCITY = 0.01
-"""Velocity below which a joint counts as at rest [rad/s|m/s]; measured velocities are never quite 0."""
-HELD_UP_S = 0.05
-"""A cycle that comes so late, or two periods late, finds the motions where they were."""
-RESTLESS_S = 0.2
-"""How long such hardware is written to before it is believed to be at rest [s]."""
-LONGEST_END_S = 2.0
-"""How long the end of the loop waits for rest [s]."""
+"""Maximum measured velocity of a joint at rest [rad/s or m/s]; measurements are never exactly 0."""
+MAX_DELAY_S = 0.05
+"""Delay of a cycle, at least two periods, beyond which motions pause for the delay [s]."""
+MIN_WRITE_TIME_S = 0.2
+"""Minimum time of writing before hardware with a small measured velocity counts as at rest [s]."""
+MAX_END_TIME_S = 2.0
+"""Maximum time to wait for rest at the end of the loop [s]."""
 
 
 class RobotHwNode:
-    """Node `robot_hw`; its namespace is that of the robot: there are its controllers, services and parameters.
+    """Node `robot_hw` in the namespace of the robot, which contains its controllers, services and parameters.
 
-    Parameters: see `parameters/robot_hw.yaml`, and those of the hardware, which has a declaration named after its
-    class: private ones, or in the namespace of each name in `robot_hardware`.
+    Parameters: see `parameters/robot_hw.yaml` and the declaration named after the class of the hardware. The parameters
+    of the hardware are private, or in the namespace of each name in `robot_hardware`.
 
-    Subscribes the topics of hardware that announces itself; publishes those of hardware that does not. The services of
-    `RosControllerManager` are there once all hardware is ready; hardware is read and written from the beginning. What
-    `LoopReport` publishes and serves is there as long as the loop runs.
+    Subscribes to the topics of hardware that announces itself and publishes those of the other hardware. The services
+    of `RosControllerManager` appear once all hardware is ready; the hardware is read and written from the start. The
+    topic and the service of `LoopReport` exist as long as the loop runs.
 
     Args:
-        ended: set to end the loop; controllers are then stopped, goals end, and the hardware is closed while the node
-            can still publish.
-        loop_time: time of the loop, unless the clock is simulated; stamps follow the clock of the system.
+        ended: Event that ends the loop: controllers stop, goals end, and the hardware is closed while the node can
+            still publish.
+        loop_time: Time of the loop, unless ROS time is simulated; stamps follow the system clock.
     """
 
     def __init__(self, ended: threading.Event, loop_time: LoopTime | None = None) -> None:
@@ -72,10 +72,10 @@ class RobotHwNode:
             "~rate", "~real_time", "~ready_timeout", "~type"
         )
         self._period_s = 1.0 / rate_hz
-        self._loop_time.max_step_s = max(HELD_UP_S, 2.0 * self._period_s)
-        listed = self._root_nh.has_param("robot_hardware") and not self._nh.has_param("type")
-        self._hw_nh = self._root_nh if listed else self._nh
-        type_name = COMBINED_TYPE if listed else type_name
+        self._loop_time.max_step_s = max(MAX_DELAY_S, 2.0 * self._period_s)
+        is_combined = self._root_nh.has_param("robot_hardware") and not self._nh.has_param("type")
+        self._hw_nh = self._root_nh if is_combined else self._nh
+        type_name = COMBINED_TYPE if is_combined else type_name
         try:
             self._robot_hw = robot_hw_of_type(type_name)
         except PluginError as error:
@@ -93,65 +93,67 @@ class RobotHwNode:
         """Initialises the hardware.
 
         Raises:
-            ParameterError: the hardware refused its parameters.
+            ParameterError: If the hardware did not initialise.
         """
-        self._warn_of_a_description_elsewhere()
+        self._warn_of_global_description()
         self._report.connect()
         if not self._robot_hw.init(self._root_nh, self._hw_nh):
             raise ParameterError(
                 f"{self._nh.namespace}: hardware {type(self._robot_hw).__name__} did not initialise; "
-                "its own message above says why"
+                "see its message above"
             )
         self._readiness = HardwareReadiness(ready_topics_of(self._robot_hw, self._hw_nh), self._robot_hw)
         self._readiness.connect()
         self._manager = RosControllerManager(self._robot_hw, rospy.get_namespace(), loop_time=self._loop_time)
 
-    def _warn_of_a_description_elsewhere(self) -> None:
+    def _warn_of_global_description(self) -> None:
         if (
             rospy.get_namespace() != "/"
             and not self._root_nh.has_param("robot_description")
             and RosNodeHandle("/").has_param("robot_description")
         ):
             rospy.logwarn(
-                "/robot_description is not taken, the robot's own is looked for: %s/robot_description. "
-                "Without one, no limits of joints are known from it",
+                "/robot_description is ignored, as this robot's parameter is %s/robot_description; "
+                "without that parameter, no joint limits are read from a URDF",
                 self._root_nh.namespace,
             )
 
     def _health(self) -> tuple[str, str]:
-        """The fault of the hardware and its warning."""
+        """Returns the fault and the warning of the hardware."""
         if self._manager is None:
             return "the hardware is being initialised", ""
         return self._manager.manager.fault, self._robot_hw.warning()
 
     def close(self) -> None:
-        """Closes the hardware, and ends real-time scheduling; may be called twice."""
+        """Closes the hardware and ends real-time scheduling; may be called twice."""
         self._robot_hw.close()
         leave_real_time()
         self._report.close()
 
     def run(self) -> bool:
-        """Runs the control loop until `ended` is set; then stops all controllers and brings the robot to rest.
+        """Runs the control loop until `ended` is set, then stops all controllers and brings the robot to rest.
 
         Returns:
-            Whether it ended by `ended`; otherwise the log says why.
+            Whether the loop ended without a failure; a failure is logged.
         """
         if self._manager is None:
-            raise RuntimeError("connect() comes before run()")
-        starter = threading.Thread(target=self._get_ready, args=(self._manager,), name="get_ready", daemon=True)
-        starter.start()
+            raise RuntimeError("run() was called before connect()")
+        starting_thread = threading.Thread(
+            target=self._await_hardware, args=(self._manager,), name="get_ready", daemon=True
+        )
+        starting_thread.start()
         self._prepare()
         try:
             self._loop(self._manager)
-        except Exception as error:  # a user's hardware may raise anything
+        except Exception as error:  # hardware of users may raise any exception
             self._failure = f"hardware {type(self._robot_hw).__name__} raised {type(error).__name__}: {error}"
             rospy.logfatal("control loop ends: %s\n%s", self._failure, traceback.format_exc())
         finally:
-            self._end(self._manager, starter)
+            self._end(self._manager, starting_thread)
         return not self._failure
 
     def _prepare(self) -> None:
-        """Asks the system for what the loop needs."""
+        """Requests real-time scheduling and awake processors from the operating system."""
         prepare_interpreter()
         if not self._real_time:
             return
@@ -160,7 +162,7 @@ class RobotHwNode:
             rospy.logwarn("control loop without: %s", "; ".join(refused))
 
     def _loop(self, manager: RosControllerManager) -> None:
-        if not self._goes_on():
+        if not self._continues():
             return
         if rospy.rostime.is_wallclock():
             self._last_s = self._loop_time.now()
@@ -173,13 +175,13 @@ class RobotHwNode:
             pacer.run(cycle)
             return
         self._last_s = rospy.get_time()
-        while self._cycle(manager, rospy.get_time(), 0.0, 0):  # how late it is, is not known
+        while self._cycle(manager, rospy.get_time(), 0.0, 0):  # the delay is unknown
             self._wait_for_simulated_clock()
 
     def _cycle(
         self, manager: RosControllerManager, time_s: float, late_s: float, missed: int, woken_late_s: float = 0.0
     ) -> bool:
-        """Reads, updates, writes; returns whether the loop goes on."""
+        """Reads the hardware, updates the controllers and writes; returns whether the loop continues."""
         begun_s = time.perf_counter()
         period_s = max(0.0, time_s - self._last_s)
         self._last_s = time_s
@@ -191,60 +193,61 @@ class RobotHwNode:
             manager.manager.watch_hardware()
         self._robot_hw.write(time_s, period_s)
         self._statistics.add(late_s, missed, time.perf_counter() - begun_s, woken_late_s)
-        return self._goes_on()
+        return self._continues()
 
-    def _goes_on(self) -> bool:
+    def _continues(self) -> bool:
         return not (self._ended.is_set() or self._failure or rospy.is_shutdown())
 
     def _wait_for_simulated_clock(self) -> None:
-        """Waits until the simulated clock has advanced by a period, or has jumped back."""
+        """Waits until the simulated clock has advanced by one period or has jumped back."""
         begun_s = rospy.get_time()
         tick = rospy.rostime.get_rostime_cond()
         while 0.0 <= rospy.get_time() - begun_s < self._period_s - CLOCK_TOLERANCE_S:
-            if not self._goes_on():
+            if not self._continues():
                 break
             with tick:
                 tick.wait(0.1)
 
-    def _end(self, manager: RosControllerManager, starter: threading.Thread) -> None:
-        """Stops the controllers, brings the robot to rest, and closes everything.
+    def _end(self, manager: RosControllerManager, starting_thread: threading.Thread) -> None:
+        """Stops the controllers, brings the robot to rest, and closes all connections.
 
-        The robot comes first: to close is work on the network, which may take long, or fail.
+        The robot comes first, because closing needs the network, which may be slow or fail.
         """
         self._ended.set()
         manager.manager.stop_all()
-        _attempt("bringing the robot to rest", self._bring_to_rest)
-        starter.join(timeout=2.0)
-        _attempt("closing the topics of ready hardware", self._readiness.close)
-        _attempt("closing the controllers", manager.close)
-        _attempt("closing the report of the loop", self._report.close)
+        _runs_without_error("bringing the robot to rest", self._bring_to_rest)
+        starting_thread.join(timeout=2.0)
+        _runs_without_error("closing the topics of ready hardware", self._readiness.close)
+        _runs_without_error("closing the controllers", manager.close)
+        _runs_without_error("closing the report of the loop", self._report.close)
 
     def _bring_to_rest(self) -> None:
-        """Writes the last commands of the controllers (velocities and efforts of 0) until no joint moves.
+        """Writes the final commands of the controllers (velocities and efforts of 0) until no joint moves.
 
-        Hardware and limits brake cycle by cycle. It uses real time, because a simulated clock may be paused.
+        The hardware and its limits brake cycle by cycle. The waits use real time, because a simulated clock may be
+        paused.
         """
         begun_s = due_s = time.monotonic()
         self._robot_hw.seed_commands()
-        measured = all(handle.command == handle.command for _, handle in self._robot_hw.command_handles)
-        going = measured and self._attempt_last("write")
-        while going and time.monotonic() - begun_s < LONGEST_END_S:
-            if not moves(self._robot_hw, 0.0 if time.monotonic() - begun_s < RESTLESS_S else REST_VELOCITY):
+        all_commands_known = all(handle.command == handle.command for _, handle in self._robot_hw.command_handles)
+        succeeded = all_commands_known and self._final_step_succeeds("write")
+        while succeeded and time.monotonic() - begun_s < MAX_END_TIME_S:
+            if not moves(self._robot_hw, 0.0 if time.monotonic() - begun_s < MIN_WRITE_TIME_S else REST_VELOCITY):
                 break
             due_s += self._period_s
             time.sleep(max(0.0, due_s - time.monotonic()))
             self._last_s += self._period_s
-            going = self._attempt_last("read") and self._attempt_last("write")
+            succeeded = self._final_step_succeeds("read") and self._final_step_succeeds("write")
 
-    def _attempt_last(self, step: str) -> bool:
-        """Reads or writes one period after the last cycle; returns whether that succeeded."""
-        return _attempt(
+    def _final_step_succeeds(self, step: str) -> bool:
+        """Reads or writes the hardware one period after the last cycle; returns whether the call succeeded."""
+        return _runs_without_error(
             f"last {step} of hardware {type(self._robot_hw).__name__}",
             lambda: getattr(self._robot_hw, step)(self._last_s + self._period_s, self._period_s),
         )
 
-    def _get_ready(self, manager: RosControllerManager) -> None:
-        """Waits for the hardware and opens the services, beside the loop, which the hardware may need to get ready."""
+    def _await_hardware(self, manager: RosControllerManager) -> None:
+        """Opens the services once the hardware is ready, on a separate thread: hardware may need the loop to start."""
         try:
             self._readiness.wait(self._ready_timeout_s, self._ended, lambda: manager.manager.fault)
             if rospy.is_shutdown() or self._ended.is_set():
@@ -252,26 +255,26 @@ class RobotHwNode:
             manager.connect()
             self._connected.set()
             self._readiness.announce()
-        except Exception as error:  # otherwise the thread ends without a message, and the node runs without services
+        except Exception as error:  # otherwise the node would run without services and without a message
             if not rospy.is_shutdown():
                 self._failure = str(error) or type(error).__name__
                 rospy.logfatal("%s", error if isinstance(error, HardwareNotReadyError) else traceback.format_exc())
 
 
-def moves(robot_hw: RobotHW, slow: float) -> bool:
-    """Whether a joint that can be commanded is faster than `slow` [rad/s|m/s], or commanded a velocity or effort."""
+def moves(robot_hw: RobotHW, max_rest_velocity: float) -> bool:
+    """Returns whether a joint exceeds a velocity [rad/s or m/s] or has a nonzero velocity or effort command."""
     return any(
-        abs(handle.velocity) > slow
+        abs(handle.velocity) > max_rest_velocity
         or (isinstance(interface, (VelocityJointInterface, EffortJointInterface)) and handle.command != 0.0)
         for interface, handle in robot_hw.command_handles
     )
 
 
-def _attempt(what: str, action: Callable[[], None]) -> bool:
+def _runs_without_error(description: str, action: Callable[[], None]) -> bool:
     try:
         action()
-    except Exception as error:  # hardware and network may raise anything; what follows must be done all the same
-        rospy.logerr("%s raised %s: %s", what, type(error).__name__, error)
+    except Exception as error:  # after any error, the next steps must still run
+        rospy.logerr("%s raised %s: %s", description, type(error).__name__, error)
         return False
     return True
 
@@ -282,7 +285,7 @@ def main() -> int:
 
     def on_signal(number: int, frame: object) -> None:
         del frame
-        if not running.is_set():  # hardware that takes long to connect must not delay the shutdown
+        if not running.is_set():  # hardware that connects slowly must not delay the shutdown
             raise SystemExit(128 + number)
         ended.set()
 

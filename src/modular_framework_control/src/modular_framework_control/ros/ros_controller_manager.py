@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The controller manager on ROS: its services, and its controllers' topics and actions.
+"""Provides the ROS services of the controller manager, and the topics and actions of its controllers.
 
-Whoever owns the control loop makes one, calls `connect` once, then `update` in every cycle between the hardware's
-`read` and `write`, and `close` at the end.
+The owner of the control loop creates a RosControllerManager and calls `connect` once, then `update` in every cycle
+between `read` and `write` of the hardware, and `close` at the end.
 """
 
 from __future__ import annotations
@@ -44,17 +44,17 @@ STATISTICS_PERIOD_S = 1.0
 
 
 class RosControllerManager:
-    """Controllers of one robot, reachable over ROS.
+    """Runs the controllers of one robot and provides them over ROS.
 
-    Services, below `<namespace>/controller_manager`: `load_controller`, `unload_controller`, `switch_controller`,
-    `list_controllers`, `list_controller_types`, `reload_controller_libraries`. Publishes, there and once a second of
-    real time while the loop runs, `statistics` (controller_manager_msgs/ControllersStatistics).
+    Services in `<namespace>/controller_manager`: `load_controller`, `unload_controller`, `switch_controller`,
+    `list_controllers`, `list_controller_types`, `reload_controller_libraries`. Topic in the same namespace:
+    `statistics` (controller_manager_msgs/ControllersStatistics), once a second of real time while the loop runs.
 
     Args:
-        robot_hw: initialised hardware.
-        namespace: namespace of the robot; controllers and their parameters are found below it.
-        types: known controller types; the built-in ones when not given.
-        loop_time: says how stamps of messages differ from the time given to `update`; not at all when not given.
+        robot_hw: Initialised hardware.
+        namespace: Namespace of the robot, which contains the controllers and their parameters.
+        types: Known controller types; None for the built-in types.
+        loop_time: Offset between the stamps of messages and the time given to `update`; None for no offset.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class RosControllerManager:
         self._loop_time = loop_time if loop_time is not None else LoopTime()
         self.manager = ControllerManager(robot_hw, RosNodeHandle(namespace), types, self._attach)
         self._services: list[rospy.Service] = []
-        self._statistics: rospy.Publisher | None = None
+        self._statistics_publisher: rospy.Publisher | None = None
         self._statistics_due_s = 0.0
 
     def _attach(self, name: str, controller: Controller) -> Callable[[], None]:
@@ -85,10 +85,10 @@ class RosControllerManager:
         """Advertises the services."""
         self._outbox.start()
         self._log.begin()
-        self._statistics = rospy.Publisher(
+        self._statistics_publisher = rospy.Publisher(
             join_names(self._namespace, "controller_manager/statistics"), ControllersStatistics, queue_size=1
         )
-        for name, kind, answer in (
+        for name, service_class, handler in (
             ("load_controller", LoadController, self._on_load),
             ("unload_controller", UnloadController, self._on_unload),
             ("switch_controller", SwitchController, self._on_switch),
@@ -97,7 +97,7 @@ class RosControllerManager:
             ("reload_controller_libraries", ReloadControllerLibraries, self._on_reload),
         ):
             full_name = join_names(self._namespace, f"controller_manager/{name}")
-            self._services.append(rospy.Service(full_name, kind, answer))
+            self._services.append(rospy.Service(full_name, service_class, handler))
 
     def update(
         self,
@@ -106,12 +106,19 @@ class RosControllerManager:
         reset_controllers: bool = False,
         reset_reason: str = RESET_REASON,
     ) -> None:
-        """One control cycle; see ControllerManager.update."""
+        """Runs one control cycle, with the arguments of ControllerManager.update.
+
+        Args:
+            time_s: Time of the cycle on the clock of the loop [s].
+            period_s: Time since the previous cycle [s].
+            reset_controllers: Whether to restart the running controllers.
+            reset_reason: Reason of the restart, sent to the clients of ended goals.
+        """
         self.manager.update(time_s, period_s, reset_controllers, reset_reason)
         now_s = time.monotonic()
-        if self._statistics is not None and now_s >= self._statistics_due_s:
+        if self._statistics_publisher is not None and now_s >= self._statistics_due_s:
             self._statistics_due_s = now_s + STATISTICS_PERIOD_S
-            self._outbox.publish(self._statistics, self._statistics_message)
+            self._outbox.publish(self._statistics_publisher, self._statistics_message)
 
     def _statistics_message(self) -> ControllersStatistics:
         message = ControllersStatistics()
@@ -124,34 +131,34 @@ class RosControllerManager:
 
     @property
     def moving(self) -> bool:
-        """Whether a controller carries out a goal."""
+        """Whether a controller executes a goal."""
         return self.manager.moving
 
     def flush(self, timeout_s: float = 2.0) -> None:
-        """Waits until everything is published that controllers have handed over so far, at most `timeout_s` [s]."""
+        """Waits up to `timeout_s` [s] until all messages passed on by the controllers so far are published."""
         self._outbox.flush(timeout_s)
 
     def close(self) -> None:
-        """Ends all goals, closes all topics and services; the control loop must have ended. May be called twice."""
+        """Ends all goals and closes all topics and services, after the end of the loop; may be called twice."""
         while self._services:
             self._services.pop().shutdown("controller manager closed")
         self.manager.stop_all()
         self._outbox.close()
         self.manager.close()
         self._log.end()
-        if self._statistics is not None:
-            self._statistics.unregister()
-            self._statistics = None
+        if self._statistics_publisher is not None:
+            self._statistics_publisher.unregister()
+            self._statistics_publisher = None
 
     def _on_load(self, request: Any) -> LoadControllerResponse:
-        return LoadControllerResponse(_done(lambda: self.manager.load_controller(request.name)))
+        return LoadControllerResponse(_succeeds(lambda: self.manager.load_controller(request.name)))
 
     def _on_unload(self, request: Any) -> UnloadControllerResponse:
-        return UnloadControllerResponse(_done(lambda: self.manager.unload_controller(request.name)))
+        return UnloadControllerResponse(_succeeds(lambda: self.manager.unload_controller(request.name)))
 
     def _on_switch(self, request: Any) -> SwitchControllerResponse:
         return SwitchControllerResponse(
-            _done(
+            _succeeds(
                 lambda: self.manager.switch_controller(
                     request.start_controllers,
                     request.stop_controllers,
@@ -175,12 +182,12 @@ class RosControllerManager:
 
     def _on_reload(self, request: Any) -> ReloadControllerLibrariesResponse:
         return ReloadControllerLibrariesResponse(
-            _done(lambda: self.manager.reload_controller_libraries(request.force_kill))
+            _succeeds(lambda: self.manager.reload_controller_libraries(request.force_kill))
         )
 
 
-def _done(action: Callable[[], None]) -> bool:
-    """Calls an operation of the manager; the services only answer `ok`, so the reason of a failure is logged."""
+def _succeeds(action: Callable[[], None]) -> bool:
+    """Calls an operation of the manager; logs the cause of a failure, as the responses only contain `ok`."""
     try:
         action()
     except ControllerError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The topics of controllers that report sensors: one a sensor, under its name in the namespace of the robot."""
+"""Publishes each sensor of a sensor controller on a topic named after the sensor in the namespace of the robot."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ from modular_framework_ros.node_handle import join_names
 
 
 class SensorRosInterface:
-    """Publishes what sensors measure.
+    """Publishes the measurements of sensors.
 
-    geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial units, std_msgs/Float64 for the
-    pace of a robot.
+    The type is geometry_msgs/WrenchStamped for force-torque sensors, sensor_msgs/Imu for inertial measurement units,
+    and std_msgs/Float64 for speed scaling.
     """
 
     def __init__(
         self, controller: SensorController, namespace: str, name: str, outbox: Outbox, loop_time: LoopTime
     ) -> None:
         del name
-        kind, to_msg = _MESSAGES[controller.interface_class]
+        message_class, to_msg = _MESSAGES[controller.interface_class]
         self._publishers = {
-            sensor: rospy.Publisher(join_names(namespace, sensor), kind, queue_size=4)
+            sensor: rospy.Publisher(join_names(namespace, sensor), message_class, queue_size=4)
             for sensor in controller.sensor_names
         }
 
@@ -59,7 +59,7 @@ class SensorRosInterface:
 
 
 def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamped:
-    """Converts the measurement of a force-torque sensor at `time_s` of the ROS clock [s]."""
+    """Converts the measurement of a force-torque sensor at ROS time `time_s` [s]."""
     message = _stamped(WrenchStamped(), time_s, handle.frame_id)
     message.wrench.force = Vector3(*handle.force)
     message.wrench.torque = Vector3(*handle.torque)
@@ -67,7 +67,7 @@ def wrench_to_msg(time_s: float, handle: ForceTorqueSensorHandle) -> WrenchStamp
 
 
 def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
-    """Converts the measurement of an inertial unit at `time_s` of the ROS clock [s]."""
+    """Converts the measurement of an inertial measurement unit at ROS time `time_s` [s]."""
     message = _stamped(Imu(), time_s, handle.frame_id)
     message.orientation = Quaternion(*handle.orientation)
     message.angular_velocity = Vector3(*handle.angular_velocity)
@@ -78,8 +78,8 @@ def imu_to_msg(time_s: float, handle: ImuSensorHandle) -> Imu:
     return message
 
 
-def pace_to_msg(time_s: float, handle: SpeedScalingHandle) -> Float64:
-    """Converts a speed scaling factor, 0 to 1; the message has no stamp."""
+def speed_scaling_to_msg(time_s: float, handle: SpeedScalingHandle) -> Float64:
+    """Converts a speed scaling factor in [0, 1]; the message has no stamp."""
     del time_s
     return Float64(handle.factor)
 
@@ -93,5 +93,5 @@ def _stamped(message: Any, time_s: float, frame_id: str) -> Any:
 _MESSAGES: Mapping[type[HardwareInterface[Any]], tuple[type[Any], Callable[[float, Any], Any]]] = {
     ForceTorqueSensorInterface: (WrenchStamped, wrench_to_msg),
     ImuSensorInterface: (Imu, imu_to_msg),
-    SpeedScalingInterface: (Float64, pace_to_msg),
+    SpeedScalingInterface: (Float64, speed_scaling_to_msg),
 }

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages with a trajectory whose points are arrays (`TrajectoryPoints`) instead of one object each.
+"""Deserialises trajectories into arrays (`TrajectoryPoints`) instead of one object per point.
 
-They are the public messages on the wire; only subscribers use them.
+The bytes on the wire are those of the public messages; only subscribers use these classes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _STAMP_BYTES = 8  # of a goal_id, before its id
 
 
 class CompactJointTrajectory(JointTrajectory):  # type: ignore[misc]
-    """A trajectory_msgs/JointTrajectory; deserialised, its `points` are arrays."""
+    """A trajectory_msgs/JointTrajectory whose deserialised `points` are arrays."""
 
     def deserialize(self, str: Buffer) -> CompactJointTrajectory:  # noqa: A002 (genpy's name)
         """Reads the message from its bytes."""
@@ -33,7 +33,7 @@ class CompactJointTrajectory(JointTrajectory):  # type: ignore[misc]
 
 
 class CompactTrajectoryActionGoal(FollowJointTrajectoryActionGoal):  # type: ignore[misc]
-    """A control_msgs/FollowJointTrajectoryActionGoal; deserialised, the points of its trajectory are arrays."""
+    """A control_msgs/FollowJointTrajectoryActionGoal whose deserialised trajectory points are arrays."""
 
     def deserialize(self, str: Buffer) -> CompactTrajectoryActionGoal:  # noqa: A002 (genpy's name)
         """Reads the message from its bytes."""
@@ -44,7 +44,7 @@ class CompactTrajectoryActionGoal(FollowJointTrajectoryActionGoal):  # type: ign
 
 
 class CompactFollowJointTrajectoryAction(FollowJointTrajectoryAction):  # type: ignore[misc]
-    """The action FollowJointTrajectory, for a server that receives compact goals."""
+    """The FollowJointTrajectory action for a server that receives compact goals."""
 
     def __init__(self, *arguments: Any, **fields: Any) -> None:
         super().__init__(*arguments, **fields)
@@ -52,14 +52,14 @@ class CompactFollowJointTrajectoryAction(FollowJointTrajectoryAction):  # type: 
 
 
 def _without_points(data: Buffer, goal_fields: int) -> tuple[TrajectoryPoints, bytes]:
-    """Returns the points of a serialised message with a trajectory, and the message without them.
+    """Returns the points of a serialised trajectory message, and the message without the points.
 
     Args:
-        data: the message.
-        goal_fields: 2 if the header and the goal_id of an action goal stand before the trajectory, otherwise 0.
+        data: Serialised message.
+        goal_fields: 2 if the header and the goal_id of an action goal precede the trajectory, otherwise 0.
 
     Raises:
-        genpy.DeserializationError: the message is cut off.
+        genpy.DeserializationError: If the message is truncated.
     """
     try:
         begin = 0
