@@ -48,8 +48,8 @@ def time_until_reported_s(arm: Arm, command: str, reason: str) -> float:
     [
         ("protective_stop", "protective stop of the arm"),
         ("emergency_stop", "emergency stop of the arm"),
-        ("cut", "link to the arm"),
-        ("freeze", "link to the arm"),
+        ("cut", "connection to the arm"),
+        ("freeze", "connection to the arm"),
     ],
 )
 def test_a_client_gets_a_fault_within_a_fifth_of_a_second(arm: Arm, command: str, reason: str) -> None:

@@ -64,8 +64,8 @@ def test_a_pause_makes_a_goal_wait(arm: Arm) -> None:
     [
         ("protective_stop", "protective stop of the arm"),
         ("emergency_stop", "emergency stop of the arm"),
-        ("cut", "link to the arm"),
-        ("freeze", "link to the arm"),
+        ("cut", "connection to the arm"),
+        ("freeze", "connection to the arm"),
     ],
 )
 def test_a_fault_ends_the_goal_with_its_reason_and_resume_goes_on_where_the_arm_stands(

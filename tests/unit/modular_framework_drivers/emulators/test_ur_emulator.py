@@ -20,7 +20,7 @@ import pytest
 
 from modular_framework_drivers.emulators.command_port import CommandError
 from modular_framework_drivers.emulators.ur_emulator_process import EmulatedArm
-from modular_framework_drivers.ur.dashboard import DashboardError, ask_dashboard
+from modular_framework_drivers.ur.dashboard import DashboardError, request_dashboard
 
 HOME = [0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0]
 
@@ -184,13 +184,13 @@ def test_a_protective_stop_ends_the_program_and_is_unlocked(arm: EmulatedArm) ->
 
 def test_after_an_emergency_stop_the_arm_is_powered_on_from_the_dashboard(arm: EmulatedArm) -> None:
     arm.command("emergency_stop")
-    assert ask_dashboard(arm.address, "safetymode") == "Safetymode: ROBOT_EMERGENCY_STOP"
-    assert ask_dashboard(arm.address, "brake release") == "Brake releasing"
+    assert request_dashboard(arm.address, "safetymode") == "Safetymode: ROBOT_EMERGENCY_STOP"
+    assert request_dashboard(arm.address, "brake release") == "Brake releasing"
     assert arm.state()["robot_mode"] == "POWER_OFF"
     arm.command("release_emergency_stop")
-    ask_dashboard(arm.address, "power on")
+    request_dashboard(arm.address, "power on")
     assert arm.state()["robot_mode"] == "IDLE"
-    ask_dashboard(arm.address, "brake release")
+    request_dashboard(arm.address, "brake release")
     assert arm.state()["robot_mode"] == "RUNNING"
 
 
@@ -234,23 +234,23 @@ def test_it_says_what_it_does_not_run(arm: EmulatedArm) -> None:
 def test_a_lost_link_refuses_connections_until_it_is_restored(arm: EmulatedArm) -> None:
     arm.command("cut")
     with pytest.raises(DashboardError, match="got no answer"):
-        ask_dashboard(arm.address, "robotmode", 1.0)
+        request_dashboard(arm.address, "robotmode", 1.0)
     arm.command("restore")
-    assert ask_dashboard(arm.address, "robotmode") == "Robotmode: RUNNING"
+    assert request_dashboard(arm.address, "robotmode") == "Robotmode: RUNNING"
 
 
 def test_a_frozen_link_lets_nothing_through_though_connections_open(arm: EmulatedArm) -> None:
     arm.command("freeze")
     with pytest.raises(DashboardError, match="timed out"):
-        ask_dashboard(arm.address, "robotmode", 0.3)
+        request_dashboard(arm.address, "robotmode", 0.3)
     arm.command("restore")
-    assert ask_dashboard(arm.address, "robotmode") == "Robotmode: RUNNING"
+    assert request_dashboard(arm.address, "robotmode") == "Robotmode: RUNNING"
 
 
 def test_delayed_packages_come_late(arm: EmulatedArm) -> None:
     arm.command("delay", seconds=0.3)
     begun_s = time.monotonic()
-    ask_dashboard(arm.address, "robotmode")
+    request_dashboard(arm.address, "robotmode")
     assert time.monotonic() - begun_s >= 0.6  # the greeting and the answer
     arm.command("restore")
 

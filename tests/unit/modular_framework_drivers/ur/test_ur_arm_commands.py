@@ -146,7 +146,7 @@ def test_a_program_that_ends_before_the_arm_follows_is_reported(hw: UrArmHardwar
     link.program_ready_s -= 2.0
     hw.read(0.0, PERIOD_S)
     assert not link.commanding
-    assert hw.fault() == "the arm at nowhere takes no commands: the program on the arm was stopped; call resume"
+    assert hw.fault() == "the arm at nowhere accepts no commands: the program on the arm was stopped; call resume"
 
 
 class FakeProcess:
@@ -269,7 +269,7 @@ def test_a_control_loop_that_comes_late_does_not_take_the_link_for_lost(link: Rt
 
 @pytest.mark.parametrize(
     ("role", "said"),
-    [("state", "reads the arm's state has said nothing"), ("control", "commands the arm has taken no command")],
+    [("state", "reads the arm's state has been silent"), ("control", "commands the arm has accepted no command")],
 )
 def test_a_process_that_hangs_is_reported_and_replaced(link: RtdeLink, role: str, said: str) -> None:
     link.connect()
@@ -323,4 +323,4 @@ def test_a_link_that_is_lost_afterwards_does(link: RtdeLink) -> None:
     until(link, lambda: link.lost == "")
     time.sleep(0.1)
     link.poll()
-    assert not link.commanding and "given up" in link.program_failure
+    assert not link.commanding and "ended with the lost connection" in link.program_failure

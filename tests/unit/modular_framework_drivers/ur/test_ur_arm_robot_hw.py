@@ -179,9 +179,9 @@ def test_the_wrench_at_the_tool_is_a_sensor(make_rig: Callable[..., Rig]) -> Non
         ("protective_stop", "protective stop of the arm"),
         ("emergency_stop", "emergency stop of the arm"),
         ("stop_program", "the program on the arm was stopped"),
-        ("cut", "link to the arm"),
-        ("freeze", "link to the arm"),
-        ("garbage", "link to the arm"),
+        ("cut", "connection to the arm"),
+        ("freeze", "connection to the arm"),
+        ("garbage", "connection to the arm"),
     ],
 )
 def test_a_fault_is_reported_the_arm_holds_and_comes_back_on_resume(rig: Rig, command: str, reason: str) -> None:
@@ -203,7 +203,7 @@ def test_a_fault_is_reported_the_arm_holds_and_comes_back_on_resume(rig: Rig, co
     assert rig.hw.fault() != "" and rig.arm.positions() == pytest.approx(rest_position, abs=1e-4)
     for remedy in ("restore", "unlock", "release_emergency_stop", "power_on"):
         rig.arm.command(remedy)
-    rig.until(lambda: "takes no commands" in rig.hw.fault() and "call resume" in rig.hw.fault())
+    rig.until(lambda: "accepts no commands" in rig.hw.fault() and "call resume" in rig.hw.fault())
     rig.run(0.2)
     assert "resume" in rig.hw.fault(), "it must not go on by itself"
     assert rig.arm.positions() == pytest.approx(rest_position, abs=1e-4)
@@ -367,7 +367,7 @@ def test_a_slow_link_is_a_warning_and_one_slower_than_the_timeout_is_lost(make_r
     rig.arm.command("delay", seconds=0.2)
     rig.until(lambda: re.search(r"states of the arm at \S+ come 0\.[23]\d s late", rig.hw.warning()) is not None)
     rig.arm.command("delay", seconds=1.2)
-    rig.until(lambda: "link to the arm" in rig.hw.fault())
+    rig.until(lambda: "connection to the arm" in rig.hw.fault())
     rig.until(lambda: "s late, longer than link_timeout (1 s)" in rig.hw.fault())
 
 
@@ -385,7 +385,7 @@ def test_an_emulator_that_is_killed_is_a_lost_link(tmp_path: Any) -> None:
     rig.until(lambda: rig.hw.ready)
     other.kill()
     rig.until(lambda: rig.hw.fault() != "")
-    assert "link to the arm" in rig.hw.fault()
+    assert "connection to the arm" in rig.hw.fault()
     rig.hw.close()
     other.close()
 

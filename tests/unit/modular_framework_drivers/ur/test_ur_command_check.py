@@ -141,7 +141,7 @@ def test_a_refused_command_brings_a_moving_arm_to_rest_and_the_next_good_one_goe
 
 def test_the_refusal_says_what_was_got_and_what_is_allowed() -> None:
     assert "command 2.5 rad is outside its range [-2, 2] rad" in checked().admit([2.5, 0.0], DT_S)
-    assert "at most 0.5 rad at once" in checked().admit([0.9, 0.0], DT_S)
+    assert "at most 0.5 rad is allowed" in checked().admit([0.9, 0.0], DT_S)
 
 
 @settings(deadline=None)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The messages between the control loop and the processes that run ur-rtde; one datagram per message.
+"""Encodes the messages between the control loop and the processes that run ur-rtde, one datagram per message.
 
-The first byte is the kind; numbers follow in the machine's own byte order, as both ends run on one machine. CONNECTING
-comes from both processes when they begin to connect; STATE, and ALIVE while there is none, from the one that reads;
-READY once and ACCEPTED after each command from the one that commands; FAILED with the reason from both, as the last
-message.
+The first byte is the message type; numbers follow in native byte order, as all processes run on one machine. Both
+processes send CONNECTING when they start to connect, and FAILED with the cause as their last message. The process that
+reads states sends STATE, or ALIVE while no state arrives. The process that sends commands to the arm sends READY once
+and ACCEPTED after each command.
 """
 
 from __future__ import annotations
@@ -18,32 +18,34 @@ CONNECTING, STATE, ALIVE, READY, ACCEPTED, FAILED, SERVO = b"C", b"S", b"A", b"R
 _STATE = struct.Struct("=cdd26diiId")
 _SERVO = struct.Struct("=c7d")
 MESSAGE_SIZE = 1024
-Six = tuple[float, ...]
+JointValues = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class ArmState:
-    """State that the arm's controller reports.
+    """Holds a state reported by the arm's controller.
 
     Attributes:
-        received_s: when the process that reads got it, on the monotonic clock [s].
-        timestamp_s: the controller's own clock [s].
-        positions: of the joints [rad].
-        velocities: [rad/s].
-        currents: of the motors [A].
-        wrench: force [N] and torque [Nm] at the tool, in the frame of the base.
-        speed_fraction: the speed slider, 0 to 1.
-        speed_scaling: share of the pace at which the controller lets programs run.
-        robot_mode, safety_mode, runtime_state: numbers of RTDE.
-        late_s: how long it was under way [s].
+        received_s: Time of reception on the monotonic clock [s].
+        timestamp_s: Time on the clock of the controller [s].
+        positions: Joint positions [rad].
+        velocities: Joint velocities [rad/s].
+        currents: Motor currents [A].
+        wrench: Force [N] and torque [Nm] at the tool, in the base frame.
+        speed_fraction: Speed slider in [0, 1].
+        speed_scaling: Speed scaling factor that the controller applies to programs.
+        robot_mode: Robot mode of RTDE.
+        safety_mode: Safety mode of RTDE.
+        runtime_state: Runtime state of the program in RTDE.
+        late_s: Transmission delay [s].
     """
 
     received_s: float
     timestamp_s: float
-    positions: Six
-    velocities: Six
-    currents: Six
-    wrench: Six
+    positions: JointValues
+    velocities: JointValues
+    currents: JointValues
+    wrench: JointValues
     speed_fraction: float
     speed_scaling: float
     robot_mode: int
@@ -53,11 +55,11 @@ class ArmState:
 
     @property
     def modes(self) -> tuple[int, int, int]:
-        """Modes of robot and safety, and state of the program."""
+        """Returns the robot mode, the safety mode and the runtime state of the program."""
         return self.robot_mode, self.safety_mode, self.runtime_state
 
     def packed(self) -> bytes:
-        """The message that carries it."""
+        """Returns the state as a message."""
         return _STATE.pack(
             STATE,
             self.received_s,
@@ -74,17 +76,17 @@ class ArmState:
 
     @classmethod
     def unpacked(cls, message: bytes) -> ArmState:
-        """The state in a message."""
+        """Returns the state in a message."""
         values = _STATE.unpack(message)
         return cls(values[1], values[2], values[3:9], values[9:15], values[15:21], values[21:27], *values[27:])
 
 
 def servo_message(positions: Sequence[float], time_s: float) -> bytes:
-    """Message that has the joints go to `positions` [rad] within `time_s` [s]."""
+    """Returns the message that commands the joints to `positions` [rad] within `time_s` [s]."""
     return _SERVO.pack(SERVO, *positions, time_s)
 
 
 def read_servo_message(message: bytes) -> tuple[list[float], float]:
-    """Positions [rad] and time [s] of a servo message."""
+    """Returns the positions [rad] and the time [s] of a servo message."""
     values = _SERVO.unpack(message)
     return list(values[1:7]), values[7]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults of an arm from the modes of its controller."""
+"""Determines the fault of a UR arm from the modes of its controller."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _REMEDIES = {
 
 
 def robot_fault(state: ArmState, address: str) -> str:
-    """Returns why an arm in this state cannot be moved, and what to do; "" if it can."""
+    """Returns the fault that prevents motion in this state and its remedy; "" if there is none."""
     mode = state.safety_mode
     if mode not in (_SAFETY_NORMAL, _SAFETY_REDUCED):
         name, remedy = _SAFETY_MODES.get(mode, f"safety mode {mode}"), _REMEDIES.get(mode, "look at its pendant")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads the parameters of an arm of Universal Robots and checks them."""
+"""Reads and checks the parameters of a UR arm."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from modular_framework_drivers.ur.rtde_link import LinkSettings
 from modular_framework_ros.node_handle import NodeHandle, ParameterError, join_names
 from modular_framework_ros.parameter_declarations import ParameterReader
 
-# Largest limits of an arm: range in turns, its maker's speed, and the acceleration that URScript accepts of a joint
+# Limits of all UR joints: position range, velocity of the data sheet, maximum acceleration accepted by URScript
 _UR_LIMITS = JointLimits(-2.0 * math.pi, 2.0 * math.pi, max_velocity=math.pi, max_acceleration=40.0)
 
 
 def read_link_settings(parameters: ParameterReader) -> LinkSettings:
-    """Returns the connection settings from the parameters of the arm.
+    """Returns the connection settings in the parameters of the arm.
 
     Raises:
-        ParameterError: something is missing or not allowed; names all of it.
+        ParameterError: If parameters are missing or invalid; names each of them.
     """
     address, timeout_s, scale, mass_kg, centre_m, lookahead_s, gain, real_time = parameters.values(
         "~robot_ip_address",
@@ -42,18 +42,22 @@ def read_link_settings(parameters: ParameterReader) -> LinkSettings:
 
 
 def read_checked_joints(names: list[str], root_nh: NodeHandle) -> list[CheckedJoint]:
-    """The joints with their limits: of the robot description and `joint_limits`, and what the arm can do at most.
+    """Returns the joints with the limits of the URDF and of `joint_limits`, bounded by those of the arm.
+
+    Args:
+        names: Names of the joints.
+        root_nh: Node handle in the root namespace.
 
     Raises:
-        ParameterError: a limit is not allowed.
+        ParameterError: If a limit is invalid.
     """
     description = root_nh.get_param("robot_description")
-    known = limits_from_urdf(description) if isinstance(description, str) else {}
-    soft = soft_limits_from_urdf(description) if isinstance(description, str) else {}
+    urdf_limits = limits_from_urdf(description) if isinstance(description, str) else {}
+    urdf_soft_limits = soft_limits_from_urdf(description) if isinstance(description, str) else {}
     joints = []
     for name in names:
-        limits = limits_with_parameters(name, known.get(name, _UR_LIMITS), root_nh)
-        _refuse_standstill(limits, join_names(root_nh.namespace, f"joint_limits/{name}"))
+        limits = limits_with_parameters(name, urdf_limits.get(name, _UR_LIMITS), root_nh)
+        _check_nonzero_limits(limits, join_names(root_nh.namespace, f"joint_limits/{name}"))
         joints.append(
             CheckedJoint(
                 name,
@@ -64,16 +68,16 @@ def read_checked_joints(names: list[str], root_nh: NodeHandle) -> list[CheckedJo
                     max_velocity=min(limits.max_velocity, _UR_LIMITS.max_velocity),
                     max_acceleration=min(limits.max_acceleration, _UR_LIMITS.max_acceleration),
                 ),
-                soft_limits_with_parameters(name, soft.get(name), root_nh),
+                soft_limits_with_parameters(name, urdf_soft_limits.get(name), root_nh),
             )
         )
     return joints
 
 
-def _refuse_standstill(limits: JointLimits, where: str) -> None:
+def _check_nonzero_limits(limits: JointLimits, where: str) -> None:
     for key, value in (("max_velocity", limits.max_velocity), ("max_acceleration", limits.max_acceleration)):
         if not value > 0.0:
             raise ParameterError(
-                f"parameter {where}/{key}: got {value:g}, there or in the robot description; expected "
-                "more than 0, else the joint cannot move"
+                f"parameter {where}/{key}: got {value:g}, from this parameter or from the robot description; expected "
+                "more than 0, otherwise the joint cannot move"
             )

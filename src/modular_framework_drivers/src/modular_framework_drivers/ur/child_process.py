@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A process with a datagram socket to it; nothing here blocks but `end`.
+"""Runs a child process connected by a datagram socket; only `end` blocks.
 
-A pipe of multiprocessing would not do: its `send` blocks while the pipe is full, which the control loop must not do.
+A pipe of multiprocessing is not suitable: its `send` blocks while the pipe is full, which would block the control loop.
 """
 
 from __future__ import annotations
@@ -13,32 +13,32 @@ from collections.abc import Iterator, Sequence
 
 from modular_framework_drivers.ur.arm_messages import MESSAGE_SIZE
 
-_ORDINARY = ("chrt", "--other", "0")
-"""Prefix of the command that gives the process ordinary scheduling, because the parent may run in real time and an
-interpreter takes long to start. It is set after the exec: the parent waits until the exec, so a child with ordinary
-scheduling before it would delay the parent while other programs use the processors."""
+_ORDINARY_SCHEDULING = ("chrt", "--other", "0")
+"""Command prefix that starts the child with ordinary scheduling, because the parent may run in real time and an
+interpreter starts slowly. The child changes its scheduling after its exec: the parent waits for the exec, and a child
+with ordinary scheduling before the exec would delay the parent on busy processors."""
 
 
 class ChildProcess:
-    """A Python module run as a process of its own, with ordinary scheduling, whatever the scheduling of its parent.
+    """Runs a Python module as a child process with ordinary scheduling.
 
     Args:
-        module: what to run; gets the first argument, the file descriptor of its socket, then the others.
-        arguments: its command line.
+        module: Name of the module.
+        arguments: Command line; the file descriptor of the child's socket is inserted after the first argument.
 
     Raises:
-        OSError: the system has no room for one.
+        OSError: If the system cannot start another process.
     """
 
     def __init__(self, module: str, arguments: Sequence[str]) -> None:
-        self._socket, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket, child_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.setblocking(False)
-        with other:
+        with child_socket:
             role, *rest = arguments
             try:
                 self._process = subprocess.Popen(
-                    [*_ORDINARY, sys.executable, "-m", module, role, str(other.fileno()), *rest],
-                    pass_fds=[other.fileno()],
+                    [*_ORDINARY_SCHEDULING, sys.executable, "-m", module, role, str(child_socket.fileno()), *rest],
+                    pass_fds=[child_socket.fileno()],
                     stdin=subprocess.DEVNULL,
                 )
             except OSError:
@@ -47,13 +47,13 @@ class ChildProcess:
         self.ended = False
 
     def messages(self) -> Iterator[bytes]:
-        """Yields the messages since the last call; sets `ended` when no more can come."""
+        """Yields the messages since the last call; sets `ended` once the child has closed the socket."""
         while not self.ended:
             try:
                 message = self._socket.recv(MESSAGE_SIZE)
             except BlockingIOError:
                 return
-            except ConnectionResetError:  # it ended without reading all messages to it; those from it come next
+            except ConnectionResetError:  # the child ended with unread messages; its own messages come next
                 continue
             except OSError:
                 message = b""
@@ -63,14 +63,14 @@ class ChildProcess:
             yield message
 
     def send(self, message: bytes) -> bool:
-        """Sends a message; returns False if the process cannot take it now."""
+        """Sends a message; returns False if the queue of the process is full or the process has ended."""
         try:
             return self._socket.send(message) == len(message)
         except OSError:
             return False
 
     def end(self, patience_s: float = 0.0) -> None:
-        """Ends the process, at once or after it had `patience_s` [s] to end by itself; may be called twice."""
+        """Ends the process: waits up to `patience_s` [s], then kills it; may be called twice."""
         self.ended = True
         self._socket.close()
         try:

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks every position command before it is sent to the arm.
 
-A command that is no number, lies outside a joint's range or is far from the last one is refused; the arm brakes and
-holds. One that is only faster, or accelerates more, than a joint may is followed as fast as the joint may; so is one
-beyond a soft limit, or by as little beyond the range as trajectory controllers allow, up to that limit. A joint that
-stands outside its range may stay there and come back.
+A command that is not finite, outside the position limits of a joint or far from the last command is refused, and the
+arm brakes. A command that exceeds only the velocity or acceleration limit is followed as fast as the limits allow. A
+command beyond a soft limit, or beyond a position limit by the tolerance of the trajectory controllers, is followed up
+to the limit. A joint outside its position limits may stay there or return.
 
-The limits are those of all hardware (modular_framework_control.hardware_interface.joint_limits). Their guard replaces a
-command by the nearest one allowed, which does not do here: a real arm must not drive to the end of its range because a
-controller went wrong, and it stops itself hard when its speed is to change at once.
+The limits have the types of modular_framework_control.hardware_interface.joint_limits. That module replaces an invalid
+command by the nearest valid command. A real arm must not move to its position limit because of a faulty controller, and
+its controller triggers a protective stop after a velocity step.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from modular_framework_control.hardware_interface.joint_limits import soft_veloc
 from modular_framework_control.trajectory.motion_limits import CURVE_MARGIN
 from modular_framework_control.trajectory.stop_motion import FOLLOWING_LAG_S, SHARP_BRAKING_FRACTION
 
-_SLACK = 1e-6  # tolerance for rounding [rad], and as a share of a limit
+_RELATIVE_TOLERANCE = 1e-6  # rounding tolerance, relative to a limit
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedJoint:
-    """A joint with its limits.
+    """Holds the limits of a joint.
 
     Attributes:
-        name: of the joint.
-        limits: of its position [rad], velocity [rad/s] and acceleration [rad/s^2]; all finite.
-        soft: its soft limits, if any.
+        name: Name of the joint.
+        limits: Limits of position [rad], velocity [rad/s] and acceleration [rad/s^2]; all finite.
+        soft: Soft limits; None if absent.
     """
 
     name: str
@@ -40,30 +40,35 @@ class CheckedJoint:
     soft: SoftJointLimits | None = None
 
     def velocity_range(self, position: float, period_s: float) -> tuple[float, float]:
-        """Smallest and largest velocity at `position` [rad] in a cycle of `period_s` [s].
+        """Returns the minimum and maximum velocity [rad/s] from which the joint can stop within its limits.
 
-        So slow that the joint can stop within its range.
+        Args:
+            position: Joint position [rad].
+            period_s: Period of the loop [s].
         """
         limits = self.limits
-        slowest, fastest = -limits.max_velocity, limits.max_velocity
+        min_velocity, max_velocity = -limits.max_velocity, limits.max_velocity
         if self.soft is not None:
-            slowest, fastest = soft_velocities(position, limits, self.soft)
-        below, above = max(position - limits.min_position, 0.0), max(limits.max_position - position, 0.0)
+            min_velocity, max_velocity = soft_velocities(position, limits, self.soft)
+        distance_below, distance_above = (
+            max(position - limits.min_position, 0.0),
+            max(limits.max_position - position, 0.0),
+        )
         return (
-            max(slowest, -_closing_speed(below, limits.max_acceleration, period_s)),
-            min(fastest, _closing_speed(above, limits.max_acceleration, period_s)),
+            max(min_velocity, -_closing_speed(distance_below, limits.max_acceleration, period_s)),
+            min(max_velocity, _closing_speed(distance_above, limits.max_acceleration, period_s)),
         )
 
 
 class CommandCheck:
-    """The commands that go to the arm.
+    """Checks position commands and computes the positions to send to the arm.
 
     Args:
-        joints: in the order of the commands.
-        max_jump: largest distance between a command and what was last sent [rad].
+        joints: Joints in the order of the commands.
+        max_jump: Maximum distance between a command and the last sent position [rad].
 
     Attributes:
-        sent: what is to be sent [rad]; changed by `admit` and `reset`.
+        sent: Positions to send [rad]; set by `admit` and `reset`.
     """
 
     def __init__(self, joints: Sequence[CheckedJoint], max_jump: float) -> None:
@@ -80,41 +85,47 @@ class CommandCheck:
         self._velocities = [0.0] * len(self._joints)
 
     def rest_after(self, index: int, position: float, velocity: float) -> float:
-        """Returns where a joint at `position` [rad] with `velocity` [rad/s] comes to rest if it brakes now [rad]."""
-        joint = self._joints[index]
-        lowest, highest = joint.limits.range_from(position)
-        way = velocity * FOLLOWING_LAG_S + math.copysign(_braking_distance(velocity, joint), velocity)
-        return min(max(position + way, lowest), highest)
-
-    def admit(self, commands: Sequence[float], period_s: float) -> str:
-        """Sets `sent` to the command for the arm.
+        """Returns the position at which a joint comes to rest if it brakes now [rad].
 
         Args:
-            commands: positions [rad].
-            period_s: time since the last call [s].
+            index: Index of the joint.
+            position: Current position [rad].
+            velocity: Current velocity [rad/s].
+        """
+        joint = self._joints[index]
+        min_position, max_position = joint.limits.range_from(position)
+        stopping_displacement = velocity * FOLLOWING_LAG_S + math.copysign(_braking_distance(velocity, joint), velocity)
+        return min(max(position + stopping_displacement, min_position), max_position)
+
+    def admit(self, commands: Sequence[float], period_s: float) -> str:
+        """Checks the commands and sets `sent` to the positions for the arm.
+
+        Args:
+            commands: Commanded positions [rad].
+            period_s: Time since the last call [s].
 
         Returns:
-            "", or why the commands were refused; `sent` then brings the arm to rest.
+            The reason if the commands are refused, in which case `sent` brings the arm to rest; otherwise "".
         """
-        reason = self._reason_to_refuse(commands)
+        reason = self._refusal_reason(commands)
         if period_s <= 0.0:
             return reason
         for index, joint in enumerate(self._joints):
             limits = joint.limits
             if reason:
-                self._brake(index, limits.max_acceleration * period_s, period_s)
+                self._decelerate(index, limits.max_acceleration * period_s, period_s)
             else:
-                lowest, highest = limits.range_from(self.sent[index])
-                self._approach(index, min(max(commands[index], lowest), highest), joint, period_s)
+                min_position, max_position = limits.range_from(self.sent[index])
+                self._approach(index, min(max(commands[index], min_position), max_position), joint, period_s)
         return reason
 
-    def _reason_to_refuse(self, commands: Sequence[float]) -> str:
+    def _refusal_reason(self, commands: Sequence[float]) -> str:
         for command, sent, velocity, joint in zip(commands, self.sent, self._velocities, self._joints, strict=True):
             limits = joint.limits
             if not math.isfinite(command):
-                return f"joint '{joint.name}': command {command} is no position; the arm holds"
-            lowest, highest = limits.range_from(sent)
-            if not lowest - CURVE_MARGIN <= command <= highest + CURVE_MARGIN:
+                return f"joint '{joint.name}': command {command} is not finite; the arm holds"
+            min_position, max_position = limits.range_from(sent)
+            if not min_position - CURVE_MARGIN <= command <= max_position + CURVE_MARGIN:
                 return (
                     f"joint '{joint.name}': command {command:.6g} rad is outside its range "
                     f"[{limits.min_position:.6g}, {limits.max_position:.6g}] rad; the arm holds"
@@ -122,40 +133,49 @@ class CommandCheck:
             if abs(command - sent) > self._max_jump + _braking_distance(velocity, joint):
                 return (
                     f"joint '{joint.name}': command {command:.6g} rad is {abs(command - sent):.3g} rad away from "
-                    f"{sent:.6g} rad where the arm is told to be; at most {self._max_jump:g} rad at once "
+                    f"the last sent position {sent:.6g} rad; at most {self._max_jump:g} rad is allowed "
                     "(parameter max_jump_rad); the arm holds"
                 )
         return ""
 
-    def _brake(self, index: int, change: float, period_s: float) -> None:
+    def _decelerate(self, index: int, max_velocity_change: float, period_s: float) -> None:
         velocity = self._velocities[index]
-        velocity -= min(max(velocity, -change), change)
+        velocity -= min(max(velocity, -max_velocity_change), max_velocity_change)
         self._velocities[index] = velocity
         self.sent[index] += velocity * period_s
         self._targets[index] = self.sent[index]
 
     def _approach(self, index: int, command: float, joint: CheckedJoint, period_s: float) -> None:
-        """Moves to the command at once if the limits of velocity and acceleration allow it, else as fast as they do.
+        """Moves to the command within one cycle, or as fast as the velocity and acceleration limits allow.
 
-        "At once" also requires that the joint can have the velocity of the commands in the next cycle, so that it does
-        not overshoot.
+        A motion within one cycle must also let the joint have the velocity of the commands in the next cycle, so that
+        the joint does not overshoot.
         """
         position, velocity = self.sent[index], self._velocities[index]
-        slowest, fastest = joint.velocity_range(position, period_s)
+        min_velocity, max_velocity = joint.velocity_range(position, period_s)
         deceleration = joint.limits.max_acceleration
-        change = deceleration * period_s
-        pace = (command - self._targets[index]) / period_s
+        max_velocity_change = deceleration * period_s
+        command_velocity = (command - self._targets[index]) / period_s
         self._targets[index] = command
-        wanted = (command - position) / period_s
-        at_once = max(abs(wanted - velocity), abs(wanted - pace)) <= change * (1.0 + _SLACK)
-        if at_once and slowest * (1.0 + _SLACK) <= wanted <= fastest * (1.0 + _SLACK):
-            self._velocities[index] = wanted
+        required_velocity = (command - position) / period_s
+        within_one_cycle = max(
+            abs(required_velocity - velocity), abs(required_velocity - command_velocity)
+        ) <= max_velocity_change * (1.0 + _RELATIVE_TOLERANCE)
+        if within_one_cycle and min_velocity * (1.0 + _RELATIVE_TOLERANCE) <= required_velocity <= max_velocity * (
+            1.0 + _RELATIVE_TOLERANCE
+        ):
+            self._velocities[index] = required_velocity
             self.sent[index] = command
             return
-        pace = min(max(pace, slowest), fastest)
-        behind = command - pace * period_s - position
-        goal = pace + math.copysign(_closing_speed(abs(behind), deceleration, period_s), behind)
-        velocity += min(max(min(max(goal, slowest), fastest) - velocity, -change), change)
+        command_velocity = min(max(command_velocity, min_velocity), max_velocity)
+        position_error = command - command_velocity * period_s - position
+        target_velocity = command_velocity + math.copysign(
+            _closing_speed(abs(position_error), deceleration, period_s), position_error
+        )
+        velocity += min(
+            max(min(max(target_velocity, min_velocity), max_velocity) - velocity, -max_velocity_change),
+            max_velocity_change,
+        )
         self._velocities[index] = velocity
         self.sent[index] = position + velocity * period_s
 
@@ -165,11 +185,11 @@ def _braking_distance(velocity: float, joint: CheckedJoint) -> float:
 
 
 def _closing_speed(distance: float, deceleration: float, period_s: float) -> float:
-    """Returns the highest speed from which a joint can stop within `distance` [rad], braking once per period.
+    """Returns the maximum speed from which a joint that brakes once per period can stop within `distance` [rad].
 
-    A cycle at that speed leaves a distance whose closing speed is lower by what is braked in a cycle, or nothing.
+    After a cycle at this speed, the maximum speed for the remaining distance is one braking step lower, or 0.
     """
-    step = deceleration * period_s
-    cycles = distance / (step * period_s)  # that it takes at the speed of one step
-    brakings = math.floor(math.sqrt(0.25 + 2.0 * cycles) - 0.5)
-    return step * (cycles / (brakings + 1) + 0.5 * brakings)
+    velocity_step = deceleration * period_s
+    cycles = distance / (velocity_step * period_s)  # number of cycles for the distance at the speed of one braking step
+    braking_cycles = math.floor(math.sqrt(0.25 + 2.0 * cycles) - 0.5)
+    return velocity_step * (cycles / (braking_cycles + 1) + 0.5 * braking_cycles)

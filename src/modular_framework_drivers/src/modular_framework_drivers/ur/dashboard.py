@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Client of the dashboard server of an arm; one line per request."""
+"""Sends requests to the dashboard server of a UR arm."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ DASHBOARD_PORT = 29999
 
 
 class DashboardError(Exception):
-    """The dashboard server did not answer."""
+    """Raised if the dashboard server does not respond."""
 
 
-def ask_dashboard(address: str, line: str, timeout_s: float = 2.0, port: int = DASHBOARD_PORT) -> str:
-    """Sends one line and returns the answer.
+def request_dashboard(address: str, line: str, timeout_s: float = 2.0, port: int = DASHBOARD_PORT) -> str:
+    """Sends one request and returns the response.
 
     Args:
-        address: of the arm's controller.
-        line: for example "unlock protective stop".
-        timeout_s: for the connection and for each answer [s].
-        port: of the dashboard server.
+        address: Address of the arm's controller.
+        line: Request, such as "unlock protective stop".
+        timeout_s: Timeout of the connection and of each response [s].
+        port: Port of the dashboard server.
 
     Raises:
-        DashboardError: nobody listens, or no answer in time.
+        DashboardError: If the server cannot be reached or does not respond in time.
     """
     try:
         with (
@@ -32,14 +32,14 @@ def ask_dashboard(address: str, line: str, timeout_s: float = 2.0, port: int = D
             lines.readline()  # the greeting
             lines.write(line + "\n")
             lines.flush()
-            answer = lines.readline().strip()
+            response = lines.readline().strip()
     except OSError as error:
         raise DashboardError(
             f"dashboard server at {address}:{port}: '{line}' got no answer: {error}; is the arm's "
             "controller on, and in remote control?"
         ) from error
-    if not answer:
+    if not response:
         raise DashboardError(
             f"dashboard server at {address}:{port} closed the connection instead of answering '{line}'"
         )
-    return answer
+    return response

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An arm of Universal Robots in a ROS node: publishes when it is ready, serves `resume` and the dashboard."""
+"""Connects a UR arm to ROS: publishes its readiness, serves `resume` and the dashboard."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger, TriggerResponse
 
-from modular_framework_drivers.ur.dashboard import DashboardError, ask_dashboard
+from modular_framework_drivers.ur.dashboard import DashboardError, request_dashboard
 from modular_framework_drivers.ur.ur_arm_robot_hw import UrArmHardware
 from modular_framework_ros.node_handle import NodeHandle, join_names
 from modular_framework_ros.parameter_declarations import parameters_below
 from modular_framework_ros.publishing import publish
 
-# Dashboard services under the names of ur_robot_driver: the request, and how the answer begins after a success
+# Dashboard services under the names of ur_robot_driver: request and start of a successful response
 DASHBOARD_SERVICES = {
     "power_on": ("power on", "Powering on"),
     "power_off": ("power off", "Powering off"),
@@ -34,10 +34,10 @@ _WATCH_PERIOD_S = 0.05
 
 
 class UrArmRobotHW(UrArmHardware):
-    """An arm of Universal Robots; its parameters are listed at `UrArmHardware`.
+    """A UR arm with the parameters of `UrArmHardware`.
 
-    Publishes `topic_to_wait_for` (std_msgs/Bool, latched) whenever it changes whether the arm follows commands. Offers,
-    below its own namespace, `resume` and `dashboard/<name>` for the names in DASHBOARD_SERVICES (std_srvs/Trigger).
+    Publishes on `topic_to_wait_for` (std_msgs/Bool, latched) whether the arm follows commands. Serves, in its own
+    namespace, `resume` and `dashboard/<name>` for each name in DASHBOARD_SERVICES (std_srvs/Trigger).
     """
 
     announces_ready: ClassVar[bool] = True
@@ -56,10 +56,12 @@ class UrArmRobotHW(UrArmHardware):
         )
         if topic:
             self._publisher = rospy.Publisher(topic, Bool, queue_size=1, latch=True)
-        self._offer(join_names(robot_hw_nh.namespace, "resume"), self._on_resume)
+        self._advertise_service(join_names(robot_hw_nh.namespace, "resume"), self._on_resume)
         for name in DASHBOARD_SERVICES:
-            self._offer(join_names(robot_hw_nh.namespace, f"dashboard/{name}"), self._asker(name))
-        threading.Thread(target=self._watch, name="ur_ready", daemon=True).start()
+            self._advertise_service(
+                join_names(robot_hw_nh.namespace, f"dashboard/{name}"), self._dashboard_callback(name)
+            )
+        threading.Thread(target=self._publish_readiness, name="ur_ready", daemon=True).start()
         return True
 
     def close(self) -> None:
@@ -68,10 +70,10 @@ class UrArmRobotHW(UrArmHardware):
             self._services.pop().shutdown("the arm is closed")
         super().close()
 
-    def _offer(self, name: str, callback: Callable[[Any], TriggerResponse]) -> None:
+    def _advertise_service(self, name: str, callback: Callable[[Any], TriggerResponse]) -> None:
         self._services.append(rospy.Service(name, Trigger, callback))
 
-    def _watch(self) -> None:
+    def _publish_readiness(self) -> None:
         published: bool | None = None
         while not self._closing.wait(_WATCH_PERIOD_S):
             ready = self.ready
@@ -84,15 +86,15 @@ class UrArmRobotHW(UrArmHardware):
         fault = self.resume()
         return TriggerResponse(success=not fault, message=fault or "the arm follows commands")
 
-    def _asker(self, name: str) -> Callable[[Any], TriggerResponse]:
-        line, done = DASHBOARD_SERVICES[name]
+    def _dashboard_callback(self, name: str) -> Callable[[Any], TriggerResponse]:
+        line, success_prefix = DASHBOARD_SERVICES[name]
 
-        def ask(request: Any) -> TriggerResponse:
+        def on_request(request: Any) -> TriggerResponse:
             del request
             try:
-                answer = ask_dashboard(self.address, line)
+                response = request_dashboard(self.address, line)
             except DashboardError as error:
                 return TriggerResponse(success=False, message=str(error))
-            return TriggerResponse(success=answer.startswith(done), message=answer)
+            return TriggerResponse(success=response.startswith(success_prefix), message=response)
 
-        return ask
+        return on_request

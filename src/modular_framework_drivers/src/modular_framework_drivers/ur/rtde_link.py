@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The connection to an arm, for the control loop: the newest state, and whether commands are accepted.
+"""Connects the control loop to an arm: provides the newest state, and sends commands.
 
-Two processes run ur-rtde (rtde_process.py). A thread starts them, and starts them again when a connection fails; the
-control loop only exchanges datagrams with them. Whether the arm is silent is decided by the process that reads it,
-because a control loop that is late itself cannot tell.
+Two processes run ur-rtde (rtde_process.py). A thread starts them, and restarts them after a connection failure; the
+control loop only exchanges datagrams with them. The process that reads the arm detects a silent arm, because a delayed
+control loop cannot tell a silent arm from its own delay.
 """
 
 from __future__ import annotations
@@ -27,33 +27,34 @@ from modular_framework_drivers.ur.arm_modes import PROGRAM_PLAYING, robot_fault
 from modular_framework_drivers.ur.child_process import ChildProcess
 from modular_framework_drivers.ur.state_watch import SilenceWatch
 
-START_TIMEOUT_S = 30.0  # for a process to start; a busy computer takes its time
+START_TIMEOUT_S = 30.0  # for a process to start, even on a busy computer
 LOGGER = logging.getLogger("rosout.ur_arm")
 _MODULE = "modular_framework_drivers.ur.rtde_process"
 _KEEPER_PERIOD_S = 0.02
-_CONNECT_TIMEOUT_S = 5.0  # from then to the first state
-_PROGRAM_TIMEOUT_S = 15.0  # from then until the program is uploaded and runs
-_SILENCE_MARGIN_S = 0.38  # a process may be silent for so much longer than the arm before it counts as failed [s]
-_LONGEST_RETRY_S = 2.0  # each attempt starts an interpreter, which takes 0.3 s of a processor
+_CONNECT_TIMEOUT_S = 5.0  # from the start of a process to the first state
+_PROGRAM_TIMEOUT_S = 15.0  # from the start of a process until the uploaded program runs
+_SILENCE_MARGIN_S = (
+    0.38  # by which the silence of a process may exceed that of the arm before the process has failed [s]
+)
+_MAX_RETRY_S = 2.0  # each attempt starts an interpreter, which takes 0.3 s of a processor
 _STOP_PATIENCE_S = 3.0  # for the arm to come to rest when the link is closed
-_FINAL_STOP_S = 0.1  # for a process that is ended to send its stop, behind all commands still queued
+_STOP_TIMEOUT_S = 0.1  # for an ended process to send its stop after all queued commands
 
 
 @dataclass(frozen=True, slots=True)
 class LinkSettings:
-    """Connection settings of an arm.
+    """Holds the connection settings of an arm.
 
     Attributes:
-        address: of its controller.
-        timeout_s: without news for so long the link counts as lost [s].
-        speed_scale: what to set its speed slider to, None to leave it, 0 to 1; once it has followed, the slider is not
-            raised any more.
-        payload_kg: mass of the manipulator [kg].
-        payload_centre_m: its centre of mass in the flange frame [m].
-        lookahead_s: of servoj, 0.03 to 0.2 [s].
-        gain: of servoj, 100 to 2000.
-        real_time: whether the processes that hold ur-rtde ask for real-time scheduling.
-        retry_s: between two attempts to connect [s]; twice as long after each that fails, at most 2 s.
+        address: Address of the controller.
+        timeout_s: Time without a state after which the connection is lost [s].
+        speed_scale: Initial speed slider in [0, 1], never raised after the first command; None for no change.
+        payload_kg: Mass of the payload [kg].
+        payload_centre_m: Centre of mass of the payload in the flange frame [m].
+        lookahead_s: Lookahead time of servoj, 0.03 to 0.2 [s].
+        gain: Gain of servoj, 100 to 2000.
+        real_time: Whether the processes that run ur-rtde request real-time scheduling.
+        retry_s: Time between two connection attempts [s]; doubles after each failure, up to 2 s.
     """
 
     address: str
@@ -68,43 +69,43 @@ class LinkSettings:
 
 
 class _RtdeProcess:
-    """A process that runs ur-rtde.
+    """Tracks a process that runs ur-rtde.
 
     Attributes:
-        process: the process.
-        working: whether it has sent a state, or is ready for commands.
-        connecting: whether it has started.
-        failed: whether it must be replaced.
-        silence: for how long an expected message has not come.
-        awaits_message: whether one is expected.
+        process: Child process.
+        working: Whether the process has sent a state or is ready for commands.
+        connecting: Whether the process has started.
+        failed: Whether the process must be replaced.
+        silence: Time without an expected message.
+        awaits_message: Whether a message is expected.
     """
 
-    __slots__ = ("process", "connecting", "working", "failed", "silence", "awaits_message", "_patience_s", "_since_s")
+    __slots__ = ("process", "connecting", "working", "failed", "silence", "awaits_message", "_timeout_s", "_since_s")
 
     def __init__(self, process: ChildProcess, now_s: float) -> None:
         self.process = process
         self.connecting = self.working = self.failed = self.awaits_message = False
         self.silence = SilenceWatch(now_s)
-        self._since_s, self._patience_s = now_s, START_TIMEOUT_S
+        self._since_s, self._timeout_s = now_s, START_TIMEOUT_S
 
-    def connects(self, now_s: float, patience_s: float) -> None:
-        """Notes that it has started, and has `patience_s` [s] from now on to connect."""
-        self.connecting, self._since_s, self._patience_s = True, now_s, patience_s
+    def start_connecting(self, now_s: float, timeout_s: float) -> None:
+        """Records that the process has started and must connect within `patience_s` [s]."""
+        self.connecting, self._since_s, self._timeout_s = True, now_s, timeout_s
 
-    def too_late(self, now_s: float) -> str:
-        """Returns by when it should have connected, if that is over; else ""."""
-        if self.working or self.failed or now_s - self._since_s <= self._patience_s:
+    def exceeded_timeout(self, now_s: float) -> str:
+        """Returns the connection timeout as text if it has passed, otherwise ""."""
+        if self.working or self.failed or now_s - self._since_s <= self._timeout_s:
             return ""
-        return f"within {self._patience_s:g} s"
+        return f"within {self._timeout_s:g} s"
 
 
 class RtdeLink:
-    """Connection to one arm.
+    """Connects to one arm.
 
-    `poll` and `servo` belong to the control loop; `request_program`, `connect` and `close` to other threads.
+    The control loop calls `poll` and `servo`; other threads call `request_program`, `connect` and `close`.
 
     Args:
-        settings: how to reach it.
+        settings: Connection settings.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
@@ -124,8 +125,8 @@ class RtdeLink:
         self.program_ready_s = 0.0
 
     def connect(self) -> None:
-        """Begins to connect, and connects again until `close`; returns at once."""
-        self._keeper = threading.Thread(target=self._keep, name="ur_link", daemon=True)
+        """Starts a thread that connects, and reconnects after each failure until `close`."""
+        self._keeper = threading.Thread(target=self._keep_connected, name="ur_link", daemon=True)
         self._keeper.start()
 
     def close(self) -> None:
@@ -136,26 +137,26 @@ class RtdeLink:
             self._keeper = None
 
     def request_program(self) -> None:
-        """Requests that the program that takes commands is uploaded (again) as soon as the arm is connected."""
+        """Requests the upload of the program that accepts commands, as soon as the arm is connected."""
         control = self._control
-        if control is not None and control.working:  # its program may have ended before the arm followed it
+        if control is not None and control.working:  # the program may have ended before the arm followed commands
             control.failed, self.commanding = True, False
         self.program_failure = ""
         self._program_wanted = True
 
     @property
     def start_step(self) -> str:
-        """What the arm still needs before it takes commands."""
+        """Describes the step that remains before the arm accepts commands."""
         control = self._control
         if control is None:
-            return "the process that commands it is to be started"
+            return "the command process has not been started yet"
         if self.commanding:
-            return "its program has been uploaded and does not run yet"
-        return "its program is being uploaded" if control.connecting else "the process that commands it starts"
+            return "its program has been uploaded but does not run yet"
+        return "its program is being uploaded" if control.connecting else "the command process is starting"
 
     def drop_program(self, reason: str) -> None:
-        """Stops commanding until the next `request_program`."""
-        LOGGER.error("arm at %s: takes no commands: %s", self._settings.address, reason)
+        """Sends no commands until the next `request_program`, and logs the reason."""
+        LOGGER.error("arm at %s: accepts no commands: %s", self._settings.address, reason)
         self._drop(reason)
 
     def _drop(self, reason: str) -> None:
@@ -189,9 +190,9 @@ class RtdeLink:
             if message[:1] == STATE:
                 newest = message
             elif message == CONNECTING:
-                states.connects(now_s, _CONNECT_TIMEOUT_S)
+                states.start_connecting(now_s, _CONNECT_TIMEOUT_S)
             elif message[:1] == FAILED:
-                self._lose(states, message[1:].decode(errors="replace"))
+                self._lose_connection(states, message[1:].decode(errors="replace"))
         silent_s = states.silence.update(now_s, heard)
         if states.failed:
             return
@@ -200,28 +201,28 @@ class RtdeLink:
                 LOGGER.info("arm at %s: connected", self._settings.address)
             self.state, self.lost, states.working = ArmState.unpacked(newest), "", True
         if states.process.ended:
-            self._lose(states, "the process that reads the arm's state ended")
+            self._lose_connection(states, "the process that reads the arm's state ended")
         elif states.working and silent_s > self._silence_timeout_s:
             timeout = f"{self._silence_timeout_s:g} s"
-            self._lose(states, f"the process that reads the arm's state has said nothing for {timeout}")
+            self._lose_connection(states, f"the process that reads the arm's state has been silent for {timeout}")
 
-    def _lose(self, states: _RtdeProcess, reason: str) -> None:
+    def _lose_connection(self, states: _RtdeProcess, reason: str) -> None:
         if not self.lost:
             LOGGER.error("arm at %s: link lost: %s", self._settings.address, reason)
-            if self._has_commanded:  # before the first command nothing has moved, and no `resume` is needed
-                self._drop("its program was given up when the link was lost")
+            if self._has_commanded:  # before the first command, no motion has started and no `resume` is needed
+                self._drop("its program ended with the lost connection")
         if not states.failed:
             states.failed = True
             self.lost = reason
 
     def _read_replies(self, control: _RtdeProcess, now_s: float) -> None:
         playing = self.state is not None and self.state.runtime_state == PROGRAM_PLAYING
-        answered = not control.awaits_message or not playing
+        received_reply = not control.awaits_message or not playing
         for message in control.process.messages():
             if message == ACCEPTED:
-                answered, control.awaits_message = True, False
+                received_reply, control.awaits_message = True, False
             elif message == CONNECTING:
-                control.connects(now_s, _PROGRAM_TIMEOUT_S)
+                control.start_connecting(now_s, _PROGRAM_TIMEOUT_S)
             elif message == READY:
                 control.working = True
                 self.commanding = self._program_wanted and not control.failed and not self.lost
@@ -233,11 +234,11 @@ class RtdeLink:
             return
         if control.process.ended:
             self.drop_program("the process that commands the arm ended")
-        elif control.silence.update(now_s, answered) > self._silence_timeout_s:
+        elif control.silence.update(now_s, received_reply) > self._silence_timeout_s:
             timeout = f"{self._silence_timeout_s:g} s"
-            self.drop_program(f"the process that commands the arm has taken no command for {timeout}")
+            self.drop_program(f"the process that commands the arm has accepted no command for {timeout}")
 
-    def _keep(self) -> None:
+    def _keep_connected(self) -> None:
         next_attempt_s, retry_s = 0.0, self._settings.retry_s
         while not self._closing.wait(_KEEPER_PERIOD_S):
             now_s = time.monotonic()
@@ -248,7 +249,7 @@ class RtdeLink:
                 elif self._states is not None and self._is_over(self._states, now_s):
                     states, self._states = self._states, None
                     states.process.end()
-                    retry_s = self._settings.retry_s if states.working else min(2.0 * retry_s, _LONGEST_RETRY_S)
+                    retry_s = self._settings.retry_s if states.working else min(2.0 * retry_s, _MAX_RETRY_S)
                     next_attempt_s = now_s + retry_s
                 self._keep_program(now_s)
             except OSError as error:
@@ -260,14 +261,14 @@ class RtdeLink:
         self._states = self._control = None
 
     def _log_start_failure(self, error: OSError) -> None:
-        reason = f"a process for it cannot be started: {error}; free memory, processes or open files of this computer"
+        reason = f"a process cannot be started: {error}; free memory, processes or open files of this computer"
         if self._states is None:
             self.lost = reason
         else:
             self.drop_program(reason)
 
     def _is_over(self, states: _RtdeProcess, now_s: float) -> bool:
-        late = states.too_late(now_s)
+        late = states.exceeded_timeout(now_s)
         if late:
             states.failed = True
             self.lost = f"no state from the arm {late} of connecting"
@@ -275,36 +276,36 @@ class RtdeLink:
 
     def _keep_program(self, now_s: float) -> None:
         control = self._control
-        wanted = self._program_wanted and not self.lost
+        requested = self._program_wanted and not self.lost
         if control is None:
-            if wanted and self.state is not None and not robot_fault(self.state, self._settings.address):
+            if requested and self.state is not None and not robot_fault(self.state, self._settings.address):
                 self._control = self._start("control", self._control_arguments(), now_s)
-        elif not wanted or control.failed:
+        elif not requested or control.failed:
             self._control, control.failed = None, True
-            control.process.end(_FINAL_STOP_S)
-        elif late := control.too_late(now_s):
+            control.process.end(_STOP_TIMEOUT_S)
+        elif late := control.exceeded_timeout(now_s):
             reason = f"the program was not accepted {late}"
             if self._has_commanded:
                 self.drop_program(reason)
-            else:  # nothing has moved yet, so no `resume` is needed
-                LOGGER.error("arm at %s: %s; it is uploaded again", self._settings.address, reason)
+            else:  # no motion has started yet, so no `resume` is needed
+                LOGGER.error("arm at %s: %s; the driver uploads the program again", self._settings.address, reason)
                 control.failed = True
 
     def _control_arguments(self) -> list[str]:
-        settings, wanted = self._settings, self._settings.speed_scale
-        if wanted is not None and self._has_commanded and self.state is not None:
-            wanted = min(wanted, self.state.speed_fraction)  # a person at the robot may have lowered it
-        scale = [] if wanted is None else ["--speed-scale", _written(wanted)]
+        settings, speed_scale = self._settings, self._settings.speed_scale
+        if speed_scale is not None and self._has_commanded and self.state is not None:
+            speed_scale = min(speed_scale, self.state.speed_fraction)  # an operator may have lowered the slider
+        scale = [] if speed_scale is None else ["--speed-scale", _formatted(speed_scale)]
         return [
             *scale,
             "--payload",
-            _written(settings.payload_kg),
+            _formatted(settings.payload_kg),
             "--payload-centre",
-            *map(_written, settings.payload_centre_m),
+            *map(_formatted, settings.payload_centre_m),
             "--lookahead",
-            _written(settings.lookahead_s),
+            _formatted(settings.lookahead_s),
             "--gain",
-            _written(settings.gain),
+            _formatted(settings.gain),
         ]
 
     def _start(self, role: str, arguments: Sequence[str], now_s: float) -> _RtdeProcess:
@@ -312,6 +313,6 @@ class RtdeLink:
         return _RtdeProcess(ChildProcess(_MODULE, [role, self._settings.address, *real_time, *arguments]), now_s)
 
 
-def _written(number: float) -> str:
-    """A number for a command line, where -5e-05 would be read as an option."""
+def _formatted(number: float) -> str:
+    """Formats a number for a command line, which would parse -5e-05 as an option."""
     return f"{number:.9f}"

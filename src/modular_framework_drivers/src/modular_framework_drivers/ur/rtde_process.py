@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The processes that run ur-rtde, one to read the arm's state and one to command it.
+"""Runs ur-rtde in two processes: one reads the state of the arm, the other sends commands to the arm.
 
-ur-rtde blocks the whole interpreter while it connects and uploads its program, and it ends the process on some faults
-of the network; neither may affect the control loop. Each process lives for one connection: it reports what failed and
-ends, or is ended, and its parent starts the next one. It also ends, and stops the arm, when its parent is gone.
+ur-rtde blocks the interpreter while it connects and uploads its program, and terminates the process after some network
+faults; neither may affect the control loop. Each process serves one connection: it reports a failure and ends, and its
+parent starts a new process. If the parent has ended, the process stops the arm and ends.
 
-Both use real-time scheduling where that is wanted and permitted, once they are connected, with a lower priority than
-the control loop.
+Once connected, both processes use real-time scheduling if requested and permitted, with a lower priority than the
+control loop.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
 _PRIORITY = 60  # the control loop has 80
 _POLL_PERIOD_S = 0.002
 _ALIVE_PERIOD_S = 0.02
-_LAST_WORDS_S = 1.0  # for the reason of the end to find room
+_FAILURE_TIMEOUT_S = 1.0  # for the cause of the failure to enter the queue
 _STOP_DECELERATION = 10.0  # at the end of a connection [rad/s^2]
 _VARIABLES = [
     "timestamp",
@@ -56,26 +56,26 @@ _VARIABLES = [
 
 
 def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
-    """Sends every state that the arm reports, until the connection fails.
+    """Sends every state reported by the arm until the connection fails.
 
     Args:
-        options: the command line.
-        channel: to the control loop.
+        options: Parsed command line.
+        channel: Socket to the control loop.
 
     Raises:
-        ConnectionEndedError: the connection failed.
-        RuntimeError: there was no connection.
+        ConnectionEndedError: If the connection failed.
+        RuntimeError: If ur-rtde could not connect.
     """
     from rtde_receive import RTDEReceiveInterface
 
     _send(channel, CONNECTING)
     delay = DelayWatch(options.address)
-    delay.refuse_beyond(options.timeout)
+    delay.check_delay(options.timeout)
     arm = RTDEReceiveInterface(options.address, -1.0, _VARIABLES)
     _take_priority(options)
     delay.start()
-    last: ArmState | None = None
-    modes, damaged = (0, 0, 0), 0
+    last_state: ArmState | None = None
+    modes, damaged_count = (0, 0, 0), 0
     last_timestamp_s, last_sent_s = float("nan"), 0.0
     silence = SilenceWatch(time.monotonic())
     while True:
@@ -83,19 +83,21 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
         state = read_new_state(arm, now_s, last_timestamp_s)
         if state is not None:
             last_timestamp_s = state.timestamp_s
-            heard = is_plausible(state, last)
-            damaged = 0 if heard else damaged + 1
-            if heard and (last is None or state.modes != last.modes):  # a flipped bit makes another valid mode of one
+            heard = is_plausible(state, last_state)
+            damaged_count = 0 if heard else damaged_count + 1
+            if heard and (
+                last_state is None or state.modes != last_state.modes
+            ):  # a flipped bit may yield another valid mode
                 heard, modes = state.modes == modes, state.modes
             if heard:
-                last, last_sent_s = state, now_s
+                last_state, last_sent_s = state, now_s
                 _send(channel, replace(state, late_s=delay.update(now_s - state.timestamp_s)).packed())
         if not heard and not arm.isConnected():
             raise ConnectionEndedError("the arm closed the connection")
         if silence.update(now_s, heard) > options.timeout:
-            what = "only damaged data" if damaged > 1 else "nothing new"
-            raise ConnectionEndedError(f"{what} from the arm for {options.timeout:g} s")
-        delay.refuse_beyond(options.timeout)
+            received_data = "only damaged data" if damaged_count > 1 else "nothing new"
+            raise ConnectionEndedError(f"{received_data} from the arm for {options.timeout:g} s")
+        delay.check_delay(options.timeout)
         if now_s - last_sent_s > _ALIVE_PERIOD_S:
             last_sent_s = now_s
             _send(channel, ALIVE)
@@ -103,15 +105,15 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
 
 
 def read_new_state(arm: Any, now_s: float, last_timestamp_s: float) -> ArmState | None:
-    """Returns the state that ur-rtde received last.
+    """Returns the newest state received by ur-rtde.
 
     Args:
         arm: RTDEReceiveInterface of the arm.
-        now_s: time of reception to note, on the monotonic clock [s].
-        last_timestamp_s: timestamp of the state that was read before [s].
+        now_s: Time of reception on the monotonic clock [s].
+        last_timestamp_s: Timestamp of the last state read [s].
 
     Returns:
-        The state; None if it was read before, or if the next state arrived while it was read.
+        The state; None if the state has already been read or the next state arrived during the read.
     """
     timestamp_s = arm.getTimestamp()
     if timestamp_s == last_timestamp_s:
@@ -133,70 +135,70 @@ def read_new_state(arm: Any, now_s: float, last_timestamp_s: float) -> ArmState 
 
 
 def _send(channel: socket.socket, message: bytes) -> None:
-    """Sends a message unless the socket is full; a control loop that is late gets a newer state later.
+    """Sends a message unless the socket is full; a delayed control loop receives a newer state later.
 
     Raises:
-        BrokenPipeError: the control loop is gone.
+        BrokenPipeError: If the control loop has ended.
     """
     with contextlib.suppress(BlockingIOError):
         channel.send(message, socket.MSG_DONTWAIT)
 
 
 def _take_priority(options: argparse.Namespace) -> None:
-    """Requests real-time scheduling if wanted; a refusal is not logged, because the control loop logs its own."""
+    """Requests real-time scheduling if enabled; the control loop already logs a refusal of its own request."""
     if options.real_time:
         run_in_real_time(_PRIORITY)
 
 
 def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
-    """Uploads ur-rtde's program and passes on the commands of the control loop until that ends.
+    """Uploads ur-rtde's program and passes on commands until the control loop closes the socket.
 
     Args:
-        options: the command line.
-        channel: from the control loop.
+        options: Parsed command line.
+        channel: Socket to the control loop.
 
     Raises:
-        ConnectionEndedError: the arm refused its settings.
-        RuntimeError: the program could not be started.
+        ConnectionEndedError: If the arm refused its settings.
+        RuntimeError: If the program could not be started.
     """
     from rtde_control import RTDEControlInterface
     from rtde_io import RTDEIOInterface
 
     _send(channel, CONNECTING)
     arm = RTDEControlInterface(options.address)
-    panel = RTDEIOInterface(options.address)
-    if options.speed_scale is not None and not panel.setSpeedSlider(options.speed_scale):
+    io = RTDEIOInterface(options.address)
+    if options.speed_scale is not None and not io.setSpeedSlider(options.speed_scale):
         raise ConnectionEndedError(f"the arm refused the speed slider value {options.speed_scale:g}")
     if not arm.setPayload(options.payload, options.payload_centre):
         raise ConnectionEndedError(f"the arm refused a payload of {options.payload:g} kg")
     _take_priority(options)
     _send(channel, READY)
-    while message := _newest(channel):
+    while message := _newest_message(channel):
         if message[:1] == SERVO:
             positions, time_s = read_servo_message(message)
-            # a paused or stopped program accepts none; the state of the arm says which of the two it is
+            # a paused or stopped program accepts no command; the state of the arm tells both cases apart
             if arm.servoJ(positions, 0.0, 0.0, time_s, options.lookahead, options.gain):
-                with contextlib.suppress(BrokenPipeError):  # the parent is gone; the next message says so
+                with contextlib.suppress(BrokenPipeError):  # the parent has ended; the next read detects this
                     _send(channel, ACCEPTED)
     arm.servoStop(_STOP_DECELERATION)
     arm.stopScript()
 
 
-def _newest(channel: socket.socket) -> bytes:
-    """Waits for a message and returns the last one in the queue; empty if the other end is gone."""
+def _newest_message(channel: socket.socket) -> bytes:
+    """Waits for a message and returns the newest message in the queue; empty if the parent has ended."""
     try:
         message = channel.recv(MESSAGE_SIZE)
         while message:
             message = channel.recv(MESSAGE_SIZE, socket.MSG_DONTWAIT)
     except BlockingIOError:
         return message
-    except ConnectionResetError:  # it ended without reading the last message to it
+    except ConnectionResetError:  # the parent ended with an unread message
         return b""
     return message
 
 
 def command_line() -> argparse.ArgumentParser:
-    """The arguments of the processes."""
+    """Returns the parser of the processes' command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("role", choices=("state", "control"))
     parser.add_argument("channel", type=int, help="file descriptor of the socket to the control loop")
@@ -214,9 +216,9 @@ def command_line() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one of the two processes; returns the exit code."""
     options = command_line().parse_args(arguments)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # ctrl-c in the terminal is for the control loop, which ends us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # on ctrl-c in the terminal, the control loop ends this process
     with socket.socket(fileno=options.channel) as channel:
-        channel.setblocking(True)  # one made where sockets have a default timeout, as rospy sets it, does not block
+        channel.setblocking(True)  # rospy sets a default timeout, which would make the socket non-blocking
         try:
             if options.role == "state":
                 report_states(options, channel)
@@ -224,11 +226,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 command_arm(options, channel)
         except BrokenPipeError:
             return 0
-        except Exception as error:  # ur-rtde raises many kinds; all mean that this connection is over
+        except Exception as error:  # ur-rtde raises many types; after any of them, the connection has failed
             text = str(error).strip() or type(error).__name__
-            if "Failed to start control script" in text:  # ur-rtde gives this reason for some arms only
+            if "Failed to start control script" in text:  # ur-rtde gives this reason only for some arms
                 text += "; is the arm in remote control?"
-            channel.settimeout(_LAST_WORDS_S)  # the socket may be full of states of a control loop that is late
+            channel.settimeout(_FAILURE_TIMEOUT_S)  # the socket may be full if the control loop is delayed
             with contextlib.suppress(OSError):
                 channel.send(FAILED + text.encode()[: MESSAGE_SIZE - 1])
             return 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An arm of Universal Robots as a `RobotHW`: joints commanded by position, over RTDE."""
+"""Provides a UR arm as a `RobotHW` with position commands over RTDE."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ JOINT_NAMES = (
     "wrist_3_joint",
 )
 _PERIOD_SMOOTHING = 0.02
-_SHORTEST_PERIOD_S = 0.002
-_LONGEST_PERIOD_S = 0.05  # a longer one is not made up for at once
+_MIN_PERIOD_S = 0.002
+_MAX_PERIOD_S = 0.05  # the motion of a longer cycle is made up gradually
 _STALE_S = 0.025  # three cycles of a CB3 controller
-_LATE_S = 0.04  # a state that was under way for so long is worth a warning [s]
-_FIRST_CYCLE_S = 1.0  # from the upload of a program to a state in which it runs [s]
-_CAUSE_S = 0.03  # by which the state that explains the end of the program may come after it [s]
+_LATE_S = 0.04  # transmission delay of a state from which on a warning is reported [s]
+_PROGRAM_START_S = 1.0  # from the upload of a program to a state with a running program [s]
+_MAX_CAUSE_DELAY_S = 0.03  # delay from the end of a program to the state that explains this end [s]
 
 
 class UrArmHardware(RobotHW):
-    """An arm that is commanded by joint positions.
+    """A UR arm with joint position commands.
 
-    Parameters: see `parameters/UrArmRobotHW.yaml`; in the root namespace `robot_description` and
-    `joint_limits/<joint>/...`: limits and soft limits.
+    Parameters: see `parameters/UrArmRobotHW.yaml`; in the root namespace, `robot_description` and
+    `joint_limits/<joint>/...` contain limits and soft limits.
 
     The efforts of the joint states are motor currents [A], as in ur_robot_driver.
     """
@@ -64,7 +64,7 @@ class UrArmHardware(RobotHW):
         self._link: RtdeLink | None = None
         self._check: CommandCheck | None = None
         self._servo_time_s = 0.008
-        self._refused = ""
+        self._refusal = ""
         self._robot_fault = "no state of the arm yet"
         self._fault = "not initialised"
         self._following = False
@@ -82,9 +82,11 @@ class UrArmHardware(RobotHW):
         except ParameterError as error:
             LOGGER.error("%s in %s: %s", type(self).__name__, where, error)
             return False
-        unused = [key for key in ("control_pc_ip_address", "robot_program_path") if robot_hw_nh.get_param(key)]
-        if unused:
-            LOGGER.info("%s: not used, as RTDE does not need it: %s", where, ", ".join(unused))
+        unused_parameters = [
+            key for key in ("control_pc_ip_address", "robot_program_path") if robot_hw_nh.get_param(key)
+        ]
+        if unused_parameters:
+            LOGGER.info("%s: not used, as RTDE does not need it: %s", where, ", ".join(unused_parameters))
         self._register(joints)
         self._link = RtdeLink(self._settings)
         self._link.connect()
@@ -108,7 +110,7 @@ class UrArmHardware(RobotHW):
 
     @property
     def address(self) -> str:
-        """Address of the arm's controller."""
+        """Returns the address of the arm's controller."""
         return self._settings.address if self._settings is not None else ""
 
     def read(self, time_s: float, period_s: float) -> None:
@@ -118,7 +120,7 @@ class UrArmHardware(RobotHW):
         state = self._link.state
         if state is not None:
             self._update_handles(state)
-        self._stop_with_the_program(state)
+        self._stop_if_program_ended(state)
         following = self._link.commanding and not self._robot_fault and self._program_runs(state)
         if not following or not self._following:
             for handle in self._handles:
@@ -129,25 +131,25 @@ class UrArmHardware(RobotHW):
 
     def _update_handles(self, state: ArmState) -> None:
         self._robot_fault = robot_fault(state, self.address)
-        known = self._link is not None and not self._link.lost
+        connected = self._link is not None and not self._link.lost
         stale = time.monotonic() - state.received_s > _STALE_S
         for handle, position, velocity, current in zip(
             self._handles, state.positions, state.velocities, state.currents, strict=True
         ):
             joint = handle.state
             joint.stale = stale
-            joint.position, joint.velocity, joint.effort = position, velocity if known else 0.0, current
+            joint.position, joint.velocity, joint.effort = position, velocity if connected else 0.0, current
         self._wrench.force = state.wrench[0], state.wrench[1], state.wrench[2]
         self._wrench.torque = state.wrench[3], state.wrench[4], state.wrench[5]
         playing = state.runtime_state == PROGRAM_PLAYING
         self._scaling.factor = min(max(state.speed_fraction * state.speed_scaling, 0.0), 1.0) if playing else 0.0
 
-    def _stop_with_the_program(self, state: ArmState | None) -> None:
-        """Stops commanding after the program has ended, for any reason, until `resume` is called."""
+    def _stop_if_program_ended(self, state: ArmState | None) -> None:
+        """Sends no commands after the program has ended for any reason, until `resume` is called."""
         if self._link is None or not self._link.commanding:
             return
         starting = not self._following and (
-            state is None or state.received_s < self._link.program_ready_s + _FIRST_CYCLE_S
+            state is None or state.received_s < self._link.program_ready_s + _PROGRAM_START_S
         )
         fault = self._robot_fault.partition(";")[0]
         if not starting and (fault or not self._program_runs(state)):
@@ -160,23 +162,23 @@ class UrArmHardware(RobotHW):
         if self._link is None or self._check is None or not self._following:
             return
         if self._link.state is None or self._link.state.runtime_state != PROGRAM_PLAYING:
-            self._restart_from_measured(self._check)  # a paused arm continues from where it stands
+            self._restart_from_measured(self._check)  # a paused arm continues from its current position
             return
-        period_s = min(period_s, _LONGEST_PERIOD_S)
+        period_s = min(period_s, _MAX_PERIOD_S)
         if period_s > 0.0:
-            self._servo_time_s += _PERIOD_SMOOTHING * (max(period_s, _SHORTEST_PERIOD_S) - self._servo_time_s)
+            self._servo_time_s += _PERIOD_SMOOTHING * (max(period_s, _MIN_PERIOD_S) - self._servo_time_s)
         for index, handle in enumerate(self._handles):
-            if handle.held:  # no joint stops at once where it was measured, and it must not come back
+            if handle.held:  # a joint cannot stop at its measured position and must not reverse
                 handle.command, handle.held = self._check.rest_after(index, handle.command, handle.velocity), False
-        refused = self._check.admit([handle.command for handle in self._handles], period_s)
-        if refused and refused != self._refused:
-            LOGGER.error("command refused: %s", refused)
-        self._refused = refused
+        refusal = self._check.admit([handle.command for handle in self._handles], period_s)
+        if refusal and refusal != self._refusal:
+            LOGGER.error("command refused: %s", refusal)
+        self._refusal = refusal
         self._link.servo(self._check.sent, self._servo_time_s)
 
     def _restart_from_measured(self, check: CommandCheck) -> None:
         check.reset([handle.position for handle in self._handles])
-        self._refused = ""
+        self._refusal = ""
 
     def warning(self) -> str:
         state = self._link.state if self._link is not None else None
@@ -185,11 +187,11 @@ class UrArmHardware(RobotHW):
         return f"the states of the arm at {self.address} come {state.late_s:.2f} s late; check the network"
 
     def fault(self) -> str:
-        return self._refused or self._fault
+        return self._refusal or self._fault
 
     @property
     def ready(self) -> bool:
-        """Whether the arm follows commands."""
+        """Returns whether the arm follows commands."""
         return self._following and not self.fault()
 
     def close(self) -> None:
@@ -197,13 +199,13 @@ class UrArmHardware(RobotHW):
             self._link.close()
 
     def resume(self, timeout_s: float = 20.0) -> str:
-        """Makes the arm follow commands again after a fault; waits until it does. Not for the control loop.
+        """Waits until the arm follows commands again after a fault; must not be called in the control loop.
 
         Args:
-            timeout_s: how long that may take [s].
+            timeout_s: Maximum wait [s].
 
         Returns:
-            "", or why it could not be done and what to do.
+            The cause of a failure and its remedy; otherwise "".
         """
         if self._link is None:
             return "the arm is not initialised"
@@ -230,8 +232,8 @@ class UrArmHardware(RobotHW):
         if link is None or not link.lost:
             return ""
         if link.state is None:
-            return f"no link to the arm at {self.address} yet: {link.lost}; it is tried again and again"
-        return f"link to the arm at {self.address} lost: {link.lost}; it is being made again"
+            return f"not connected to the arm at {self.address} yet: {link.lost}; the driver keeps trying"
+        return f"connection to the arm at {self.address} lost: {link.lost}; the driver reconnects"
 
     def _program_fault(self) -> str:
         link = self._link
@@ -239,14 +241,14 @@ class UrArmHardware(RobotHW):
             return ""
         if link.program_failure:
             return "" if self._cause_may_follow(link) else self._program_failure(link)
-        return f"the arm at {self.address} is being made ready for commands: {link.start_step}"
+        return f"the arm at {self.address} is starting to accept commands: {link.start_step}"
 
     def _program_failure(self, link: RtdeLink) -> str:
-        return f"the arm at {self.address} takes no commands: {link.program_failure}; call resume"
+        return f"the arm at {self.address} accepts no commands: {link.program_failure}; call resume"
 
     def _cause_may_follow(self, link: RtdeLink) -> bool:
-        """Whether a state that explains the end of the program may still arrive.
+        """Returns whether a state that explains the end of the program may still arrive.
 
-        The end may be reported before the stop of the arm that caused it.
+        The end of the program may be reported before the stop of the arm that caused this end.
         """
-        return link.state is None or link.state.received_s < link.program_failed_s + _CAUSE_S
+        return link.state is None or link.state.received_s < link.program_failed_s + _MAX_CAUSE_DELAY_S
