@@ -218,7 +218,7 @@ def test_a_new_goal_takes_over(gripper: Gripper) -> None:
     until(lambda: ended == [GoalStatus.PREEMPTED], "the end of the goal before")
 
 
-@pytest.mark.parametrize(("fault", "text"), [("unplug", "port .* is gone"), ("overload", "overloaded")])
+@pytest.mark.parametrize(("fault", "text"), [("unplug", "port .* is lost"), ("overload", "overloaded")])
 def test_a_fault_under_way_ends_the_goal_with_the_reason_and_the_next_one_works(
     gripper: Gripper, fault: str, text: str
 ) -> None:

@@ -137,7 +137,7 @@ def test_a_robot_whose_velocities_are_never_0_is_believed_after_a_while(make_nod
 def test_a_robot_that_does_not_stop_is_not_waited_for_without_end(
     make_node: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(robot_hw_node, "LONGEST_END_S", 0.3)
+    monkeypatch.setattr(robot_hw_node, "MAX_END_TIME_S", 0.3)
     node, robot_hw = make_node(1.0)
     robot_hw.noise = 1.0
     begun_s = time.monotonic()

@@ -132,7 +132,7 @@ def test_a_loaded_controller_is_initialized_then_running_then_stopped(loop: Any)
         (["left_too"], [], BEST_EFFORT, "joint 'a' is claimed", {"left"}),
         (["both"], ["left"], STRICT, None, {"both"}),
         (["both", "right"], ["left"], STRICT, "joint 'b' is claimed", {"left"}),
-        (["right"], [], 7, "strictness 7 is not known", {"left"}),
+        (["right"], [], 7, "unknown strictness 7", {"left"}),
     ],
 )
 def test_switch_rules(

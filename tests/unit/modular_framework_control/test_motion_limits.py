@@ -178,6 +178,6 @@ def test_the_measured_position_is_held_while_the_robot_is_paused_and_where_no_de
     duration_s: float, rate: float, braking: float
 ) -> None:
     actual = np.array([[0.5], [2.0]])
-    bound = replace(BOUND, braking=np.array([braking]))
+    bound = replace(BOUND, max_decelerations=np.array([braking]))
     track = StopMotion(duration_s, bound).tracks(np.array([[1.5], [2.0]]), actual, 3.0, rate)[0]
     assert track.sample(4.0)[:, 0].tolist() == [0.5, 0.0, 0.0]

@@ -17,7 +17,7 @@ from modular_framework_drivers.emulators.dynamixel_line import DynamixelLine
 from modular_framework_drivers.ezgripper import dynamixel_bus, mx64
 from modular_framework_drivers.ezgripper.dynamixel_bus import (
     DynamixelBus,
-    NoAnswerError,
+    NoResponseError,
     PortLostError,
     RefusedError,
 )
@@ -97,7 +97,7 @@ def test_waiting_for_an_answer_leaves_the_processor_alone(line: DynamixelLine, b
     line.power_off()
     before_s, start_s = time.thread_time(), time.monotonic()
     for _ in range(5):
-        with pytest.raises(NoAnswerError):
+        with pytest.raises(NoResponseError):
             bus.read(1, mx64.READING)
     assert time.thread_time() - before_s < 0.2 * (time.monotonic() - start_s)
 
@@ -117,7 +117,9 @@ def test_a_damaged_line_is_endured(line: DynamixelLine, fault: str) -> None:
 def test_an_answer_too_late_is_not_taken_for_that_to_another_question(
     line: DynamixelLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(dynamixel_bus, "LATE_S", 2.0)  # a busy computer makes answers later than the line does
+    monkeypatch.setattr(
+        dynamixel_bus, "MAX_RESPONSE_DELAY_S", 2.0
+    )  # a busy computer makes answers later than the line does
     bus = DynamixelBus(str(line.link), 57600, timeout_s=2.0)
     bus.open()
     line.delay(0.045)
@@ -140,10 +142,10 @@ def test_answers_that_never_come_are_not_waited_for_longer_than_late_ones_take(
 @pytest.mark.parametrize(
     ("fault", "error", "hint"),
     [
-        (lambda line: line.power_off(), NoAnswerError, "does not answer"),
-        (lambda line: line.change_id(5), NoAnswerError, "servo 1 on"),
-        (lambda line: line.corrupt(1), NoAnswerError, "damaged packets"),
-        (lambda line: line.unplug(), PortLostError, "is gone"),
+        (lambda line: line.power_off(), NoResponseError, "does not respond"),
+        (lambda line: line.change_id(5), NoResponseError, "servo 1 on"),
+        (lambda line: line.corrupt(1), NoResponseError, "damaged packets"),
+        (lambda line: line.unplug(), PortLostError, "is lost"),
     ],
 )
 def test_a_servo_out_of_reach_is_an_error_that_says_why(
@@ -161,7 +163,7 @@ def test_answers_to_earlier_instructions_are_no_damaged_packets(
 ) -> None:
     answer_to_a_write = b"\xff\xff\x01\x02\x00\xfc"
     monkeypatch.setattr(dynamixel_line, "answer_bus", lambda servos, instruction: answer_to_a_write)
-    with pytest.raises(NoAnswerError, match="does not answer"):
+    with pytest.raises(NoResponseError, match="does not respond"):
         bus.read(1, mx64.READING)
 
 
@@ -174,7 +176,7 @@ def test_a_port_that_takes_no_bytes_is_not_called_unplugged() -> None:
             os.write(port, b"\xff" * 1024)
     bus = DynamixelBus(os.ttyname(port), 57600)
     bus.open()
-    with pytest.raises(PortLostError, match="took no bytes for 0.5 s"):
+    with pytest.raises(PortLostError, match="accepted no bytes for 0.5 s"):
         bus.read(1, mx64.READING)
     os.close(port)
     os.close(reader)
@@ -183,7 +185,7 @@ def test_a_port_that_takes_no_bytes_is_not_called_unplugged() -> None:
 def test_another_baud_rate_is_named(line: DynamixelLine) -> None:
     bus = DynamixelBus(str(line.link), 115200)
     bus.open()
-    with pytest.raises(NoAnswerError, match="at 115200 baud does not answer.*baud rate"):
+    with pytest.raises(NoResponseError, match="at 115200 baud does not respond.*baud rate"):
         bus.model_number(1)
 
 
@@ -195,7 +197,7 @@ def test_a_refused_word_is_an_error(bus: DynamixelBus) -> None:
 def test_a_port_that_is_not_there_or_taken_is_named(line: DynamixelLine, bus: DynamixelBus, tmp_path: Path) -> None:
     with pytest.raises(PortLostError, match="nowhere cannot be opened: No such file"):
         DynamixelBus(str(tmp_path / "nowhere"), 57600).open()
-    with pytest.raises(PortLostError, match="opened: another program has it"):
+    with pytest.raises(PortLostError, match="opened: another program uses it"):
         DynamixelBus(str(line.link), 57600).open()
     with pytest.raises(PortLostError, match="is not open"):
         DynamixelBus(str(line.link), 57600).read(1, mx64.READING)

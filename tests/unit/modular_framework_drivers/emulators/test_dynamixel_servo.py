@@ -179,7 +179,7 @@ def test_no_bytes_whatever_upset_the_servos(noise: bytes) -> None:
 
 @pytest.mark.parametrize(("word", "value"), [(0, 0), (1024, 0), (300, 300), (1024 + 300, -300), (1023, 1023)])
 def test_direction_bits_are_read_and_written(word: int, value: int) -> None:
-    assert mx64.directed(word) == value
+    assert mx64.from_direction_word(word) == value
     if word != 1024:
         assert mx64.direction_word(value) == word
 

@@ -54,7 +54,7 @@ class Bench:
         while not self.gripper.state().ready:
             servo = self.line.fingers[0].servo
             if servo.get(mx64.TORQUE_CONTROL_MODE):
-                load = abs(mx64.directed(servo.get(mx64.PRESENT_LOAD)))
+                load = abs(mx64.from_direction_word(servo.get(mx64.PRESENT_LOAD)))
                 self.strongest_while_calibrating = max(self.strongest_while_calibrating, load)
             time.sleep(0.005)
 
@@ -186,13 +186,13 @@ def test_a_stop_keeps_hold_of_what_is_held(line: DynamixelLine, gripper: EzGripp
 
 
 FAULTS = [
-    ("unplugged", lambda line: line.unplug(), lambda line: line.plug(), "gone|cannot be opened", 2.0),
-    ("servo without power", lambda line: line.power_off(), lambda line: line.power_on(), "does not answer", 2.0),
+    ("unplugged", lambda line: line.unplug(), lambda line: line.plug(), "is lost|cannot be opened", 2.0),
+    ("servo without power", lambda line: line.power_off(), lambda line: line.power_on(), "does not respond", 2.0),
     ("overload", lambda line: line.overload(), lambda line: None, "overloaded", 2.0),
     ("overheating", lambda line: line.heat(85), lambda line: line.heat(40), "too hot .8[45] degrees C.", 2.0),
-    ("every answer lost", lambda line: line.lose(1), lambda line: line.clear(), "does not answer", 2.0),
+    ("every answer lost", lambda line: line.lose(1), lambda line: line.clear(), "does not respond", 2.0),
     ("every answer damaged", lambda line: line.corrupt(1), lambda line: line.clear(), "damaged packets", 2.0),
-    ("late answers", lambda line: line.delay(1.0), lambda line: line.clear(), "does not answer", 2.0),
+    ("late answers", lambda line: line.delay(1.0), lambda line: line.clear(), "does not respond", 2.0),
     ("another id", lambda line: line.change_id(9), lambda line: line.change_id(1), "servo 1 on", 2.0),
 ]
 
@@ -292,7 +292,7 @@ def test_a_moment_without_power_that_the_line_endures_is_a_fault_and_no_grasp(
     time.sleep(0.75 * LINK_TIMEOUT_S)
     line.power_on()
     until(lambda: gripper.state().faults != faults)
-    assert "without power" in gripper.state().last_fault or "does not answer" in gripper.state().last_fault
+    assert "lost power" in gripper.state().last_fault or "does not respond" in gripper.state().last_fault
     until(lambda: not gripper.state().fault)
     assert gripper.state().motion is not Motion.HOLDING
 
@@ -380,9 +380,9 @@ def test_a_shaft_that_was_turned_while_it_had_no_power_is_a_fault_and_nothing_mo
     finger.angle += 900
     there = finger.opening
     line.power_on()
-    until(lambda: "its shaft is not where the fingers can be" in gripper.state().fault)
+    until(lambda: "its shaft is outside the travel" in gripper.state().fault)
     time.sleep(1.2)  # two more attempts
-    assert "its shaft is not where the fingers can be" in gripper.state().fault
+    assert "its shaft is outside the travel" in gripper.state().fault
     assert finger.opening == pytest.approx(there, abs=5)
     finger.angle -= 900
     until(lambda: not gripper.state().fault)
@@ -455,12 +455,12 @@ def test_a_goal_from_before_a_fault_is_void(slow: tuple[DynamixelLine, EzGripper
     line.lose(1)
     keep_waiting(gripper)
     gripper.command(1.0, 300)
-    until(lambda: "does not answer" in gripper.state().fault, 10.0)
+    until(lambda: "does not respond" in gripper.state().fault, 10.0)
     assert gripper.state().faults > before.faults
     gripper.command(1.1, 300)
     line.clear()
     until(lambda: not gripper.state().fault, 10.0)
-    assert "does not answer" in gripper.state().last_fault
+    assert "does not respond" in gripper.state().last_fault
     time.sleep(0.3)
     assert gripper.state().goal.position == pytest.approx(1.7, abs=TOLERANCE)
     assert gripper.state().reading.position == pytest.approx(1.7, abs=TOLERANCE)
@@ -480,7 +480,7 @@ def test_a_gripper_that_comes_late_is_used(make_gripper: MakeGripper) -> None:
 def test_a_wrong_baud_rate_is_named(make_gripper: MakeGripper) -> None:
     _, gripper = make_gripper(baudrate=115200)
     gripper.start()
-    until(lambda: "at 115200 baud does not answer" in gripper.state().fault)
+    until(lambda: "at 115200 baud does not respond" in gripper.state().fault)
 
 
 def test_a_servo_of_another_model_is_not_used(make_gripper: MakeGripper) -> None:

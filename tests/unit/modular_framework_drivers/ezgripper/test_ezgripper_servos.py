@@ -7,7 +7,7 @@ import pytest
 
 from modular_framework_drivers.emulators.dynamixel_servo import DynamixelServo, Instruction
 from modular_framework_drivers.ezgripper import mx64
-from modular_framework_drivers.ezgripper.dynamixel_bus import READ, WRITE, DynamixelBus, NoAnswerError
+from modular_framework_drivers.ezgripper.dynamixel_bus import READ, WRITE, DynamixelBus, NoResponseError
 from modular_framework_drivers.ezgripper.grip import Drive
 from modular_framework_drivers.ezgripper.gripper_servos import GripperError, GripperServos
 from modular_framework_drivers.ezgripper.mx64 import Register, ServoErrors
@@ -33,7 +33,7 @@ class DirectBus(DynamixelBus):
         data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
         answer = self.servo.handle(Instruction(servo_id, WRITE, bytes([register.address]) + data, True))
         if register is self.loses:
-            raise NoAnswerError("silent")
+            raise NoResponseError("silent")
         return ServoErrors(answer[4])
 
     def new_words(self) -> list[tuple[Register, int]]:
@@ -63,7 +63,7 @@ def servos(bus: DirectBus) -> GripperServos:
 
 
 def test_a_motor_that_gets_its_torque_back_has_its_new_goal_before(bus: DirectBus, servos: GripperServos) -> None:
-    servos.forget()
+    servos.clear_written()
     servos.drive(Drive(1.94, 300))
     assert bus.new_words() == [
         (mx64.GOAL_POSITION, CLOSED),
@@ -88,7 +88,7 @@ def test_staying_leaves_a_motor_off_that_has_shut_down(bus: DirectBus, servos: G
     servos.drive(drive)
     bus.servo.set(mx64.PRESENT_POSITION, CLOSED + 1000)
     bus.servo.shut_down(ServoErrors.OVERLOAD)
-    servos.stay()
+    servos.hold_position()
     assert mx64.signed(bus.servo.get(mx64.GOAL_POSITION)) == CLOSED + 1000
     assert (bus.servo.get(mx64.TORQUE_CONTROL_MODE), bus.servo.get(mx64.TORQUE_LIMIT)) == (0, 0)
     assert bus.servo.errors == ServoErrors.OVERLOAD
@@ -101,10 +101,10 @@ def test_a_servo_that_followed_a_command_whose_answer_was_lost_had_power(
     servos.drive(Drive(None, 200))
     servos.drive(Drive(0.97, 200))
     bus.loses = lost
-    with pytest.raises(NoAnswerError):
+    with pytest.raises(NoResponseError):
         servos.drive(Drive(None, 200, -1))
     bus.loses = None
-    assert servos.find_again()
+    assert servos.restore_zeros()
     servos.drive(Drive(None, 200, -1))
     assert (bus.servo.get(mx64.GOAL_TORQUE), bus.servo.get(mx64.TORQUE_CONTROL_MODE)) == (200, 1)
 
@@ -112,12 +112,12 @@ def test_a_servo_that_followed_a_command_whose_answer_was_lost_had_power(
 def test_a_servo_of_which_only_the_place_is_known_is_not_taken_for_faithful(
     bus: DirectBus, servos: GripperServos
 ) -> None:
-    servos.forget()
-    servos.stay()
+    servos.clear_written()
+    servos.hold_position()
     bus.servo.power_cycle()
     bus.servo.set(mx64.GOAL_POSITION, CLOSED + 1250)
     bus.servo.set(mx64.PRESENT_POSITION, CLOSED + 1250 + 4096)
-    assert not servos.find_again()
+    assert not servos.restore_zeros()
     assert servos.read().position == pytest.approx(0.97)
 
 
@@ -127,10 +127,10 @@ def test_a_shaft_where_the_fingers_cannot_be_is_a_fault_until_it_is_back_and_not
     bus.servo.power_cycle()
     bus.servo.set(mx64.PRESENT_POSITION, CLOSED + 3300)
     for _ in range(2):
-        with pytest.raises(GripperError, match="servo 1: its shaft is not where the fingers can be"):
-            servos.find_again()
+        with pytest.raises(GripperError, match="servo 1: its shaft is outside the travel"):
+            servos.restore_zeros()
         assert servos.calibrated
     bus.servo.set(mx64.PRESENT_POSITION, CLOSED + 1250 - 4096)
-    assert not servos.find_again()
+    assert not servos.restore_zeros()
     assert bus.new_words() == []
     assert servos.read().position == pytest.approx(0.97)

@@ -126,7 +126,7 @@ class Finger:
         if not servo.get(mx64.TORQUE_ENABLE):
             return 0.0
         if servo.get(mx64.TORQUE_CONTROL_MODE):
-            wanted = mx64.directed(servo.get(mx64.GOAL_TORQUE)) / mx64.TORQUE_MAX
+            wanted = mx64.from_direction_word(servo.get(mx64.GOAL_TORQUE)) / mx64.TORQUE_MAX
         else:
             error = mx64.signed(servo.get(mx64.GOAL_POSITION)) - self.angle
             wanted = servo.get(mx64.P_GAIN) / 8.0 * error / mx64.TORQUE_MAX

@@ -292,6 +292,6 @@ def _describe(finger: Finger) -> str:
         f"id={servo.servo_id} opening={finger.opening:.0f} speed={finger.speed:.0f} "
         f"torque_limit={servo.get(mx64.TORQUE_LIMIT)} torque_enable={servo.get(mx64.TORQUE_ENABLE)} "
         f"torque_mode={servo.get(mx64.TORQUE_CONTROL_MODE)} "
-        f"goal_torque={mx64.directed(servo.get(mx64.GOAL_TORQUE))} "
+        f"goal_torque={mx64.from_direction_word(servo.get(mx64.GOAL_TORQUE))} "
         f"temperature={finger.temperature:.1f} errors={int(servo.errors)}"
     )

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An EZGripper that any thread can use without ever having to wait.
+"""Provides an EZGripper to several threads without locks.
 
-One thread communicates with the servos: it connects, calibrates and follows goals; after a fault it reports the reason
-and connects again by itself. Other threads read the last state and write the next request. Each of the two is a single
-attribute, so there is no lock that the control loop might have to wait for.
+One thread communicates with the servos: it connects, calibrates and follows goals; after a fault, it reports the cause
+and reconnects. Other threads read the last state and write the next request. State and request are single attributes,
+so the control loop never waits for a lock.
 """
 
 from __future__ import annotations
@@ -23,33 +23,39 @@ from modular_framework_drivers.ezgripper.gripper_servos import (
     GripperReading,
     GripperServos,
     describe_errors,
-    with_set_point_near,
+    limit_set_point_distance,
 )
 from modular_framework_drivers.ezgripper.gripper_settings import GripperSettings
-from modular_framework_drivers.ezgripper.mx64 import MOTOR_FAULTS, TORQUE_MAX, UNWATCHED_TORQUE, WARM, ServoErrors
+from modular_framework_drivers.ezgripper.mx64 import (
+    MOTOR_FAULTS,
+    SUSTAINED_TORQUE,
+    TORQUE_MAX,
+    WARNING_TEMPERATURE,
+    ServoErrors,
+)
 
 LOGGER = logging.getLogger("rosout.ezgripper")
-SILENT_S = 1.0
-"""A state older than this, plus the time a servo has for its answer, counts as lost [s]."""
+MAX_STATE_AGE_S = 1.0
+"""Maximum age of the state, besides the timeout of a response, before the connection counts as lost [s]."""
 
 
 SET_POINT_PERIODS = 2.0
-"""Periods that a set point must last: until the next one is due, and as long again if that comes late."""
+"""Periods for which a set point must last: one until the next set point, and one for its delay."""
 
 
 @dataclass(frozen=True, slots=True)
 class GripperState:
-    """State of the gripper at its last answer.
+    """Holds the state of the gripper at its last response.
 
     Attributes:
-        stamp_s: time of the answer on the monotonic clock [s]; minus infinity before it is calibrated.
-        reading: what was measured.
-        motion: state of the fingers.
-        goal: the one that is followed.
-        ready: whether it is calibrated and has been at its start position.
-        fault: why it cannot be used at the moment; "" if it can.
-        faults: number of faults so far, so that one that came and went between two reads is not missed.
-        last_fault: the latest of them; "" before the first.
+        stamp_s: Time of the response on the monotonic clock [s]; minus infinity before the calibration.
+        reading: Measurements of the gripper.
+        motion: State of the fingers.
+        goal: Current goal.
+        ready: Whether the gripper is calibrated and has reached its start position.
+        fault: Current fault; "" if there is none.
+        faults: Number of faults so far, which reveals a short fault between two reads.
+        last_fault: Latest fault; "" before the first fault.
     """
 
     stamp_s: float
@@ -64,11 +70,11 @@ class GripperState:
 
 @dataclass(frozen=True, slots=True)
 class _Request:
-    """The last request of another thread.
+    """Holds the last request of another thread.
 
     Attributes:
-        goal: to follow; None to stop.
-        faults: number of faults at that time; a fault that comes later cancels the request.
+        goal: Goal to follow; None for a stop.
+        faults: Number of faults at the time of the request; a later fault cancels the request.
     """
 
     goal: Goal | None
@@ -76,70 +82,70 @@ class _Request:
 
 
 class _Ended(Exception):
-    """`close` was called."""
+    """Raised on the gripper's thread after a call of `close`."""
 
 
 class EzGripper:
-    """One gripper. `start`, then `state`, `command` and `stop` from any thread; `close` in the end.
+    """Controls one gripper: after `start`, any thread may call `state`, `command` and `stop`, until `close`.
 
     Args:
-        settings: of its connection and its motions.
+        settings: Settings of the gripper.
     """
 
     def __init__(self, settings: GripperSettings) -> None:
         self.settings = settings
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
-        first = Goal(0, settings.start_position, settings.start_torque)
+        initial_goal = Goal(0, settings.start_position, settings.start_torque)
         self._numbers = itertools.count(1)
-        self._request = self._handled_request = _Request(first, 0)
-        self._grip = Grip(settings.rules, first)
+        self._request = self._handled_request = _Request(initial_goal, 0)
+        self._grip = Grip(settings.rules, initial_goal)
         self._bus = DynamixelBus(settings.port_name, settings.baudrate, settings.link_timeout_s)
         self._servos = GripperServos(self._bus, settings.servo_ids, self._wait)
-        nothing = GripperReading(CLOSED_POSITION, 0.0, 0.0, 0.0, 0.0, ServoErrors.NONE)
+        no_reading = GripperReading(CLOSED_POSITION, 0.0, 0.0, 0.0, 0.0, ServoErrors.NONE)
         self._state = GripperState(
-            -math.inf, nothing, Motion.MOVING, first, False, f"{settings.name}: not connected yet"
+            -math.inf, no_reading, Motion.MOVING, initial_goal, False, f"{settings.name}: not connected yet"
         )
         self._ready = False
-        self._warm = False
+        self._is_hot = False
         self._off_since_s: float | None = None
 
     # ---- any thread ----
 
     def start(self) -> None:
-        """Begins to connect; returns at once. `state` has the result."""
+        """Starts the thread that connects to the gripper; `state` reports the result."""
         self._thread = threading.Thread(target=self._run, name=self.settings.name, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Stops the fingers, which keep holding with little torque, and the thread; may be called twice."""
+        """Stops the fingers, which keep holding with a low torque, and ends the thread; may be called twice."""
         self._ended.set()
         if self._thread is not None:
             self._thread.join(2.0)
 
     def state(self) -> GripperState:
-        """Returns the latest state; if it is too old, it has a fault that says so."""
+        """Returns the latest state, with a fault if the state is too old."""
         state = self._state
         age_s = time.monotonic() - state.stamp_s
-        if age_s > SILENT_S + self.settings.link_timeout_s and not state.fault:
-            return replace(state, fault=f"{self.settings.name}: nothing heard of the servos for {age_s:.1f} s")
+        if age_s > MAX_STATE_AGE_S + self.settings.link_timeout_s and not state.fault:
+            return replace(state, fault=f"{self.settings.name}: no response of the servos for {age_s:.1f} s")
         return state
 
     def command(self, position: float, torque: int) -> int:
-        """Requests a motion; ignored while there is a fault, and cancelled by a fault that comes before it is handled.
+        """Requests a motion; the request is ignored during a fault, and cancelled by a fault before the motion starts.
 
-        A client that waits for its goal must therefore also watch `state().faults`: once that has changed, the goal may
-        never be followed.
+        Therefore, a client that waits for its goal must also watch `state().faults`: after a change, the goal may never
+        be followed.
 
         Args:
-            position: of the knuckle joint [rad].
-            torque: largest torque [units of the servo].
+            position: Goal position of the knuckle joint [rad].
+            torque: Maximum torque [servo units].
 
         Returns:
-            The number of the goal; `state().goal` has it once the goal is followed.
+            The number of the goal, which is that of `state().goal` once the motion has started.
 
         Raises:
-            ValueError: the position or the torque is out of its limits.
+            ValueError: If the position or the torque is outside its limits.
         """
         if not 0.0 <= position <= CLOSED_POSITION:
             raise ValueError(f"{self.settings.name}: position {position} rad is outside [0, {CLOSED_POSITION}]")
@@ -151,12 +157,12 @@ class EzGripper:
         return goal.number
 
     def stop(self) -> None:
-        """Requests a stop at the present position; an object that is held stays held."""
+        """Requests a stop at the current position; the fingers keep holding an object."""
         self._request = _Request(None, self._state.faults)
 
     @property
     def stale(self) -> bool:
-        """Whether the latest state is too old to judge a motion by."""
+        """Returns whether the latest state is too old to monitor a motion."""
         return time.monotonic() - self._state.stamp_s > self.settings.rules.stale_s
 
     # ---- the gripper's thread ----
@@ -177,8 +183,8 @@ class EzGripper:
         except _Ended:
             self._hold_safely()
         except Exception:
-            LOGGER.exception("%s: unexpected error; the gripper is out of use", self.settings.name)
-            self._report("internal error, told in the log; the gripper is out of use until the node is started again")
+            LOGGER.exception("%s: unexpected error; the gripper cannot be used", self.settings.name)
+            self._report("internal error; see the log; the gripper cannot be used until the node is restarted")
         finally:
             self._bus.close()
 
@@ -190,7 +196,7 @@ class EzGripper:
             position = self._servos.read().position
             self._grip.stop(position)
             drive = self._grip.update(position, time.monotonic())
-            self._servos.drive(replace(drive, torque=min(drive.torque, UNWATCHED_TORQUE)))
+            self._servos.drive(replace(drive, torque=min(drive.torque, SUSTAINED_TORQUE)))
         except BusError as error:
             LOGGER.warning("%s: %s", self.settings.name, error)
 
@@ -199,34 +205,34 @@ class EzGripper:
             raise _Ended
 
     def _connect(self) -> None:
-        """Opens the serial line and brings the servos into a known state; the next cycle handles a fault of a motor."""
+        """Opens the serial line and initialises the servos; the next cycle handles a motor fault."""
         self._bus.open()
         self._servos.set_up()
-        known = self._servos.calibrated
-        faithful = known and self._servos.find_again()
-        if not known:
+        was_calibrated = self._servos.calibrated
+        unchanged = was_calibrated and self._servos.restore_zeros()
+        if not was_calibrated:
             self._report("calibrating", logging.INFO)
             self._servos.calibrate()
-            self._follow_anew(self.settings.start_position)
+            self._restart_at(self.settings.start_position)
         reading, now_s = self._servos.read(), time.monotonic()
         was_off, self._off_since_s = self._off_since_s is not None, None
         if reading.errors & MOTOR_FAULTS:
-            self._servos.forget()
-            self._follow_anew(reading.position)
+            self._servos.clear_written()
+            self._restart_at(reading.position)
             return
-        if known and (was_off or not faithful):
-            self._follow_anew(reading.position)
-        elif known:
+        if was_calibrated and (was_off or not unchanged):
+            self._restart_at(reading.position)
+        elif was_calibrated:
             self._grip.stop(reading.position)
         self._drive(reading.position, now_s)
 
     def _drive(self, position: float, now_s: float) -> None:
         period_s = min(max(now_s - self._state.stamp_s, self.settings.poll_period_s), self.settings.rules.stale_s)
         drive = self._grip.update(position, now_s)
-        self._servos.drive(with_set_point_near(drive, position, SET_POINT_PERIODS * period_s))
+        self._servos.drive(limit_set_point_distance(drive, position, SET_POINT_PERIODS * period_s))
 
-    def _follow_anew(self, position: float) -> None:
-        """Replaces the state machine and its goal; the new goal is `position` [rad]."""
+    def _restart_at(self, position: float) -> None:
+        """Restarts the state machine with the goal `position` [rad]."""
         position = min(max(position, 0.0), CLOSED_POSITION)
         self._grip = Grip(self.settings.rules, Goal(next(self._numbers), position, self.settings.start_torque))
 
@@ -236,12 +242,12 @@ class EzGripper:
             self._handle_motor_fault(reading, now_s)
             return
         if self.stale and self._servos.lost_power():
-            raise GripperError("the servos were without power for a moment; check the power supply and its cable")
-        if self._off_since_s is not None:  # the motor is on again, but has lost its torque limit
+            raise GripperError("the servos lost power for a moment; check the power supply and its cable")
+        if self._off_since_s is not None:  # the motor is on again but has lost its torque limit
             self._off_since_s = None
-            self._servos.forget()
-            self._follow_anew(reading.position)
-        self._warn_of_heat(reading.temperature)
+            self._servos.clear_written()
+            self._restart_at(reading.position)
+        self._warn_if_hot(reading.temperature)
         self._handle_request(reading.position, now_s)
         self._drive(reading.position, now_s)
         self._ready |= self._grip.motion is not Motion.MOVING
@@ -251,18 +257,18 @@ class EzGripper:
         request = self._request
         if request is self._handled_request or request.faults != self._state.faults:
             return
-        self._handled_request, before = request, self._grip.goal
+        self._handled_request, previous_goal = request, self._grip.goal
         if request.goal is None:
             self._grip.stop(position)
-        elif (request.goal.position, request.goal.torque) == (before.position, before.torque):
+        elif (request.goal.position, request.goal.torque) == (previous_goal.position, previous_goal.torque):
             self._grip.goal = request.goal
         else:
             self._grip.retarget(request.goal, position, time_s)
 
     def _handle_motor_fault(self, reading: GripperReading, now_s: float) -> None:
-        """Publishes the fault and stops the fingers, because not every fault switches every motor off.
+        """Publishes the fault and stops the fingers, because not every fault switches off every motor.
 
-        After a pause it switches the torque on again, at the present position.
+        After a pause, the torque is enabled again at the current position.
         """
         text = f"{self.settings.name}: {describe_errors(reading.errors, reading.temperature, reading.voltage)}"
         since_s = self._off_since_s
@@ -271,23 +277,23 @@ class EzGripper:
             LOGGER.error("%s", text)
         self._publish(reading, now_s, text)
         if since_s is None:
-            self._servos.stay()
+            self._servos.hold_position()
         elif now_s - since_s >= self.settings.fault_pause_s:
             self._off_since_s = now_s
-            self._servos.forget()
+            self._servos.clear_written()
             self._servos.drive(Drive(reading.position, self.settings.start_torque))
 
-    def _warn_of_heat(self, temperature: float) -> None:
-        if temperature >= WARM and not self._warm:
+    def _warn_if_hot(self, temperature: float) -> None:
+        if temperature >= WARNING_TEMPERATURE and not self._is_hot:
             LOGGER.warning(
-                "%s: the motor is at %.0f degrees C, it switches itself off at 80; hold with less torque",
+                "%s: the motor has %.0f degrees C and switches itself off at 80; hold with a lower torque",
                 self.settings.name,
                 temperature,
             )
-        self._warm = temperature >= WARM
+        self._is_hot = temperature >= WARNING_TEMPERATURE
 
     def _publish(self, reading: GripperReading, now_s: float, fault: str) -> None:
-        recovered = self._state.fault and not fault
+        has_recovered = self._state.fault and not fault
         state = replace(
             self._state,
             stamp_s=now_s,
@@ -301,11 +307,11 @@ class EzGripper:
             self._set_fault(state, fault)
         else:
             self._state = state
-        if recovered:
-            LOGGER.info("%s: in use", self.settings.name)
+        if has_recovered:
+            LOGGER.info("%s: fault cleared", self.settings.name)
 
     def _report(self, problem: str, level: int = logging.ERROR) -> None:
-        """Publishes a fault; logs it if it differs from the last one."""
+        """Publishes a fault, and logs a fault that differs from the last fault."""
         text = f"{self.settings.name}: {problem}"
         if text != self._state.fault:
             LOGGER.log(level, "%s", text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An EZGripper as a `RobotHW`, alone or combined with an arm."""
+"""Provides an EZGripper as a `RobotHW`, alone or combined with an arm."""
 
 from __future__ import annotations
 
@@ -21,20 +21,19 @@ LOGGER = logging.getLogger("rosout.ezgripper_robot_hw")
 
 
 class EzGripperRobotHW(RobotHW):
-    """modular_framework_drivers/EzGripperRobotHW: one joint, commanded by position, its effort bounded on request.
+    """modular_framework_drivers/EzGripperRobotHW: one joint with position commands and an optional maximum effort.
 
-    `init` begins to connect and calibrate the gripper, which closes it; `initialised` is true once it has been at its
-    start position. A fault of the link or of the motor is `fault()`; the gripper comes back by itself and then stands
-    still until it is commanded.
+    `init` starts to connect and calibrate the gripper, which closes the fingers; `initialised` is true once the gripper
+    has reached its start position. `fault()` reports faults of the connection and of the motor; the gripper recovers
+    automatically and then stands still until the next command.
 
-    Parameters: see `parameters/EzGripperRobotHW.yaml`; limits come from `robot_description` and from
-    `joint_limits`, when they are there.
+    Parameters: see `parameters/EzGripperRobotHW.yaml`; `robot_description` and `joint_limits` may contain limits.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._gripper: EzGripper | None = None
-        self._faults, self._missed = 0, ""
+        self._fault_count, self._missed_fault = 0, ""
 
     def init(self, root_nh: NodeHandle, robot_hw_nh: NodeHandle) -> bool:
         where = join_names(robot_hw_nh.namespace, "")
@@ -67,14 +66,14 @@ class EzGripperRobotHW(RobotHW):
         if self._gripper is None:
             return
         state, joint = self._gripper.state(), self._handle.state
-        if not math.isfinite(state.stamp_s):  # nothing is measured before the calibration
+        if not math.isfinite(state.stamp_s):  # the calibration has not finished
             return
         joint.position, joint.velocity = state.reading.position, 0.0 if state.fault else state.reading.velocity
         joint.stale = self._gripper.stale
         joint.effort = state.reading.load * TORQUE_MAX / FULL_TORQUE * self._full_effort
-        self._missed = state.last_fault if state.faults != self._faults else ""
-        self._faults = state.faults
-        if state.fault or self._missed or not state.ready:
+        self._missed_fault = state.last_fault if state.faults != self._fault_count else ""
+        self._fault_count = state.faults
+        if state.fault or self._missed_fault or not state.ready:
             self._handle.command = joint.position
             self._guard.reset()
 
@@ -83,16 +82,16 @@ class EzGripperRobotHW(RobotHW):
             return
         self._guard.enforce(period_s)
         position = min(max(self._handle.command, 0.0), CLOSED_POSITION)
-        self._gripper.command(position, self._torque())
+        self._gripper.command(position, self._max_torque())
 
-    def _torque(self) -> int:
-        """The greatest torque the controller allows [units of the servo]."""
+    def _max_torque(self) -> int:
+        """Returns the maximum torque allowed by the controller [servo units]."""
         if not self._handle.max_effort > 0.0:
             return self._default_torque
         return round(min(1.0, self._handle.max_effort / self._full_effort) * FULL_TORQUE)
 
     def fault(self) -> str:
-        return (self._gripper.state().fault or self._missed) if self._gripper is not None else ""
+        return (self._gripper.state().fault or self._missed_fault) if self._gripper is not None else ""
 
     def close(self) -> None:
         if self._gripper is not None:

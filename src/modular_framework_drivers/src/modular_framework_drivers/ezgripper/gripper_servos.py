@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The servos of one EZGripper as one joint: set up, calibrated, read and driven in the unit of the knuckle joint.
+"""Calibrates, reads and drives the servos of one EZGripper as one knuckle joint.
 
-From the maker's public library: the motor closes the fingers clockwise. Calibration closes them with little torque
-until they stand still and takes that position as zero. From there to fully open the motor turns 2500 ticks, and the
-knuckle joint moves from 1.94 rad to 0.
+From the manufacturer's public library: the motor closes the fingers clockwise. Calibration closes the fingers with
+little torque until they stand still, which defines the zero position. From the zero position to fully open, the motor
+rotates by 2500 ticks, and the knuckle joint moves from 1.94 rad to 0.
 """
 
 from __future__ import annotations
@@ -18,33 +18,33 @@ from modular_framework_drivers.ezgripper.grip import Drive
 from modular_framework_drivers.ezgripper.mx64 import Reading, Register, ServoErrors
 
 CLOSED_POSITION = 1.94
-"""Of the knuckle joint with the pads together [rad]."""
+"""Position of the knuckle joint with closed pads [rad]."""
 TRAVEL_TICKS = 2500
-SLACK_TICKS = 400
-"""How far beyond the ends of the travel a position may be measured [ticks]."""
+TRAVEL_TOLERANCE_TICKS = 400
+"""Tolerance of measured positions beyond the ends of the travel [ticks]."""
 CALIBRATION_TORQUE = 100
 RELAXED_TORQUE = 10
 CALIBRATION_TIMEOUT_S = 10.0
-STANDS_AFTER_S = 0.3
-STANDS_WITHIN_TICKS = 4
+MIN_STANDSTILL_S = 0.3
+STANDSTILL_TOLERANCE_TICKS = 4
 LIMIT_REGISTERS = (mx64.CW_ANGLE_LIMIT, mx64.CCW_ANGLE_LIMIT)
 
 
 class GripperError(Exception):
-    """The gripper answers but cannot be used; the text says what to do."""
+    """Raised if the gripper responds but cannot be used; the text contains the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
 class GripperReading:
-    """The gripper as measured.
+    """Holds the measurements of a gripper.
 
     Attributes:
-        position: of the knuckle joint [rad].
-        velocity: closing positive [rad/s].
-        load: share of the motor's torque, closing positive, in [-1, 1].
-        temperature: of the hottest motor [deg C].
-        voltage: lowest [V].
-        errors: all error bits.
+        position: Position of the knuckle joint [rad].
+        velocity: Velocity of the knuckle joint, closing positive [rad/s].
+        load: Fraction of the full torque in [-1, 1], closing positive.
+        temperature: Temperature of the hottest motor [deg C].
+        voltage: Minimum supply voltage of the motors [V].
+        errors: Error bits of all motors.
     """
 
     position: float
@@ -57,7 +57,7 @@ class GripperReading:
 
 @dataclass(slots=True)
 class _Servo:
-    """One servo: its zero [ticks], and the values that were written to its RAM last."""
+    """Tracks a servo: its zero position [ticks] and the values last written to its RAM."""
 
     servo_id: int
     zero: int | None = None
@@ -65,37 +65,37 @@ class _Servo:
 
 
 def joint_from_ticks(ticks: float) -> float:
-    """Position of the knuckle joint [rad] for an angle of the shaft from its zero [ticks]."""
+    """Returns the position of the knuckle joint [rad] for a shaft angle from the zero position [ticks]."""
     return CLOSED_POSITION * (1.0 - ticks / TRAVEL_TICKS)
 
 
 def ticks_from_joint(position: float) -> int:
-    """Angle of the shaft from its zero [ticks] for a position of the knuckle joint [rad]."""
+    """Returns the shaft angle from the zero position [ticks] for a position of the knuckle joint [rad]."""
     return round(TRAVEL_TICKS * (1.0 - position / CLOSED_POSITION))
 
 
-def with_set_point_near(drive: Drive, position: float, duration_s: float) -> Drive:
-    """Brings the set point so near that fingers whose line is cut, since no servo has a watchdog, do not go far.
+def limit_set_point_distance(drive: Drive, position: float, duration_s: float) -> Drive:
+    """Limits the distance of the set point, so that fingers stop early if the line is cut: servos have no watchdog.
 
     Args:
-        drive: the command.
-        position: measured [rad].
-        duration_s: for how long the motor must be able to use its torque before the set point is renewed [s].
+        drive: Command to the motor.
+        position: Measured position [rad].
+        duration_s: Time for which the motor must have its full torque before the next set point [s].
     """
     if drive.position is None:
         return drive
-    ticks = drive.torque * (mx64.TICKS_PER_TORQUE + mx64.TOP_SPEED_TICKS_S / mx64.TORQUE_MAX * duration_s)
-    lead = ticks * CLOSED_POSITION / TRAVEL_TICKS
-    return replace(drive, position=min(max(drive.position, position - lead), position + lead))
+    ticks = drive.torque * (mx64.TICKS_PER_TORQUE + mx64.MAX_SPEED_TICKS_S / mx64.TORQUE_MAX * duration_s)
+    max_offset = ticks * CLOSED_POSITION / TRAVEL_TICKS
+    return replace(drive, position=min(max(drive.position, position - max_offset), position + max_offset))
 
 
 class GripperServos:
-    """All servos of a gripper; to be used by one thread.
+    """Drives all servos of a gripper; must be used by a single thread.
 
     Args:
-        bus: the open serial line.
-        servo_ids: which servos move the fingers.
-        wait: waits for some time [s]; raises to end the wait early.
+        bus: Open serial line.
+        servo_ids: Identifiers of the servos that move the fingers.
+        wait: Callback that waits for a time [s]; raises an exception to end the wait early.
     """
 
     def __init__(self, bus: DynamixelBus, servo_ids: Sequence[int], wait: Callable[[float], None]) -> None:
@@ -104,34 +104,34 @@ class GripperServos:
 
     @property
     def calibrated(self) -> bool:
-        """Whether every zero is known."""
+        """Returns whether the zero positions of all servos are known."""
         return all(servo.zero is not None for servo in self._servos)
 
     def set_up(self) -> None:
         """Checks the model of each servo and sets its permanent registers.
 
         Raises:
-            BusError: one does not answer.
-            GripperError: one is something else than an MX-64 or MX-106.
+            BusError: If a servo does not respond.
+            GripperError: If a servo is not an MX-64 or MX-106.
         """
         for servo in self._servos:
             model = self._bus.model_number(servo.servo_id)
             if model not in mx64.MODELS:
-                known = ", ".join(f"{number} ({name})" for number, name in mx64.MODELS.items())
+                known_models = ", ".join(f"{number} ({name})" for number, name in mx64.MODELS.items())
                 raise GripperError(
-                    f"servo {servo.servo_id} is model {model}; expected {known} with protocol 1.0; check servo_ids"
+                    f"servo {servo.servo_id} is model {model}; expected {known_models} with protocol 1.0; check the id"
                 )
             for register in LIMIT_REGISTERS:
-                self._ensure(servo, register, mx64.MULTI_TURN_LIMIT)
-            self._ensure(servo, mx64.MULTI_TURN_OFFSET, 0)
-            self._ensure(servo, mx64.RESOLUTION_DIVIDER, 1)
+                self._write_if_different(servo, register, mx64.MULTI_TURN_LIMIT)
+            self._write_if_different(servo, mx64.MULTI_TURN_OFFSET, 0)
+            self._write_if_different(servo, mx64.RESOLUTION_DIVIDER, 1)
 
     def calibrate(self) -> None:
-        """Closes until the fingers stand still, and takes that position as zero. Nothing may be between them.
+        """Closes the fingers until they stand still, which defines the zero position; no object may be between them.
 
         Raises:
-            BusError: a servo does not answer.
-            GripperError: they do not come to a stop, or a motor reports an error.
+            BusError: If a servo does not respond.
+            GripperError: If the fingers do not come to a stop or a motor reports an error.
         """
         for servo in self._servos:
             servo.written.clear()
@@ -147,82 +147,84 @@ class GripperServos:
             servo.zero = self._reading(servo).position
 
     def _wait_for_standstill(self) -> None:
-        standstill_s = passed_s = 0.0
-        last: list[int] = []
-        while standstill_s < STANDS_AFTER_S:
+        standstill_s = elapsed_s = 0.0
+        last_positions: list[int] = []
+        while standstill_s < MIN_STANDSTILL_S:
             readings = [self._reading(servo) for servo in self._servos]
-            self._refuse_errors(readings)
-            now = [reading.position for reading in readings]
-            stands = bool(last) and all(abs(a - b) <= STANDS_WITHIN_TICKS for a, b in zip(now, last, strict=True))
-            standstill_s = standstill_s + 0.1 if stands else 0.0
-            last = now
-            if passed_s > CALIBRATION_TIMEOUT_S:
+            self._check_motor_errors(readings)
+            positions = [reading.position for reading in readings]
+            stands_still = bool(last_positions) and all(
+                abs(a - b) <= STANDSTILL_TOLERANCE_TICKS for a, b in zip(positions, last_positions, strict=True)
+            )
+            standstill_s = standstill_s + 0.1 if stands_still else 0.0
+            last_positions = positions
+            if elapsed_s > CALIBRATION_TIMEOUT_S:
                 raise GripperError(
                     f"calibration: the fingers still moved after {CALIBRATION_TIMEOUT_S:.0f} s of "
                     "closing; check that the tendon is in place and the fingers meet"
                 )
             self._wait(0.1)
-            passed_s += 0.1
+            elapsed_s += 0.1
 
-    def _refuse_errors(self, readings: Sequence[Reading]) -> None:
+    def _check_motor_errors(self, readings: Sequence[Reading]) -> None:
         hottest = max(reading.temperature for reading in readings)
         lowest = min(reading.voltage for reading in readings)
         for reading in readings:
             if reading.errors & mx64.MOTOR_FAULTS:
                 raise GripperError(f"calibration: {describe_errors(reading.errors, hottest, lowest)}")
 
-    def find_again(self) -> bool:
-        """Returns whether the servos, after a lost link, still have the values that were written last.
+    def restore_zeros(self) -> bool:
+        """Returns whether the servos, after a lost connection, still have the values last written.
 
-        If not, they were without power. Then everything is written again at the next `drive`, and the turns of their
-        shafts are counted anew, which needs no motion because the travel is less than one turn.
+        Otherwise, the servos have lost power. In this case, the next `drive` writes all values again, and the
+        revolutions of the shafts are determined again, without motion because the travel is below one revolution.
 
         Raises:
-            BusError: a servo does not answer.
-            GripperError: a shaft is outside the travel; its zero is kept, so that no new calibration moves the fingers.
+            BusError: If a servo does not respond.
+            GripperError: If a shaft is outside the travel; its zero is kept, as a calibration would move the fingers.
         """
-        faithful = all(self._remembers(servo) for servo in self._servos)
+        unchanged = all(self._has_written_values(servo) for servo in self._servos)
         for servo in self._servos:
-            if servo.zero is None or faithful:
+            if servo.zero is None or unchanged:
                 continue
             position = self._reading(servo).position
-            ticks = (position - servo.zero + SLACK_TICKS) % mx64.TICKS_PER_TURN - SLACK_TICKS
-            if ticks > TRAVEL_TICKS + SLACK_TICKS:
+            ticks = (position - servo.zero + TRAVEL_TOLERANCE_TICKS) % mx64.TICKS_PER_TURN - TRAVEL_TOLERANCE_TICKS
+            if ticks > TRAVEL_TICKS + TRAVEL_TOLERANCE_TICKS:
                 raise GripperError(
-                    f"servo {servo.servo_id}: its shaft is not where the fingers can be; free them and "
-                    "check the tendon, or start the node again to calibrate them anew"
+                    f"servo {servo.servo_id}: its shaft is outside the travel of the fingers; free the fingers and "
+                    "check the tendon, or restart the node to calibrate the fingers again"
                 )
             servo.zero = position - ticks
             servo.written.clear()
-        return faithful
+        return unchanged
 
-    def _remembers(self, servo: _Servo) -> bool:
+    def _has_written_values(self, servo: _Servo) -> bool:
         return mx64.TORQUE_ENABLE in servo.written and all(
             mx64.from_bytes(self._bus.read(servo.servo_id, register)[0]) == value % (1 << 8 * register.size)
             for register, value in servo.written.items()
         )
 
     def lost_power(self) -> bool:
-        """Returns whether a motor that was switched on is off, though its servo reports no error.
+        """Returns whether a motor is off although its torque was enabled and its servo reports no error.
 
         Raises:
-            BusError: a servo does not answer.
+            BusError: If a servo does not respond.
         """
         return any(
             servo.written.get(mx64.TORQUE_ENABLE) and not any(self._bus.read(servo.servo_id, mx64.TORQUE_ENABLE)[0])
             for servo in self._servos
         )
 
-    def forget(self) -> None:
-        """Makes the next `drive` write every value; a motor that shut down has lost its torque limit."""
+    def clear_written(self) -> None:
+        """Makes the next `drive` write all values, as a motor loses its torque limit when it shuts down."""
         for servo in self._servos:
             servo.written.clear()
 
     def read(self) -> GripperReading:
-        """Measures.
+        """Returns the measurements of the gripper.
 
         Raises:
-            BusError: a servo does not answer.
+            BusError: If a servo does not respond.
         """
         readings = [self._reading(servo) for servo in self._servos]
         ticks = fmean(
@@ -242,13 +244,13 @@ class GripperServos:
         )
 
     def drive(self, drive: Drive) -> None:
-        """Sends a command to the motors; only values that have changed are written.
+        """Sends a command to the motors; writes only changed values.
 
         Raises:
-            BusError: a servo does not answer.
+            BusError: If a servo does not respond.
         """
         for servo in self._servos:
-            # A lower torque limit is written before the new goal, a higher one after it: the motor exceeds neither.
+            # A lower torque limit precedes the new goal and a higher limit follows, so the motor exceeds neither limit.
             if drive.position is None or drive.torque < servo.written.get(mx64.TORQUE_LIMIT, 0):
                 self._write(servo, mx64.TORQUE_LIMIT, drive.torque)
             if drive.position is None:
@@ -259,11 +261,11 @@ class GripperServos:
             self._write(servo, mx64.TORQUE_LIMIT, drive.torque)
             self._write(servo, mx64.TORQUE_ENABLE, 1)
 
-    def stay(self) -> None:
-        """Commands every motor to its present position, with the torque it has: one that has shut down stays off.
+    def hold_position(self) -> None:
+        """Commands each motor to its current position with its current torque; a motor that is off stays off.
 
         Raises:
-            BusError: a servo does not answer.
+            BusError: If a servo does not respond.
         """
         for servo in self._servos:
             self._write(servo, mx64.GOAL_POSITION, self._reading(servo).position)
@@ -274,26 +276,32 @@ class GripperServos:
 
     def _write(self, servo: _Servo, register: Register, value: int) -> None:
         if servo.written.get(register) != value:
-            servo.written.pop(register, None)  # if the answer is lost, the value is unknown
+            servo.written.pop(register, None)  # if the response is lost, the value is unknown
             self._bus.write(servo.servo_id, register, value)
             servo.written[register] = value
 
-    def _ensure(self, servo: _Servo, register: Register, value: int) -> None:
-        """Writes a value to the EEPROM only if it is not there yet, because its number of writes is limited."""
+    def _write_if_different(self, servo: _Servo, register: Register, value: int) -> None:
+        """Writes a value to the EEPROM only if it differs, because the number of EEPROM writes is limited."""
         if mx64.from_bytes(self._bus.read(servo.servo_id, register)[0]) != value:
             self._bus.write(servo.servo_id, register, value)
 
 
 def describe_errors(errors: ServoErrors, temperature: float, voltage: float) -> str:
-    """Describes the motor's error bits and what to do."""
+    """Describes the error bits of the motor and the remedies.
+
+    Args:
+        errors: Error bits.
+        temperature: Temperature of the hottest motor [deg C].
+        voltage: Minimum supply voltage [V].
+    """
     texts = []
     if errors & ServoErrors.OVERHEATING:
         texts.append(
             f"the motor is too hot ({temperature:.0f} degrees C) and has switched itself off; let it cool, "
-            "and hold with less torque"
+            "and hold with a lower torque"
         )
     if errors & ServoErrors.OVERLOAD:
-        texts.append("the motor was overloaded and has switched itself off; free the fingers, and use less torque")
+        texts.append("the motor was overloaded and has switched itself off; free the fingers and use a lower torque")
     if errors & ServoErrors.VOLTAGE:
-        texts.append(f"the supply gives {voltage:.1f} V, which is outside the servo's limits; check the power supply")
+        texts.append(f"the supply voltage of {voltage:.1f} V is outside the servo's limits; check the power supply")
     return "; ".join(texts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parameters of an EZGripper, checked."""
+"""Reads and checks the parameters of an EZGripper."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from modular_framework_ros.node_handle import NodeHandle
 from modular_framework_ros.parameter_declarations import parameters_below
 
 FULL_TORQUE = 800
-"""Torque that an intensity of 1 stands for at most, by the maker's advice [units of the servo]."""
+"""Maximum torque at an intensity of 1, as recommended by the manufacturer [servo units]."""
 
 STALE_PERIODS, STALE_S = 5.0, 0.1
-"""Age at which a measured position is stale: in periods of polling, and at least so much per servo on the line [s]."""
+"""Age of a stale position: number of polling periods, and minimum age per servo on the line [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class GripperSettings:
-    """Connection and behaviour of a gripper.
+    """Holds the settings of a gripper.
 
     Attributes:
-        port_name: serial port.
-        baudrate: [bit/s].
+        port_name: Name of the serial port.
+        baudrate: Baud rate of the serial line [bit/s].
         servo_ids: Dynamixel identifiers.
-        name: of the gripper, for messages.
-        poll_period_s: the servos are asked so often [s].
-        start_position: of the knuckle joint after calibration [rad].
-        start_torque: to get there [units of the servo].
-        link_timeout_s: a servo that has not answered for so long is out of reach [s].
-        reconnect_period_s: between two tries to reach a gripper that is not there [s].
-        fault_pause_s: a motor that has switched itself off is left alone for so long [s].
-        rules: when is arrived, when held up.
+        name: Name of the gripper in messages.
+        poll_period_s: Polling period of the servos [s].
+        start_position: Position of the knuckle joint after calibration [rad].
+        start_torque: Torque of the motion to the start position [servo units].
+        link_timeout_s: Time without a response after which a servo is unreachable [s].
+        reconnect_period_s: Time between two connection attempts [s].
+        fault_pause_s: Pause after a motor has switched itself off [s].
+        rules: Thresholds for reached goals and stalled fingers.
     """
 
     port_name: str
@@ -47,21 +47,21 @@ class GripperSettings:
     rules: GripRules = field(default_factory=GripRules)
 
 
-def read_gripper_settings(own: NodeHandle, root: NodeHandle) -> GripperSettings:
-    """The settings of the parameters that `parameters/EzGripperRobotHW.yaml` declares.
+def read_gripper_settings(gripper_nh: NodeHandle, root_nh: NodeHandle) -> GripperSettings:
+    """Returns the settings in the parameters declared in `parameters/EzGripperRobotHW.yaml`.
 
     Args:
-        own: namespace of the gripper.
-        root: namespace of port_name, baudrate, servo_ids and manipulator_name if `own` has no port_name.
+        gripper_nh: Node handle in the namespace of the gripper.
+        root_nh: Node handle of port_name, baudrate, servo_ids and manipulator_name if `gripper_nh` has no port_name.
 
     Raises:
-        ParameterError: lists all faults.
+        ParameterError: If parameters are missing or invalid; names each of them.
     """
-    place = "~" if own.has_param("port_name") else ""
-    connection = [place + key for key in ("port_name", "baudrate", "servo_ids", "manipulator_name")]
+    prefix = "~" if gripper_nh.has_param("port_name") else ""
+    connection = [prefix + key for key in ("port_name", "baudrate", "servo_ids", "manipulator_name")]
     behaviour = ("~poll_rate", "~start_position", "~link_timeout", "~position_tolerance", "~stall_time", "~hold_torque")
     port, baudrate, ids, name, rate, start_position, link_timeout_s, tolerance, stall_s, torque = parameters_below(
-        "modular_framework_drivers", "EzGripperRobotHW", own, root
+        "modular_framework_drivers", "EzGripperRobotHW", gripper_nh, root_nh
     ).values(*connection, *behaviour, required=connection[:1])
     period_s = 1.0 / rate
     return GripperSettings(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The register table of a Dynamixel MX-64 (protocol 1.0): registers, units and error bits.
+"""Defines the register table of a Dynamixel MX-64 (protocol 1.0): registers, units and error bits.
 
-Source: the public manual of the maker, ROBOTIS e-Manual, "MX-64" and "DYNAMIXEL Protocol 1.0".
+Source: manual of the manufacturer, ROBOTIS e-Manual, "MX-64" and "DYNAMIXEL Protocol 1.0".
 """
 
 from __future__ import annotations
@@ -11,34 +11,34 @@ from enum import IntFlag
 
 MODEL_NUMBER_MX64 = 310
 MODELS = {MODEL_NUMBER_MX64: "MX-64", 320: "MX-106"}
-"""Servos the gripper is sold with; their tables agree in what is used of them."""
+"""Servos with which the gripper is sold; the used registers of their tables agree."""
 TICKS_PER_TURN = 4096
 SPEED_UNIT_TICKS_S = 0.114 / 60.0 * TICKS_PER_TURN
-"""One unit of the speed registers, 0.114 turns a minute [ticks/s]."""
-TOP_SPEED_TICKS_S = 63.0 / 60.0 * TICKS_PER_TURN
-"""Speed without load at full torque and 12 V, 63 turns a minute [ticks/s]."""
+"""Unit of the speed registers, 0.114 revolutions per minute [ticks/s]."""
+MAX_SPEED_TICKS_S = 63.0 / 60.0 * TICKS_PER_TURN
+"""No-load speed at full torque and 12 V, 63 revolutions per minute [ticks/s]."""
 TICKS_PER_TORQUE = 8.0 / 32.0
-"""Distance from the goal position per unit of torque that the position control applies, with its initial gain 32."""
+"""Position error per unit of torque of the position control with the default gain of 32."""
 TORQUE_MAX = 1023
-"""Largest word of the torque registers: the full torque of the motor."""
-UNWATCHED_TORQUE = 100
-"""Torque that the motor may apply for any length of time, by its maker."""
-WARM = 70.0
-"""Temperature from which on a user should know of it [deg C]; the motor switches itself off at 80."""
-CLOCKWISE = 1 << 10
-"""Bit of the speed, load and torque words that holds the direction."""
+"""Maximum value of the torque registers: the full torque of the motor."""
+SUSTAINED_TORQUE = 100
+"""Torque that the motor can sustain indefinitely, according to the manufacturer."""
+WARNING_TEMPERATURE = 70.0
+"""Temperature from which on a warning is logged [deg C]; the motor switches itself off at 80 deg C."""
+CLOCKWISE_BIT = 1 << 10
+"""Direction bit of the speed, load and torque registers."""
 MULTI_TURN_LIMIT = 4095
-"""Both angle limits at this word: positions go on beyond one turn, signed."""
+"""Value of both angle limits that selects multi-turn mode, which has signed positions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """A register in a servo's table.
+    """Describes a register of a servo.
 
     Attributes:
-        address: first byte.
-        size: bytes; the low one comes first.
-        name: as in the manual.
+        address: Address of the first byte.
+        size: Number of bytes, in little-endian order.
+        name: Name in the manual.
     """
 
     address: int
@@ -81,11 +81,11 @@ GOAL_TORQUE = Register(71, 2, "Goal Torque")
 GOAL_ACCELERATION = Register(73, 1, "Goal Acceleration")
 
 READING = Register(PRESENT_POSITION.address, 8, "Present Position to Present Temperature")
-"""Everything measured, in one go."""
+"""All measurements as one register, for a single read."""
 
 
 class ServoErrors(IntFlag):
-    """Bits of the error byte of a status packet."""
+    """Error bits of a status packet."""
 
     NONE = 0
     VOLTAGE = 1
@@ -98,20 +98,20 @@ class ServoErrors(IntFlag):
 
 
 MOTOR_FAULTS = ServoErrors.VOLTAGE | ServoErrors.OVERHEATING | ServoErrors.OVERLOAD
-"""Errors of the motor, which last; the others belong to one instruction."""
+"""Errors of the motor, which persist; the other errors concern a single instruction."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Measurements of a servo.
+    """Holds the measurements of a servo.
 
     Attributes:
-        position: [ticks], signed in multi-turn mode.
-        speed: counter-clockwise positive [ticks/s].
-        load: share of the motor's torque, counter-clockwise positive, in [-1, 1]; inferred, not measured.
-        voltage: [V].
-        temperature: [deg C].
-        errors: error bits of the packet it came with.
+        position: Shaft position [ticks], signed in multi-turn mode.
+        speed: Shaft speed, counter-clockwise positive [ticks/s].
+        load: Fraction of the full torque in [-1, 1], counter-clockwise positive; inferred by the servo.
+        voltage: Supply voltage [V].
+        temperature: Temperature of the motor [deg C].
+        errors: Error bits of the packet.
     """
 
     position: int
@@ -123,31 +123,31 @@ class Reading:
 
 
 def from_bytes(data: bytes | bytearray) -> int:
-    """The word of some bytes, low byte first."""
+    """Returns the unsigned number in little-endian bytes."""
     return int.from_bytes(data, "little")
 
 
 def signed(word: int) -> int:
-    """A word of 16 bits as a signed number (positions in multi-turn mode)."""
+    """Returns a 16-bit word as a signed number, such as a position in multi-turn mode."""
     return word - 0x10000 if word & 0x8000 else word
 
 
-def directed(word: int) -> int:
-    """A word with a direction bit (speed, load, torque) as a number, counter-clockwise positive."""
-    return -(word & (CLOCKWISE - 1)) if word & CLOCKWISE else word & (CLOCKWISE - 1)
+def from_direction_word(word: int) -> int:
+    """Returns a word with a direction bit (speed, load, torque) as a number, counter-clockwise positive."""
+    return -(word & (CLOCKWISE_BIT - 1)) if word & CLOCKWISE_BIT else word & (CLOCKWISE_BIT - 1)
 
 
 def direction_word(value: int) -> int:
-    """The word of a speed, load or torque, counter-clockwise positive."""
-    return CLOCKWISE | -value if value < 0 else value
+    """Returns the word with a direction bit for a speed, load or torque, counter-clockwise positive."""
+    return CLOCKWISE_BIT | -value if value < 0 else value
 
 
 def parse_reading(data: bytes, errors: ServoErrors) -> Reading:
-    """Parses the eight bytes of `READING`."""
+    """Parses the eight bytes of the register READING."""
     return Reading(
         signed(from_bytes(data[0:2])),
-        directed(from_bytes(data[2:4])) * SPEED_UNIT_TICKS_S,
-        directed(from_bytes(data[4:6])) / TORQUE_MAX,
+        from_direction_word(from_bytes(data[2:4])) * SPEED_UNIT_TICKS_S,
+        from_direction_word(from_bytes(data[4:6])) / TORQUE_MAX,
         data[6] / 10.0,
         float(data[7]),
         errors,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Grasp action of an EZGripper without ROS controllers: one node drives the servos itself."""
+"""Serves the Grasp action of an EZGripper without ROS controllers: the node drives the servos directly."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from modular_framework_ros.ros_node_handle import RosNodeHandle
 POLL_S = 0.01
 STOP_TIMEOUT_S = 1.0
 STANDSTILL_SPEED, STANDSTILL_S = 0.05, 0.1
-PRESSING_SHARE = 0.5
-"""Share of the allowed torque from which on the fingers count as pressing."""
+PRESSING_FRACTION = 0.5
+"""Minimum fraction of the allowed torque at which the fingers press on an object."""
 
 
 class EzGripperManipulator:
-    """Moves the gripper for the grasp server, and publishes its joint.
+    """Moves the gripper for the grasp server and publishes the state of the knuckle joint.
 
-    Publishers: `joint_states` (sensor_msgs/JointState), as long as the servos answer.
+    Publishers: `joint_states` (sensor_msgs/JointState), as long as the servos respond.
 
     Args:
-        gripper: the device.
-        joint: name of the knuckle joint.
+        gripper: Gripper device.
+        joint: Name of the knuckle joint.
     """
 
     def __init__(self, gripper: EzGripper, joint: str) -> None:
@@ -45,13 +45,13 @@ class EzGripperManipulator:
         self._publisher: rospy.Publisher | None = None
 
     def connect(self) -> None:
-        """Begins to connect the gripper and to publish."""
+        """Starts to connect the gripper and to publish."""
         self._gripper.start()
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=10)
         threading.Thread(target=self._publish, name="joint_states", daemon=True).start()
 
     def joint_state(self, names: Mapping[str, float]) -> JointState:
-        """Returns the joint as measured last."""
+        """Returns the last measured joint state."""
         del names
         return self._message(self._gripper.state())
 
@@ -59,30 +59,32 @@ class EzGripperManipulator:
         """Moves the fingers until they stand still at their goal or hold an object.
 
         Raises:
-            GraspCommandError: the gripper has a fault or may use no torque, the time is over, or a stop was requested.
+            GraspCommandError: If the gripper has a fault or zero torque, the time is over, or a stop is requested.
         """
         torque = self._gripper.settings.start_torque
         if self._joint in motion.efforts:
             torque = round(motion.efforts[self._joint] * FULL_TORQUE)
             refuse_no_effort(self._joint, torque)
-        before = self._gripper.state()
-        self._refuse_fault(before)
-        position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)  # forgives rounding
-        number = self._gripper.command(position, torque)
+        initial_state = self._gripper.state()
+        self._refuse_fault(initial_state)
+        position = min(max(motion.targets[self._joint], 0.0), CLOSED_POSITION)  # tolerates rounding errors
+        goal_number = self._gripper.command(position, torque)
         end_s = time.monotonic() + motion.timeout_s
         # an object that the fingers hold may give way to the new torque
         standstill = StandstillDetector(STANDSTILL_SPEED, STANDSTILL_S)
         while True:
             state = self._gripper.state()
             self._refuse_fault(state)
-            if state.faults != before.faults:  # a fault between two reads may have cancelled the goal
+            if state.faults != initial_state.faults:  # a fault between two reads may have cancelled the goal
                 self._stop()
                 raise GraspCommandError(state.last_fault)
             if motion.stop_requested():
                 self._stop()
                 raise GraspCommandError("stopped on request")
-            stands = state.goal.number == number and standstill.update(state.reading.velocity, state.stamp_s)
-            if stands and state.motion is not Motion.MOVING:
+            stands_still = state.goal.goal_number == goal_number and standstill.update(
+                state.reading.velocity, state.stamp_s
+            )
+            if stands_still and state.motion is not Motion.MOVING:
                 return self._outcome(state)
             if time.monotonic() > end_s:
                 self._stop()
@@ -94,15 +96,15 @@ class EzGripperManipulator:
 
     def _outcome(self, state: GripperState) -> Outcome:
         reading, held = state.reading, state.motion is Motion.HOLDING
-        does = "press" if held else "stand"
+        state_text = "press" if held else "stand"
         allowed = min(state.goal.torque, self._gripper.settings.rules.hold_torque)
         pressing = (
-            held and allowed >= CALIBRATION_TORQUE and (abs(reading.load) * TORQUE_MAX >= PRESSING_SHARE * allowed)
+            held and allowed >= CALIBRATION_TORQUE and (abs(reading.load) * TORQUE_MAX >= PRESSING_FRACTION * allowed)
         )
         return Outcome(
             {self._joint: reading.position},
             held,
-            f"the fingers {does} at {reading.position:.4f} rad with {reading.load:.0%} torque",
+            f"the fingers {state_text} at {reading.position:.4f} rad with {reading.load:.0%} torque",
             pressing,
         )
 
@@ -111,13 +113,15 @@ class EzGripperManipulator:
             raise GraspCommandError(state.fault)
 
     def _stop(self) -> None:
-        """Stops the fingers, and waits until they stand still."""
+        """Stops the fingers and waits until they stand still."""
         self._gripper.stop()
-        asked_s = time.monotonic()
+        requested_s = time.monotonic()
         standstill = StandstillDetector(STANDSTILL_SPEED, STANDSTILL_S)
-        while time.monotonic() < asked_s + STOP_TIMEOUT_S:
+        while time.monotonic() < requested_s + STOP_TIMEOUT_S:
             state = self._gripper.state()
-            if state.fault or (state.stamp_s > asked_s and standstill.update(state.reading.velocity, state.stamp_s)):
+            if state.fault or (
+                state.stamp_s > requested_s and standstill.update(state.reading.velocity, state.stamp_s)
+            ):
                 return
             time.sleep(POLL_S)
         rospy.logwarn(
@@ -143,21 +147,23 @@ class EzGripperManipulator:
 
 
 def gripper_group(joint: str) -> Group:
-    """The planning group of the gripper: one joint; its effort is counted in shares of the full torque."""
+    """Returns the planning group of the gripper: one joint, with efforts as fractions of the full torque."""
     knuckle = Joint(joint, "revolute", "", "", 0.0, CLOSED_POSITION, 1.0, "")
     return Group("ezgripper", (knuckle,), "", {"closed": {joint: CLOSED_POSITION}})
 
 
 def main() -> int:
-    """Runs the node `ezgripper_grasp_action_server`; raises ParameterError when its parameters are wrong.
+    """Runs the node `ezgripper_grasp_action_server`.
 
-    A gripper that is not there, or has a fault, does not end the node: goals are aborted with the reason until it is
-    back.
+    An absent or faulty gripper does not end the node: goals are aborted with the reason until the gripper is usable.
 
-    Parameters: see `parameters/ezgripper_grasp_action_server.yaml`. A goal's `max_torque` is in units of the servo, of
-    which no more than 800 are used.
+    Parameters: see `parameters/ezgripper_grasp_action_server.yaml`. The `max_torque` of a goal is in servo units and is
+    limited to 800.
 
     Publishers: `joint_states`.
+
+    Raises:
+        ParameterError: If a parameter is missing or invalid.
     """
     rospy.init_node("ezgripper_grasp_action_server")
     settings = read_gripper_settings(RosNodeHandle("~"), RosNodeHandle("/"))

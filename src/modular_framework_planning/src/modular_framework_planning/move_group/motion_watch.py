@@ -133,9 +133,7 @@ class WatchedMotion:
         if not others or self._watch is None:
             return
         with self._watching:
-            hit = self._watch.robot_collision(
-                self._as_planned(self._context.monitor.snapshot()), others, TIME_SHIFTS_S
-            )
+            hit = self._watch.robot_collision(self._as_planned(self._context.monitor.snapshot()), others, TIME_SHIFTS_S)
         if hit is not None:
             raise PlanningError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
