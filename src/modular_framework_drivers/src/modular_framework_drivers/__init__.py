@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Real devices of the framework and emulators of them."""
+"""Drivers of real devices, and emulators of these devices."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Devices in software: they speak the wire protocols of the real ones and take faults on command."""
+"""Emulated devices, which use the wire protocols of the real devices and simulate faults on command."""

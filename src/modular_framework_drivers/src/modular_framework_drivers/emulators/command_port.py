@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A TCP port for commands to an emulator, by which tests and users inject faults.
+"""Serves commands to an emulator over TCP, with which tests and users inject faults.
 
-Text lines over TCP, on the loopback interface if no other is given: `command key=value ...`; one line is the answer to
-each, `ok ...` or `error ...`. `help` lists the commands. From a shell: `echo unplug | nc 127.0.0.1 29900`.
+A command is a text line `command key=value ...`, by default on the loopback interface; the response is one line,
+`ok ...` or `error ...`. `help` lists the commands. Example in a shell: `echo unplug | nc 127.0.0.1 29900`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Value = bool | int | float | str
 
 
 class CommandError(Exception):
-    """A command cannot be carried out; the text says what is allowed."""
+    """Raised if a command cannot be executed; the text gives the cause."""
 
 
 def parse_value(text: str) -> Value:
-    """Parses a value: true, false, an integer, a number, or else the text itself."""
+    """Parses a value: true, false, an integer or a number; any other text is returned unchanged."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -36,17 +36,17 @@ def parse_value(text: str) -> Value:
 
 
 def run_command(commands: Mapping[str, Command], line: str) -> str:
-    """Carries out one line.
+    """Executes the command in one line.
 
     Args:
-        commands: what can be done, by name; a docstring's first line is its help.
-        line: `name key=value ...`.
+        commands: Commands by name; the first line of a docstring is the help text.
+        line: Command line `name key=value ...`.
 
     Returns:
-        What the command answered, "" for nothing.
+        The response of the command; "" for none.
 
     Raises:
-        CommandError: unknown command, bad arguments, or the command refused.
+        CommandError: If the command is unknown, has invalid arguments or fails.
     """
     line = line.strip()
     name, *words = line.split()
@@ -76,12 +76,12 @@ def _first_line(function: Command) -> str:
 
 
 class CommandPort:
-    """Serves the commands of one emulator; each connection has a thread of its own.
+    """Serves the commands of one emulator, with a thread per connection.
 
     Args:
-        commands: what can be done, by name. Runs on a thread of the port: a command takes its own locks.
-        port: TCP port; 0 for any free one.
-        address: where to listen.
+        commands: Commands by name; called on threads of the port, so each command must acquire its own locks.
+        port: TCP port; 0 for any free port.
+        address: Address of the interface.
     """
 
     def __init__(self, commands: Mapping[str, Command], port: int = 0, address: str = LOOPBACK) -> None:
@@ -91,14 +91,14 @@ class CommandPort:
 
     @property
     def port(self) -> int:
-        """The TCP port; the one asked for until `connect`."""
+        """Returns the TCP port; before `connect`, the requested port."""
         return int(self._server.server_address[1]) if self._server is not None else self._wanted[1]
 
     def connect(self) -> None:
         """Opens the port.
 
         Raises:
-            OSError: the port is taken; the text names it.
+            OSError: If the port is in use; the text names the port.
         """
         commands = self._commands
 
@@ -121,7 +121,7 @@ class CommandPort:
         threading.Thread(target=self._server.serve_forever, args=(0.05,), name="command_port", daemon=True).start()
 
     def close(self) -> None:
-        """Stops listening. May be called twice."""
+        """Closes the port; may be called twice."""
         server, self._server = self._server, None
         if server is not None:
             server.shutdown()
@@ -129,7 +129,7 @@ class CommandPort:
 
 
 def answer(commands: Mapping[str, Command], line: str) -> str:
-    """Returns the line that answers a command."""
+    """Returns the response line to a command line."""
     if not line.strip():
         return "error: empty line; `help` lists the commands"
     try:
@@ -142,18 +142,18 @@ def send_command(port: int, command: str, address: str = LOOPBACK, timeout_s: fl
     """Sends one command to a running emulator.
 
     Args:
-        port: its command port.
-        command: name of the command.
-        address: where it runs.
-        timeout_s: longest wait for the answer [s].
-        arguments: of the command.
+        port: Command port of the emulator.
+        command: Name of the command.
+        address: Address of the emulator.
+        timeout_s: Timeout of the response [s].
+        arguments: Arguments of the command.
 
     Returns:
-        What it answered after `ok`.
+        The response after `ok`.
 
     Raises:
-        CommandError: it refused.
-        OSError: nobody listens, or no answer in time.
+        CommandError: If the command failed.
+        OSError: If the emulator cannot be reached or does not respond in time.
     """
     words = [
         command,

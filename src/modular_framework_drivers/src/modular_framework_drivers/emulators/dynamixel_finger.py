@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Model of the mechanics behind an emulated gripper servo: motor, fingers with their two stops, and possibly an object.
+"""Simulates the mechanics of an emulated gripper servo: motor, fingers with two end stops, and an optional object.
 
-A simple model, enough for what a driver sees: speed follows the motor's duty with one time constant, friction eats a
-share of the duty, and contacts push back like a spring.
+The model is simple but sufficient for a driver: the speed follows the motor's duty with one time constant, friction
+takes up a fraction of the duty, and contacts act like springs.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ STEP_S = 0.002
 
 @dataclass(frozen=True, slots=True)
 class FingerModel:
-    """Parameters of the model.
+    """Holds the parameters of the model.
 
     Attributes:
-        closed_ticks: shaft angle at which the pads meet [ticks], any turn.
-        travel_ticks: from there to the stop of the open fingers [ticks].
-        shut_ticks: fingers that are open less than this count as shut [ticks].
-        object_room_ticks: fingers take up an offered object once they are open this much wider than it [ticks].
-        top_speed: without load at full duty [ticks/s]; an MX-64 at 12 V turns 63 times a minute.
-        time_constant_s: of the speed [s].
-        torque_mode_gain: how much faster the same word makes it without load in torque control mode, where the motor's
-            current is held and its voltage rises with its speed.
-        friction: duty that only just does not move anything, in [0, 1].
-        stiffness: of stops and objects: duty a tick of pressing in takes [1/tick].
-        overload_share: duty that is an overload when it lasts, in [0, 1].
-        overload_s: how long it lasts until then [s].
-        room_temperature: [deg C].
-        heating: at full duty without motion [K/s].
-        cooling: share of the excess over the room lost [1/s].
+        closed_ticks: Shaft angle of closed pads [ticks], in any revolution.
+        travel_ticks: Travel from closed pads to the stop of the open fingers [ticks].
+        shut_ticks: Maximum opening of closed fingers [ticks].
+        object_room_ticks: Minimum clearance around an object that appears between the fingers [ticks].
+        top_speed: No-load speed at full duty [ticks/s]; 63 revolutions per minute for an MX-64 at 12 V.
+        time_constant_s: Time constant of the speed [s].
+        torque_mode_gain: Ratio of the no-load speeds in torque control mode and in position control at equal torque
+            words; torque control holds the current, so the voltage rises with the speed.
+        friction: Maximum duty without motion, in [0, 1].
+        stiffness: Stiffness of stops and objects: duty per tick of penetration [1/tick].
+        overload_share: Minimum duty of an overload, in [0, 1].
+        overload_s: Minimum duration of an overload [s].
+        room_temperature: Temperature of the room [deg C].
+        heating: Temperature rise at full duty without motion [K/s].
+        cooling: Fraction of the excess over the room temperature lost per second [1/s].
     """
 
     closed_ticks: float = -150.0
@@ -56,12 +56,12 @@ class FingerModel:
 
 
 class Finger:
-    """The moving part behind one servo; `advance` lets time pass and writes what the servo measures.
+    """Simulates the moving parts of one servo; `advance` writes the measurements to the servo.
 
     Args:
-        servo: whose registers command it.
-        model: parameters of the model.
-        opening: initial position, counted from the closed fingers [ticks].
+        servo: Servo whose registers contain the commands.
+        model: Parameters of the model.
+        opening: Initial opening from the closed fingers [ticks].
     """
 
     def __init__(self, servo: DynamixelServo, model: FingerModel | None = None, opening: float = 400.0) -> None:
@@ -79,11 +79,11 @@ class Finger:
 
     @property
     def opening(self) -> float:
-        """Opening of the fingers from the closed stop [ticks]."""
+        """Returns the opening of the fingers from the closed stop [ticks]."""
         return self.angle - self.model.closed_ticks
 
     def advance(self, duration_s: float) -> None:
-        """Simulates this time [s], in steps that the stiff contacts need."""
+        """Simulates a time [s] in steps that are short enough for the stiff contacts."""
         self._left_s += duration_s
         while self._left_s >= STEP_S:
             self._left_s -= STEP_S
@@ -92,7 +92,7 @@ class Finger:
         self._publish()
 
     def _take_offered(self) -> None:
-        """Places an offered object between the fingers once they have been closed, as for calibration, and are open."""
+        """Places an offered object between open fingers once they have been closed, as during the calibration."""
         self._was_shut |= self.opening < self.model.shut_ticks
         if (
             self.offered_opening is not None
@@ -102,7 +102,7 @@ class Finger:
             self.object_opening, self.offered_opening = self.offered_opening, None
 
     def power_cycle(self) -> None:
-        """Resets the servo's count of turns after a loss of power: the encoder measures one turn only."""
+        """Resets the revolution count after a loss of power: the encoder measures a single revolution."""
         turns = math.floor(self.angle / mx64.TICKS_PER_TURN) * mx64.TICKS_PER_TURN
         self.angle -= turns
         self.model = replace(self.model, closed_ticks=self.model.closed_ticks - turns)
@@ -120,7 +120,7 @@ class Finger:
         self._heat(period_s)
 
     def _wanted_duty(self) -> float:
-        """Duty of the motor, counter-clockwise (opening) positive."""
+        """Returns the duty of the motor, counter-clockwise (opening) positive."""
         servo = self.servo
         limit = servo.get(mx64.TORQUE_LIMIT) / mx64.TORQUE_MAX
         if not servo.get(mx64.TORQUE_ENABLE):
@@ -133,7 +133,7 @@ class Finger:
         return max(-limit, min(limit, wanted))
 
     def _resistance(self) -> float:
-        """Duty that stops and object take up, positive against opening."""
+        """Returns the duty taken up by the stops and the object, positive against opening."""
         model, opening = self.model, self.opening
         lower = 0.0 if self.object_opening is None else max(0.0, self.object_opening)
         return model.stiffness * (min(0.0, opening - lower) + max(0.0, opening - model.travel_ticks))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shared parts of the emulator nodes: their main function, and the commands as ROS services."""
+"""Provides the main function of the emulator nodes, and their commands as ROS services."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from modular_framework_ros.node_handle import ParameterError
 
 
 class EmulatorNode(Protocol):
-    """The node of an emulator."""
+    """Interface of an emulator node."""
 
     def connect(self) -> None:
-        """Opens what clients connect to."""
+        """Opens the ports and services for clients."""
 
     def run(self) -> None:
         """Serves until the node is shut down."""
 
 
 def run_emulator(name: str, make_node: Callable[[], EmulatorNode]) -> int:
-    """Runs an emulator until ROS ends it.
+    """Runs an emulator until ROS shuts down.
 
     Args:
-        name: of the ROS node.
-        make_node: reads its parameters.
+        name: Name of the ROS node.
+        make_node: Callback that reads the parameters and returns the node.
 
     Returns:
-        The exit code: 1 when a parameter is wrong or a port is taken, which is logged.
+        The exit code: 1 if a parameter is invalid or a port is in use; the cause is logged.
     """
     rospy.init_node(name)
     try:
@@ -46,7 +46,7 @@ def run_emulator(name: str, make_node: Callable[[], EmulatorNode]) -> int:
 
 
 def offer_commands(commands: Mapping[str, Command]) -> list[rospy.Service]:
-    """Advertises `~<command>` (std_srvs/Trigger) for every command that needs no argument."""
+    """Advertises `~<command>` (std_srvs/Trigger) for every command without required arguments."""
     return [
         rospy.Service(f"~{name}", Trigger, _CommandService(command))
         for name, command in commands.items()
@@ -55,7 +55,7 @@ def offer_commands(commands: Mapping[str, Command]) -> list[rospy.Service]:
 
 
 class _CommandService:
-    """A command as the callback of a service."""
+    """Callback of a service that runs a command."""
 
     def __init__(self, command: Command) -> None:
         self._command = command

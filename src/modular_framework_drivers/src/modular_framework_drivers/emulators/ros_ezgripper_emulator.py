@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An emulated EZGripper on a pseudo-terminal, as a ROS node."""
+"""Runs an emulated EZGripper on a pseudo-terminal as a ROS node."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from modular_framework_drivers.ezgripper.gripper_settings import read_gripper_se
 from modular_framework_ros.declared_parameters import DeclaredParameters
 from modular_framework_ros.ros_node_handle import RosNodeHandle
 
-_PRIORITY = 40  # the thread of the serial line gets 30, like the emulated arm
+_PRIORITY = 40  # the thread of the serial line has 30, as in the emulated arm
 
 
 class EzGripperEmulatorNode:
     """Node `ezgripper_emulator`.
 
-    Parameters: see `parameters/ezgripper_emulator.yaml`; the path `~port_name` is where the serial port is found. The
-    object is between the fingers once they have been shut and opened.
+    Parameters: see `parameters/ezgripper_emulator.yaml`; `~port_name` is the path of the serial port. The object
+    appears between the fingers once they have closed and opened.
 
-    Services (std_srvs/Trigger): `~<command>` for every command that needs no argument.
+    Services (std_srvs/Trigger): `~<command>` for every command without required arguments.
     """
 
     def __init__(self) -> None:
@@ -45,10 +45,10 @@ class EzGripperEmulatorNode:
         self._services: list[rospy.Service] = []
 
     def connect(self) -> None:
-        """Plug the line in, listen, and offer the services.
+        """Connects the serial line, opens the command port and advertises the services.
 
         Raises:
-            OSError: the path or the command port is taken; the text names it.
+            OSError: If the path or the command port is in use; the text names it.
         """
         self._commands.connect()
         self._line.connect()
@@ -58,8 +58,8 @@ class EzGripperEmulatorNode:
         )
 
     def run(self) -> None:
-        """Serves until the node is shut down, in real time where that is permitted, then pulls the plug."""
-        run_in_real_time(_PRIORITY)  # a servo answers on time, however busy the computer is
+        """Serves until the node is shut down, in real time if permitted, then disconnects the serial line."""
+        run_in_real_time(_PRIORITY)  # servos respond on time even on a busy computer
         rospy.spin()
         self._commands.close()
         self._line.close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The emulated controller of a UR arm as a ROS node."""
+"""Runs the emulated controller of a UR arm as a ROS node."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class UrEmulatorNode:
 
     Parameters: see `parameters/ur_emulator.yaml`.
 
-    Services (std_srvs/Trigger): `~<command>` for every command that needs no argument; the others are available at the
-    command port only.
+    Services (std_srvs/Trigger): `~<command>` for every command without required arguments; the other commands are only
+    available at the command port.
     """
 
     def __init__(self) -> None:
@@ -25,10 +25,10 @@ class UrEmulatorNode:
         self._emulator = UrEmulator(*arm)
 
     def connect(self) -> None:
-        """Listen, and offer the services.
+        """Opens the ports and advertises the services.
 
         Raises:
-            OSError: a port is taken; the text names it.
+            OSError: If a port is in use; the text names the port.
         """
         self._emulator.connect()
         if self._log:
@@ -36,7 +36,7 @@ class UrEmulatorNode:
         offer_commands(self._emulator.commands)
 
     def run(self) -> None:
-        """Serve until the node is shut down."""
+        """Serves until the node is shut down."""
         rospy.on_shutdown(self._emulator.stop)
         self._emulator.run()
         self._emulator.close()

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The effect of the program that ur-rtde uploads to a controller, without an interpreter of URScript.
+"""Emulates the program that ur-rtde uploads to a controller, without interpreting URScript.
 
-ur-rtde's control script reads a command from an integer register and its arguments from the registers beside it, every
-cycle. Streamed commands are carried out at once. Any other is carried out when the register changes from none to it;
-the script then reports that in its state register and waits until the command is cleared. The numbers of the commands
-and the registers are those of ur-rtde 1.6.
+In every cycle, ur-rtde's control script reads a command from an integer register and its arguments from the adjacent
+registers. Streamed commands run in every cycle. Any other command runs once, when the register changes from NONE to the
+command; then the script reports completion in its state register and waits until the command is cleared. The numbers of
+the commands and the registers are those of ur-rtde 1.6.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ READY, DONE = 1, 2
 
 
 class Command(IntEnum):
-    """Commands of the control script that the emulator carries out."""
+    """Emulated commands of the control script."""
 
     NONE = 0
     MOVEJ = 1
@@ -49,15 +49,15 @@ _STREAMED = (Command.SPEEDJ, Command.SERVOJ, Command.GET_STEPTIME)
 
 
 class UnknownProgramError(Exception):
-    """A program was uploaded that the emulator does not know."""
+    """Raised if an uploaded program is not ur-rtde's control script."""
 
 
 class ControlScript:
-    """The running control script.
+    """Emulates the running control script.
 
     Args:
-        controller: what it runs on.
-        offset: first of the registers it uses.
+        controller: Controller that runs the script.
+        offset: Index of the first used register.
     """
 
     def __init__(self, controller: UrController, offset: int = 0) -> None:
@@ -72,10 +72,10 @@ class ControlScript:
 
     @classmethod
     def from_text(cls, controller: UrController, text: str) -> ControlScript:
-        """The script of an upload.
+        """Returns the script in an uploaded text.
 
         Raises:
-            UnknownProgramError: it is another program; the emulator does not interpret URScript.
+            UnknownProgramError: If the text is another program, as the emulator does not interpret URScript.
         """
         heading = _HEADING.search(text)
         if _MARK not in text:
@@ -85,7 +85,7 @@ class ControlScript:
         return cls(controller, int(offset.group(1)) if offset else 0)
 
     def cycle(self) -> bool:
-        """Runs its main loop once; returns False when it is stopped."""
+        """Runs one cycle of the script; returns False once the script has ended."""
         if self._moving:
             if not self._controller.motion.finished:
                 return True
@@ -126,7 +126,7 @@ class ControlScript:
             self._controller.outputs.doubles[self._offset] = self._controller.period_s
 
     def _execute(self, command: int) -> bool:
-        """Begins a command that is not streamed; returns False when the program ends."""
+        """Starts a command that is not streamed; returns False if the program ends."""
         controller = self._controller
         match command:
             case Command.STOP_SCRIPT:
@@ -166,10 +166,10 @@ class ControlScript:
 
 
 class ProgramReceiver:
-    """Collects the text that arrives on a script port and starts the programs in it.
+    """Collects the text received on a script port and starts the programs in this text.
 
     Args:
-        controller: what the programs are for.
+        controller: Controller that runs the programs.
     """
 
     def __init__(self, controller: UrController) -> None:
@@ -177,7 +177,7 @@ class ProgramReceiver:
         self._text = ""
 
     def receive(self, data: bytes) -> None:
-        """Adds received data; a program ends with a line `end`, a single command with its line."""
+        """Adds received data; a program ends with a line `end`, a single command at the end of its line."""
         self._text += data.decode("utf-8", errors="replace")
         while "\n" in self._text:
             if not self._text.startswith(("def ", "sec ")):

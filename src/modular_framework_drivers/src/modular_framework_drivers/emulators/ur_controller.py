@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The state of an emulated UR controller: arm, modes, registers, and the program that runs on it."""
+"""Holds the state of an emulated UR controller: arm, modes, registers, and the running program."""
 
 from __future__ import annotations
 
@@ -49,22 +49,22 @@ _SAFETY_BITS = {
 
 
 class Program(Protocol):
-    """A program on the controller."""
+    """Interface of a program on the controller."""
 
     name: str
 
     def cycle(self) -> bool:
-        """Runs for one cycle; False when it has ended."""
+        """Runs for one cycle; returns False once the program has ended."""
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A kind of controller.
+    """Describes a model of the controller.
 
     Attributes:
-        name: as the dashboard says it.
-        version: of the software: major, minor, bugfix, build.
-        frequency: cycles per second.
+        name: Model name in the dashboard.
+        version: Software version: major, minor, bugfix, build.
+        frequency: Control frequency [Hz].
     """
 
     name: str
@@ -77,19 +77,19 @@ MODELS = {"UR5": Model("UR5", (3, 15, 8, 106339), 125.0), "UR5e": Model("UR5", (
 
 @dataclass(slots=True)
 class Registers:
-    """The general purpose registers that programs and RTDE clients talk through."""
+    """Holds the general purpose registers through which programs and RTDE clients communicate."""
 
     ints: list[int] = field(default_factory=lambda: [0] * REGISTERS)
     doubles: list[float] = field(default_factory=lambda: [0.0] * REGISTERS)
 
 
 class UrController:
-    """Controller and arm.
+    """Emulates a controller and its arm.
 
     Args:
-        model: kind of controller.
-        positions: joint positions at the beginning [rad].
-        unlock_delay_s: how long after a protective stop it cannot be unlocked; 5 s on the real one [s].
+        model: Model of the controller.
+        positions: Initial joint positions [rad].
+        unlock_delay_s: Minimum time from a protective stop to its release [s]; 5 s on a real controller.
     """
 
     def __init__(self, model: Model, positions: Sequence[float], unlock_delay_s: float = 5.0) -> None:
@@ -113,38 +113,38 @@ class UrController:
 
     @property
     def period_s(self) -> float:
-        """Duration of a cycle [s]."""
+        """Returns the period of a cycle [s]."""
         return 1.0 / self.model.frequency
 
     @property
     def target_positions(self) -> Sequence[float]:
-        """Commanded positions of the joints [rad]."""
+        """Returns the commanded joint positions [rad]."""
         command = self.motion.command
         return command.target if command.drive in (Drive.SERVO, Drive.MOVE) else self.motion.positions
 
     @property
     def streamed(self) -> bool:
-        """Whether the joints follow positions that a client streams."""
+        """Returns whether the joints follow positions streamed by a client."""
         return self.motion.command.drive is Drive.SERVO
 
     @property
     def speed_scaling(self) -> float:
-        """Share of its pace at which the program moves the arm, beside the slider: 1, or 0 while it is paused."""
+        """Returns the speed scaling factor of the program, besides the slider: 1, or 0 during a pause."""
         return 0.0 if self.runtime_state is RuntimeState.PAUSED else 1.0
 
     @property
     def safety_status_bits(self) -> int:
-        """`safety_status_bits` of RTDE."""
+        """Returns `safety_status_bits` of RTDE."""
         return _SAFETY_BITS[self.safety_mode]
 
     @property
     def robot_status_bits(self) -> int:
-        """`robot_status_bits` of RTDE."""
+        """Returns `robot_status_bits` of RTDE."""
         powered = self.robot_mode is not RobotMode.POWER_OFF
         return int(powered) | int(self.runtime_state is RuntimeState.PLAYING) << 1
 
     def cycle(self) -> None:
-        """Runs program and arm for one cycle."""
+        """Runs the program and the arm for one cycle."""
         self.time_s += self.period_s
         if self.program is not None and self.runtime_state is RuntimeState.PLAYING and not self.program.cycle():
             self.stop_program()
@@ -160,7 +160,7 @@ class UrController:
             self.on_cycle()
 
     def start_program(self, program: Program) -> bool:
-        """Runs a program in place of what runs, whose motion ends; False when the arm is not ready for one."""
+        """Runs a program and ends the previous program and its motion; returns False if the arm is not ready."""
         if self.robot_mode is not RobotMode.RUNNING or self.safety_mode is not SafetyMode.NORMAL:
             LOGGER.warning(
                 "program %s not started: robot mode %s, safety mode %s",
@@ -181,7 +181,7 @@ class UrController:
         self.motion.set_command(MotionCommand(Drive.STOP, acceleration=PROTECTIVE_STOP_DECELERATION))
 
     def pause(self) -> bool:
-        """Pause the program; False when none plays."""
+        """Pauses the program; returns False if no program is playing."""
         if self.runtime_state is not RuntimeState.PLAYING:
             return False
         self.runtime_state = RuntimeState.PAUSED
@@ -195,14 +195,14 @@ class UrController:
         return True
 
     def protective_stop(self) -> None:
-        """Stops as for a collision; the program ends."""
+        """Stops the arm as after a collision, and ends the program."""
         self.stop_program()
         if self.safety_mode is SafetyMode.NORMAL:
             self.safety_mode = SafetyMode.PROTECTIVE_STOP
             self._stopped_at_s = self.time_s
 
     def unlock(self) -> bool:
-        """Release the protective stop; False while it is too early."""
+        """Releases the protective stop; returns False before the unlock delay has passed."""
         if self.time_s - self._stopped_at_s < self._unlock_delay_s:
             return False
         if self.safety_mode is SafetyMode.PROTECTIVE_STOP:
@@ -210,18 +210,18 @@ class UrController:
         return True
 
     def emergency_stop(self) -> None:
-        """Press the red button: power is cut."""
+        """Presses the emergency stop button, which cuts the power."""
         self.stop_program()
         self.safety_mode = SafetyMode.ROBOT_EMERGENCY_STOP
         self.robot_mode = RobotMode.POWER_OFF
 
     def release_emergency_stop(self) -> None:
-        """Pull the red button; the arm stays without power."""
+        """Releases the emergency stop button; the arm remains without power."""
         if self.safety_mode is SafetyMode.ROBOT_EMERGENCY_STOP:
             self.safety_mode = SafetyMode.NORMAL
 
     def power_on(self) -> None:
-        """Switches the arm on, with its brakes closed."""
+        """Switches the arm on with closed brakes."""
         if self.robot_mode is RobotMode.POWER_OFF and self.safety_mode is not SafetyMode.ROBOT_EMERGENCY_STOP:
             self.robot_mode = RobotMode.IDLE
 
@@ -231,7 +231,7 @@ class UrController:
         self.robot_mode = RobotMode.POWER_OFF
 
     def brake_release(self) -> None:
-        """Makes the arm ready to move; switches it on if need be."""
+        """Releases the brakes, and switches the arm on if necessary."""
         self.power_on()
         if self.robot_mode is RobotMode.IDLE:
             self.robot_mode = RobotMode.RUNNING

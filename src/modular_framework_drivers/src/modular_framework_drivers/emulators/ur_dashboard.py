@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The emulated dashboard server; its answers are those of the real one, because clients compare them."""
+"""Emulates the dashboard server with the texts of the real server, because clients compare them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ BANNER = "Connected: Universal Robots Dashboard Server\n"
 
 
 class DashboardReceiver:
-    """Answers the lines of one client.
+    """Responds to the requests of one client.
 
     Args:
-        controller: what they are about.
+        controller: Emulated controller.
     """
 
     def __init__(self, controller: UrController) -> None:
@@ -48,13 +48,13 @@ class DashboardReceiver:
         }
 
     def receive(self, data: bytes) -> bytes:
-        """Returns the answer to received bytes."""
+        """Returns the response to received bytes."""
         self._text += data.decode("utf-8", errors="replace")
         *lines, self._text = self._text.split("\n")
         return "".join(self.answer(line.strip()) + "\n" for line in lines).encode()
 
     def answer(self, line: str) -> str:
-        """Returns the answer to one line."""
+        """Returns the response to one line."""
         lowered = line.lower()
         if lowered in self._answers:
             return self._answers[lowered]()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs an emulated UR controller for tests and measurements: a process of its own at a loopback address of its own."""
+"""Runs an emulated UR controller for tests and measurements in a separate process with its own loopback address."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ _MODULE = "modular_framework_drivers.emulators.ur_emulator"
 
 
 class EmulatedArm:
-    """A running emulator.
+    """Starts an emulator process.
 
     Args:
-        model: kind of controller, see ur_controller.py.
-        unlock_delay_s: after a protective stop [s].
-        positions: of the joints at the beginning [rad].
+        model: Model of the controller, see ur_controller.py.
+        unlock_delay_s: Minimum time from a protective stop to its release [s].
+        positions: Initial joint positions [rad].
 
     Attributes:
-        address: where it listens.
+        address: Address of the emulator.
     """
 
     def __init__(self, model: str = "UR5", unlock_delay_s: float = 0.0, positions: Sequence[float] = HOME) -> None:
-        draw = random.Random(os.urandom(8))  # 127.x.y.z is this machine; tests that run at the same time draw others
+        draw = random.Random(os.urandom(8))  # 127.x.y.z is this machine; concurrent tests draw other addresses
         self.address = f"127.{draw.randint(16, 254)}.{draw.randint(0, 254)}.{draw.randint(1, 254)}"
         self._process = subprocess.Popen(
             [
@@ -56,7 +56,7 @@ class EmulatedArm:
             raise RuntimeError(f"the emulator at {self.address} did not start; what it said is above")
 
     def command(self, command: str, **arguments: Any) -> str:
-        """Sends a command to the command port."""
+        """Sends a command with named arguments to the command port, and returns the response."""
         return send_command(COMMAND_PORT, command, self.address, **arguments)
 
     def state(self) -> dict[str, str]:
@@ -68,7 +68,7 @@ class EmulatedArm:
         return [float(value) for value in self.state()["q"].split(",")]
 
     def kill(self) -> None:
-        """Ends the process without notice."""
+        """Kills the process."""
         self._process.kill()
         self._process.wait()
 

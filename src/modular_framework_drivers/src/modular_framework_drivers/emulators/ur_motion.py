@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Motion of the joints of the emulated arm: they follow the program within a UR5's speed and acceleration."""
+"""Simulates the joints of the emulated arm, which follow programs within the velocity and acceleration of a UR5."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 JOINTS = 6
 MAX_VELOCITY = math.pi  # of every joint of a UR5 [rad/s]
-MAX_ACCELERATION = 40.0  # what URScript allows of a joint [rad/s^2]
-MAX_SERVO_ERROR = 0.5  # further behind its servo target the controller stops the arm [rad]
-_ARRIVED = 1e-5  # a move ends this near its target [rad], as slow as this [rad/s]
+MAX_ACCELERATION = 40.0  # maximum accepted by URScript [rad/s^2]
+MAX_SERVO_ERROR = 0.5  # distance to the servo target beyond which the controller stops the arm [rad]
+_ARRIVED = 1e-5  # tolerance at the end of a move: distance [rad] and speed [rad/s]
 
-# Denavit-Hartenberg parameters of the UR5 as its maker publishes them: (a [m], d [m], alpha [rad]) per joint.
+# Denavit-Hartenberg parameters of the UR5 from the manufacturer: (a [m], d [m], alpha [rad]) per joint.
 _UR5_LINKS = (
     (0.0, 0.089159, math.pi / 2),
     (-0.425, 0.0, 0.0),
@@ -28,7 +28,7 @@ _UR5_LINKS = (
 
 
 class Drive(Enum):
-    """Kind of a motion."""
+    """Type of a motion."""
 
     HOLD = "hold"
     SERVO = "servo"
@@ -39,14 +39,14 @@ class Drive(Enum):
 
 @dataclass(frozen=True, slots=True)
 class MotionCommand:
-    """One motion.
+    """Holds the command of a motion.
 
     Attributes:
-        drive: its kind.
-        target: joint positions (SERVO, MOVE) [rad] or velocities (SPEED) [rad/s].
-        velocity: top speed (MOVE) [rad/s].
-        acceleration: of SPEED, MOVE and STOP [rad/s^2].
-        lookahead_s: time constant with which SERVO follows [s].
+        drive: Type of the motion.
+        target: Joint positions of SERVO and MOVE [rad] or joint velocities of SPEED [rad/s].
+        velocity: Maximum speed of MOVE [rad/s].
+        acceleration: Acceleration of SPEED, MOVE and STOP [rad/s^2].
+        lookahead_s: Time constant of SERVO [s].
     """
 
     drive: Drive
@@ -57,10 +57,10 @@ class MotionCommand:
 
 
 class ArmMotion:
-    """Positions and velocities of the joints.
+    """Simulates the positions and velocities of the joints.
 
     Args:
-        positions: where they are at the beginning [rad].
+        positions: Initial joint positions [rad].
     """
 
     def __init__(self, positions: Sequence[float]) -> None:
@@ -69,19 +69,19 @@ class ArmMotion:
         self.command = MotionCommand(Drive.HOLD)
 
     def set_command(self, command: MotionCommand) -> None:
-        """Replaces the present motion."""
+        """Replaces the current motion."""
         self.command = command
 
     @property
     def servo_error(self) -> float:
-        """Largest distance of a joint from its servo target [rad]; 0 without a target."""
+        """Returns the maximum distance of a joint to its servo target [rad]; 0 without a target."""
         if self.command.drive is not Drive.SERVO:
             return 0.0
         return max(abs(goal - position) for goal, position in zip(self.command.target, self.positions, strict=True))
 
     @property
     def finished(self) -> bool:
-        """Whether a MOVE has arrived or a STOP has come to rest."""
+        """Returns whether a MOVE has reached its target or a STOP has come to rest."""
         at_rest = max(map(abs, self.velocities)) <= _ARRIVED
         if self.command.drive is Drive.MOVE:
             return at_rest and all(
@@ -91,7 +91,7 @@ class ArmMotion:
         return at_rest
 
     def step(self, dt_s: float, speed_fraction: float) -> None:
-        """Advances by `dt_s` [s]; `speed_fraction` in [0, 1] scales every speed, as the speed slider does."""
+        """Advances by `dt_s` [s]; `speed_fraction` in [0, 1] scales the maximum speed, like the speed slider."""
         command = self.command
         wanted = self._wanted_velocities(command, dt_s)
         limit = command.acceleration if command.drive in (Drive.SPEED, Drive.MOVE, Drive.STOP) else MAX_ACCELERATION
@@ -120,7 +120,7 @@ class ArmMotion:
     def _towards(
         self, target: Sequence[float], time_constant_s: float, acceleration: float, tops: Sequence[float]
     ) -> list[float]:
-        """Velocities that bring the joints to the target without running past it."""
+        """Returns the velocities that bring the joints to the target without overshoot."""
         velocities = []
         for goal, position, top in zip(target, self.positions, tops, strict=True):
             error = goal - position
@@ -130,7 +130,7 @@ class ArmMotion:
 
 
 def flange_pose(positions: Sequence[float]) -> tuple[float, ...]:
-    """Pose of a UR5's flange in its base: position [m], then the rotation vector [rad]."""
+    """Returns the flange pose of a UR5 in the base frame: position [m], then rotation vector [rad]."""
     rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     origin = [0.0, 0.0, 0.0]
     for theta, (a, d, alpha) in zip(positions, _UR5_LINKS, strict=True):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SAKE EZGripper over a serial line of Dynamixel servos."""
+"""Driver of the SAKE EZGripper over a serial line of Dynamixel servos."""

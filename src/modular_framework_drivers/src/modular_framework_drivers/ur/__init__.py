@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Universal Robots arms over RTDE."""
+"""Driver of Universal Robots arms over RTDE."""
