@@ -487,7 +487,7 @@ def test_objects_are_spawned_and_deleted_and_unknown_models_named(tmp_path) -> N
     assert run(SpawnObject("cube", "mine", (0.1, 0.2, 0.3)))[0] == "success"
     assert models["mine"].initial_pose.position.y == 0.2
     for state, reason in (
-        (SpawnObject("cube", "mine"), "an object 'mine' already"),
+        (SpawnObject("cube", "mine"), "an object 'mine' exists already"),
         (SpawnObject("sphere"), "the type must be a folder of"),
         (DeleteObject("other"), "no such model"),
     ):
