@@ -69,7 +69,7 @@ def test_figures_are_listed_and_written_as_png_and_pdf(tmp_path: Path, capsys: p
     [
         (("--figure", "rankin"), "ranking, differences"),
         (("--figure", "ranking.svg"), "png, pdf"),
-        (("--figure", "ranking", "--table", "latex"), "give one of them"),
+        (("--figure", "ranking", "--table", "latex"), "remove one of them"),
     ],
 )
 def test_what_cannot_be_drawn_is_named_with_what_can(

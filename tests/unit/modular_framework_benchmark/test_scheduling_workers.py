@@ -86,7 +86,7 @@ def test_a_killed_worker_costs_no_other_episode_and_its_own_is_tried_twice(
         if record.spec.trial == 0:
             assert record.status is EpisodeStatus.BROKEN
             assert "was killed by signal SIGKILL; its last output: the worker is about to die" in record.cause
-            assert "tried 2 times" in record.cause
+            assert "after 2 attempts" in record.cause
         else:
             assert record.succeeded, "the second try succeeds"
             earlier = record.snapshot.get("earlier_tries", [])
