@@ -50,6 +50,6 @@ def test_commander_and_move_group_agree_on_limits(entries: dict[str, Any]) -> No
 def test_looser_limits_are_noted() -> None:
     entries = {"turn": {"max_velocity": 9.0}, "roll": {"has_position_limits": True, "max_position": 1.0}}
     assert [note.split(";")[0] for note in RobotModel(URDF, SRDF, entries).notes] == [
-        "joint_limits/turn: max_velocity 9 is looser than the URDF's 2",
+        "joint_limits/turn: max_velocity 9 is looser than the URDF's 2, but is used",
         "joint_limits/roll: has_position_limits is ignored, because the joint is continuous",
     ]
