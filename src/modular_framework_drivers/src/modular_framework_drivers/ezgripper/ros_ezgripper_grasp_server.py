@@ -81,9 +81,7 @@ class EzGripperManipulator:
             if motion.stop_requested():
                 self._stop()
                 raise GraspCommandError("stopped on request")
-            stands_still = state.goal.goal_number == goal_number and standstill.update(
-                state.reading.velocity, state.stamp_s
-            )
+            stands_still = state.goal.number == goal_number and standstill.update(state.reading.velocity, state.stamp_s)
             if stands_still and state.motion is not Motion.MOVING:
                 return self._outcome(state)
             if time.monotonic() > end_s:
