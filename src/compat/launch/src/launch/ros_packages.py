@@ -6,7 +6,6 @@ from __future__ import annotations
 import functools
 import os
 from pathlib import Path
-from xml.etree import ElementTree
 
 import roslib.packages
 import rospkg
@@ -71,26 +70,16 @@ def programs_of_package(package: str) -> set[str]:
     return found
 
 
-def plugin_classes(package: str) -> set[str]:
-    """Returns the names of the plugins that ROS packages, and the package itself, export to a package.
+def plugin_descriptions(package: str) -> list[Path]:
+    """Returns the plugin descriptions that ROS packages, and the package itself, export to a package.
 
     Raises:
         PackageNotFoundError: There is no such package.
     """
     package_share_directory(package)
     finder = _current_finder()
-    names: set[str] = set()
-    for each in (package, *finder.get_depends_on(package, implicit=False)):
-        prefix = finder.get_path(each)
-        for description in finder.get_manifest(each).get_export(package, "plugin"):
-            names |= _described_classes(Path(description.replace("${prefix}", prefix)))
-    return names
-
-
-def _described_classes(description: Path) -> set[str]:
-    """Returns the classes of a plugin description; none of one that cannot be read, which pluginlib reports."""
-    try:
-        root = ElementTree.parse(description).getroot()
-    except (OSError, ElementTree.ParseError):
-        return set()
-    return {name for each in root.iter("class") if (name := each.get("name") or each.get("type"))}
+    return [
+        Path(description.replace("${prefix}", finder.get_path(each)))
+        for each in (package, *finder.get_depends_on(package, implicit=False))
+        for description in finder.get_manifest(each).get_export(package, "plugin")
+    ]

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from typing import Any
 import rospkg
 import yaml
 from launch.core.screen_log import get_logger
-from launch.ros_packages import package_share_directory, plugin_classes
+from launch.ros_packages import package_share_directory, plugin_descriptions
+
+from modular_framework_urdf import xml_text
 
 ROS2_PACKAGES = ("rviz_default_plugins", "rviz_common")
 """Packages of ROS 2 whose classes are in the package `rviz` of ROS 1."""
@@ -162,7 +165,7 @@ def ros1_config_file(path: Path) -> Path:
         return path
     if not isinstance(config, Mapping):
         return path
-    classes = {*plugin_classes("rviz"), *(f"rviz/{name}" for name in BUILT_IN)}
+    classes = {*_plugin_classes(plugin_descriptions("rviz")), *(f"rviz/{name}" for name in BUILT_IN)}
     translator = RvizTranslator(classes, _moveit_displays())
     ros1 = translator.config(config)
     if ros1 == config:
@@ -175,6 +178,16 @@ def ros1_config_file(path: Path) -> Path:
     target.write_text(yaml.safe_dump(ros1, sort_keys=False), encoding="utf-8")
     get_logger("rviz").info("%s is translated for ROS 1: %s", path, target)
     return target
+
+
+def _plugin_classes(descriptions: Iterable[Path]) -> set[str]:
+    """Returns the classes of plugin descriptions, except those of unreadable files, which pluginlib reports."""
+    found = set()
+    for description in descriptions:
+        with contextlib.suppress(OSError, xml_text.XmlError):
+            classes = xml_text.read(description).iter("class")
+            found |= {name for each in classes if (name := each.get("name") or each.get("type"))}
+    return found
 
 
 def _moveit_displays() -> list[Config]:
