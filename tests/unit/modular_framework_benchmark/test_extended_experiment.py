@@ -94,6 +94,21 @@ def test_an_extension_with_the_same_files_is_taken_also_with_a_level_that_brings
         assert len(database.pending(1)) == len(sample_episodes(4))
 
 
+def test_the_states_of_a_user_count(stack: Stack, tmp_path: Path) -> None:
+    states = tmp_path / "states"
+    states.mkdir()
+    text = '<arg name="states_directory" default=""/><rosparam command'
+    stack.launch.write_text(stack.launch.read_text().replace("<rosparam command", text))
+    found = []
+    for content in ("WAIT_S = 1", "WAIT_S = 2"):
+        (states / "my_state.py").write_text(content)
+        arguments = {"planner_configuration": str(stack.configuration), "states_directory": str(states)}
+        loaded_stack.cache_clear()
+        digests = run_digests("task", [EpisodeSpec(0, {}, 0, 1, {"launch": str(stack.launch), "arguments": arguments})])
+        found.append(digests["folder states_directory"])
+    assert found[0] != found[1]
+
+
 def test_packages_of_nodes_and_versions_of_libraries_count(stack: Stack) -> None:
     digests = stack.digests()
     assert {"package top_down_grasps", "package modular_framework_planning", "Python package numpy"} <= set(digests)

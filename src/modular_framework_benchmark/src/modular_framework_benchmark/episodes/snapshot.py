@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-PACKAGES = ("coal", "numpy", "ompl", "pin", "pybullet", "scipy", "toppra")
+PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
 """Packages whose versions affect results."""
 
 COLD_START = "cold_start"

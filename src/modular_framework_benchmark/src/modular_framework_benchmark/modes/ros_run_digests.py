@@ -13,14 +13,19 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from modular_framework_benchmark.episodes.ros_package_sources import package_source
+from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
 from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCH_SETTINGS, preview_stack
 from modular_framework_benchmark.episodes.snapshot import PACKAGES
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
 LOAD_SETTINGS = (*LAUNCH_SETTINGS, "robot", "method")
 """Settings that determine what is launched or loaded."""
-LIBRARIES = ("modular_framework_benchmark", "modular_framework_core", "modular_framework_planning")
+FOLDERS = ("states_directory", "templates_directory")
+"""Launch arguments that name a folder of the user's code."""
+LIBRARIES = tuple(
+    f"modular_framework_{name}"
+    for name in ("benchmark", "control", "core", "planning", "ros", "simulation", "states", "urdf")
+)
 
 
 def run_digests(mode: str, episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
@@ -73,6 +78,10 @@ def _launch_digests(spec: EpisodeSpec) -> Iterator[tuple[str, str]]:
     for file in sorted(Path(argument) for argument in arguments if argument.startswith("/") and len(argument) < 1024):
         if file.is_file():
             yield f"file {file.parent.name}/{file.name}", hashlib.sha256(file.read_bytes()).hexdigest()
+    for name in FOLDERS:
+        folder = str(stack.launch.arguments.get(name, ""))
+        if folder and Path(folder).is_dir():
+            yield f"folder {name}", tree_digest([Path(folder)])
     yield from _package_digests({*LIBRARIES, *(node.package for node in stack.preview.nodes)})
 
 
