@@ -82,6 +82,24 @@ def test_compare_marks_what_else_differs(
     assert text in shown and text in (tmp_path / "page.html").read_text()
 
 
+def test_compare_marks_settings_and_files_that_differ_and_not_those_that_a_factor_varies(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(name: str, speed: float, digest: str) -> str:
+        path = tmp_path / name
+        with open_database(path, create=True) as database:
+            number = database.add_experiment(sample_description(ran_with={"file a.world": digest}), sample_episodes(2))
+            for spec in sample_episodes(2):
+                settings = {"method": spec.configuration, "parameters": {"/robot_speed_factor": speed}}
+                database.write(number, sample_record(spec, snapshot={**SNAPSHOT, "settings": settings}))
+        return str(path)
+
+    assert compare([run("before.db", 1.0, "1a"), run("after.db", 0.5, "2b")]) == 0
+    shown = capsys.readouterr().out
+    assert "settings.parameters./robot_speed_factor: before 1.0; after 0.5" in shown
+    assert "other content of file a.world" in shown and "settings.method" not in shown
+
+
 def test_compare_marks_nothing_where_only_measurements_differ(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

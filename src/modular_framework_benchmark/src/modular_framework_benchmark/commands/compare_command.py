@@ -15,7 +15,7 @@ from modular_framework_benchmark.reports.regression import Change, compare_exper
 from modular_framework_benchmark.reports.regression_page import regression_page, regression_text
 from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import open_source
-from modular_framework_benchmark.reports.run_record import differences_of
+from modular_framework_benchmark.reports.run_record import content_differences, differences_of, setting_differences
 
 REGRESSED = 1
 
@@ -48,7 +48,11 @@ def _compare(given: argparse.Namespace) -> int:
         open_source(given.before, given.experiment) as before,
         open_source(given.after or given.before, given.other or given.experiment) as after,
     ):
-        differing = differences_of(before.snapshots, after.snapshots)
+        differing = (
+            *differences_of(before.snapshots, after.snapshots),
+            *setting_differences(before.settings, after.settings),
+            *content_differences(before.results.description, after.results.description),
+        )
         regression = dataclasses.replace(
             compare_experiments(before.results_by_start, after.results_by_start), differing=differing
         )

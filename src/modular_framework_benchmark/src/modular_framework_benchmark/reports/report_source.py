@@ -36,6 +36,11 @@ class OpenedExperiment:
         return self.database.snapshot_values(self.number, VARYING_PARTS)
 
     @property
+    def settings(self) -> SnapshotValues:
+        """Returns the distinct settings of the episodes with their numbers of episodes."""
+        return {"settings": self.database.snapshot_values(self.number).get("settings", ())}
+
+    @property
     def results_by_start(self) -> ExperimentResults:
         """Returns the results with the column `cold_start`: whether an episode was the first of its stack."""
         cold = self.database.flagged_episodes(self.number, COLD_START)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
 
+from modular_framework_benchmark.records.experiment import ExperimentDescription
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.records.used_software import IMPLEMENTATION
 from modular_framework_benchmark.reports.number_text import counted
@@ -18,6 +19,7 @@ from modular_framework_ros.reported_figures import Clock
 SnapshotValues = Mapping[str, Sequence[tuple[Any, int]]]
 
 MAX_VALUES = 4
+MAX_NAMES = 12
 MAX_PARAMETERS = 400
 MAX_OTHERS_FRACTION = 0.1
 """Fraction of the machine used by other processes above which real times are doubtful."""
@@ -163,6 +165,41 @@ def differences_of(before: SnapshotValues, after: SnapshotValues) -> tuple[str, 
             f"({medians[1] / medians[0]:.2f} times)"
         )
     return tuple(found)
+
+
+def setting_differences(before: SnapshotValues, after: SnapshotValues) -> tuple[str, ...]:
+    """Returns the settings of which two experiments share no value.
+
+    Values that factors, trials and seeds vary are shared by experiments of the same design.
+
+    Args:
+        before: Snapshots of the earlier experiment, as for `recorded_values`, of the settings.
+        after: Snapshots of the later experiment.
+    """
+    earlier, later = _values_of(before), _values_of(after)
+    found = []
+    for name in dict.fromkeys([*earlier, *later]):
+        sides = earlier.get(name, {"nothing"}), later.get(name, {"nothing"})
+        if not sides[0] & sides[1]:
+            texts = (", ".join(sorted(side)[:MAX_VALUES]) for side in sides)
+            found.append(f"{name}: before {next(texts)}; after {next(texts)}")
+    return tuple(found)
+
+
+def content_differences(before: ExperimentDescription, after: ExperimentDescription) -> tuple[str, ...]:
+    """Returns the files, packages and parameters whose content differs, by digest.
+
+    Args:
+        before: Description of the earlier experiment.
+        after: Description of the later experiment.
+    """
+    names = [
+        name
+        for name, digests in before.ran_with.items()
+        if name in after.ran_with and not set(digests.split()) & set(after.ran_with[name].split())
+    ]
+    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    return (f"other content of {', '.join(names[:MAX_NAMES])}{more}",) if names else ()
 
 
 def _values_of(snapshots: SnapshotValues) -> dict[str, set[str]]:
