@@ -59,9 +59,9 @@ def config_folder() -> Path | None:
 
 
 def task_script(name: Path) -> Path:
-    """Returns the path of a task script. A bare file name that does not exist is resolved in the API package."""
+    """Returns the path of a task script. A relative path that does not exist is resolved in the API package."""
     folder = _package(API_PACKAGE)
-    if name.exists() or name.name != str(name) or folder is None:
+    if name.exists() or name.is_absolute() or folder is None:
         return name
     return folder / SCRIPTS_FOLDER / name
 
