@@ -119,7 +119,7 @@ def test_a_state_is_explained_from_its_signature_and_docstring(capsys: pytest.Ca
     assert main(["--explain", "plan", "", str(STATES), str(TEMPLATES)]) == 0
     page = capsys.readouterr().out
     assert "target_state_type: one of 'pose', 'joint_state', 'pregrasp', 'grasp', 'postgrasp', required" in page
-    assert "plan_name: a text, default ''\n      Name to store the plan under" in page
+    assert "plan_name: a text, default ''\n      Name of the stored plan; empty for an anonymous plan." in page
     assert "Outcomes: success, fail (by default)" in page and "Io keys: arm_commander (by default)" in page
 
 
