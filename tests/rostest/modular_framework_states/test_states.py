@@ -262,7 +262,7 @@ def test_unknown_words_are_refused_when_a_state_is_made() -> None:
         lambda: AllowManipulatorCollisions(True, "cup"),
         lambda: AllowManipulatorCollisions(True, "", links=["cup"]),
     ):
-        with pytest.raises(ValueError, match="cup|links are of use"):
+        with pytest.raises(ValueError, match="cup|links needs a collision_type"):
             make()
 
 
