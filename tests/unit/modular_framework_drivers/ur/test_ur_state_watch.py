@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from modular_framework_drivers.ur import rtde_process
 from modular_framework_drivers.ur.arm_messages import ArmState
-from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
+from modular_framework_drivers.ur.state_watch import ModeConfirmation, SilenceWatch, is_plausible
 
 SIX = (0.1,) * 6
 STATE = ArmState(100.0, 5.0, SIX, SIX, SIX, SIX, 1.0, 1.0, 7, 1, 2)
@@ -108,3 +108,11 @@ def test_a_joint_that_turns_without_end_has_turned_often() -> None:
 )
 def test_garbage_does_not_follow(changes: dict[str, object]) -> None:
     assert not is_plausible(next_state(**changes), STATE)
+
+
+def test_only_two_successive_states_change_the_modes() -> None:
+    modes = ModeConfirmation()
+    running, idle = (7, 1, 2), (5, 1, 2)
+    assert [modes.confirm(each) for each in (running, running)] == [False, True]
+    assert [modes.confirm(each) for each in (idle, running, idle, running)] == [False, True, False, True]
+    assert [modes.confirm(each) for each in (idle, idle, idle)] == [False, True, True]

@@ -34,7 +34,7 @@ from modular_framework_drivers.ur.arm_messages import (
     read_servo_message,
 )
 from modular_framework_drivers.ur.delay_watch import ConnectionEndedError, DelayWatch
-from modular_framework_drivers.ur.state_watch import SilenceWatch, is_plausible
+from modular_framework_drivers.ur.state_watch import ModeConfirmation, SilenceWatch, is_plausible
 
 _PRIORITY = 60  # the control loop has 80
 _POLL_PERIOD_S = 0.002
@@ -75,7 +75,7 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
     _take_priority(options)
     delay.start()
     last_state: ArmState | None = None
-    modes, damaged_count = (0, 0, 0), 0
+    modes, damaged_count = ModeConfirmation(), 0
     last_timestamp_s, last_sent_s = float("nan"), 0.0
     silence = SilenceWatch(time.monotonic())
     while True:
@@ -85,10 +85,7 @@ def report_states(options: argparse.Namespace, channel: socket.socket) -> None:
             last_timestamp_s = state.timestamp_s
             heard = is_plausible(state, last_state)
             damaged_count = 0 if heard else damaged_count + 1
-            if heard and (
-                last_state is None or state.modes != last_state.modes
-            ):  # a flipped bit may yield another valid mode
-                heard, modes = state.modes == modes, state.modes
+            heard = heard and modes.confirm(state.modes)
             if heard:
                 last_state, last_sent_s = state, now_s
                 _send(channel, replace(state, late_s=delay.update(now_s - state.timestamp_s)).packed())

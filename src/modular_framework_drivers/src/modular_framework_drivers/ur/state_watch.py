@@ -16,6 +16,22 @@ _MAX_MODE = 31
 _MAX_ADVANCE_S = 2.0  # of the controller's clock over the local clock at the end of a delay
 
 
+class ModeConfirmation:
+    """Accepts modes of the arm once two successive states agree, because a flipped bit may yield another valid mode."""
+
+    def __init__(self) -> None:
+        self._accepted: tuple[int, ...] | None = None
+        self._previous: tuple[int, ...] | None = None
+
+    def confirm(self, modes: tuple[int, ...]) -> bool:
+        """Returns whether the modes of the newest state are those accepted, or those of the state before."""
+        is_confirmed = modes in (self._accepted, self._previous)
+        self._previous = modes
+        if is_confirmed:
+            self._accepted = modes
+        return is_confirmed
+
+
 class SilenceWatch:
     """Measures the time without a received message.
 
