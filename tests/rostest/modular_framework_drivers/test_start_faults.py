@@ -48,15 +48,15 @@ CASES: dict[str, tuple[str, dict[str, object], str]] = {
 
 GRIPPER_CASES: dict[str, tuple[Callable[[DynamixelLine], object], int, str]] = {
     "no_cable": (DynamixelLine.unplug, 57600, "cannot be opened: No such file or directory; check the cable"),
-    "no_gripper_power": (DynamixelLine.power_off, 57600, "at 57600 baud does not answer"),
-    "another_baud_rate": (lambda line: None, 115200, "at 115200 baud does not answer"),
+    "no_gripper_power": (DynamixelLine.power_off, 57600, "at 57600 baud does not respond"),
+    "another_baud_rate": (lambda line: None, 115200, "at 115200 baud does not respond"),
     "another_id": (lambda line: line.change_id(7), 57600, "servo 1 on"),
     "another_model": (
         lambda line: line.fingers[0].servo.set(mx64.MODEL_NUMBER, 12),
         57600,
         "servo 1 is model 12; expected 310 (MX-64)",
     ),
-    "port_in_use": (lambda line: None, 57600, "cannot be opened: another program has it"),
+    "port_in_use": (lambda line: None, 57600, "cannot be opened: another program uses it"),
 }
 """What is wrong with a gripper at the start, the baud rate of its driver, and the text that says so."""
 
