@@ -15,7 +15,7 @@ from modular_framework_benchmark.reports.regression import Change, compare_exper
 from modular_framework_benchmark.reports.regression_page import regression_page, regression_text
 from modular_framework_benchmark.reports.report_files import write_file
 from modular_framework_benchmark.reports.report_source import open_source
-from modular_framework_benchmark.reports.run_record import content_differences, differences_of, setting_differences
+from modular_framework_benchmark.reports.run_record import content_differences, differences_of
 
 REGRESSED = 1
 
@@ -49,8 +49,7 @@ def _compare(given: argparse.Namespace) -> int:
         open_source(given.after or given.before, given.other or given.experiment) as after,
     ):
         differing = (
-            *differences_of(before.snapshots, after.snapshots),
-            *setting_differences(before.settings, after.settings),
+            *differences_of(before.compared_snapshots, after.compared_snapshots),
             *content_differences(before.results.description, after.results.description),
         )
         regression = dataclasses.replace(

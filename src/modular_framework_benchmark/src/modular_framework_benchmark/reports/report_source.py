@@ -12,7 +12,7 @@ from modular_framework_benchmark.episodes.snapshot import COLD_START, VARYING_PA
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_content import ReportSource
-from modular_framework_benchmark.reports.run_record import SnapshotValues
+from modular_framework_benchmark.reports.run_record import SETTINGS, SnapshotValues
 from modular_framework_benchmark.results.database import ResultDatabase, open_database
 
 
@@ -36,9 +36,9 @@ class OpenedExperiment:
         return self.database.snapshot_values(self.number, VARYING_PARTS)
 
     @property
-    def settings(self) -> SnapshotValues:
-        """Returns the distinct settings of the episodes with their numbers of episodes."""
-        return {"settings": self.database.snapshot_values(self.number).get("settings", ())}
+    def compared_snapshots(self) -> SnapshotValues:
+        """Returns the snapshots with the settings, in which two experiments may differ."""
+        return self.database.snapshot_values(self.number, [part for part in VARYING_PARTS if part != SETTINGS])
 
     @property
     def results_by_start(self) -> ExperimentResults:

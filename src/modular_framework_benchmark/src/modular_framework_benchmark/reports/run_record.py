@@ -18,6 +18,8 @@ from modular_framework_ros.reported_figures import Clock
 
 SnapshotValues = Mapping[str, Sequence[tuple[Any, int]]]
 
+SETTINGS = "settings"
+"""Snapshot part with the settings of an episode."""
 MAX_VALUES = 4
 MAX_NAMES = 12
 MAX_PARAMETERS = 400
@@ -144,19 +146,22 @@ def _load_warning(results: ExperimentResults, snapshots: SnapshotValues) -> Iter
 
 
 def differences_of(before: SnapshotValues, after: SnapshotValues) -> tuple[str, ...]:
-    """Returns the differences between the runs of two experiments: versions, planners, methods, machine, files.
+    """Returns the differences between the runs of two experiments: versions, planners, methods, machine, settings.
 
     Args:
-        before: Snapshots of the earlier experiment, as for `recorded_values`.
+        before: Snapshots of the earlier experiment, as for `recorded_values`, with the settings.
         after: Snapshots of the later experiment.
     """
     earlier, later = _values_of(before), _values_of(after)
     found = []
     for name in dict.fromkeys([*earlier, *later]):
-        if earlier.get(name) == later.get(name) or name.endswith(IMPLEMENTATION) and name not in earlier.keys() & later:
+        sides = [side.get(name, {"nothing"}) for side in (earlier, later)]
+        # factors, trials and seeds vary the settings; experiments of the same design share values
+        is_same = bool(sides[0] & sides[1]) if name.startswith(f"{SETTINGS}.") else sides[0] == sides[1]
+        if is_same or name.endswith(IMPLEMENTATION) and name not in earlier.keys() & later:
             continue
-        sides = (", ".join(sorted(side.get(name, {"nothing"}))[:MAX_VALUES]) for side in (earlier, later))
-        found.append(f"{name}: before {next(sides)}; after {next(sides)}")
+        texts = [", ".join(sorted(side)[:MAX_VALUES]) for side in sides]
+        found.append(f"{name}: before {texts[0]}; after {texts[1]}")
     times = [[float(value) for value, _ in side.get("reference_s", ())] for side in (before, after)]
     if all(times) and any(text.startswith("machine.") for text in found):
         medians = [statistics.median(side) for side in times]
@@ -164,25 +169,6 @@ def differences_of(before: SnapshotValues, after: SnapshotValues) -> tuple[str, 
             f"the machines: the reference workload takes {medians[0]:.3f} s before and {medians[1]:.3f} s after "
             f"({medians[1] / medians[0]:.2f} times)"
         )
-    return tuple(found)
-
-
-def setting_differences(before: SnapshotValues, after: SnapshotValues) -> tuple[str, ...]:
-    """Returns the settings of which two experiments share no value.
-
-    Values that factors, trials and seeds vary are shared by experiments of the same design.
-
-    Args:
-        before: Snapshots of the earlier experiment, as for `recorded_values`, of the settings.
-        after: Snapshots of the later experiment.
-    """
-    earlier, later = _values_of(before), _values_of(after)
-    found = []
-    for name in dict.fromkeys([*earlier, *later]):
-        sides = earlier.get(name, {"nothing"}), later.get(name, {"nothing"})
-        if not sides[0] & sides[1]:
-            texts = (", ".join(sorted(side)[:MAX_VALUES]) for side in sides)
-            found.append(f"{name}: before {next(texts)}; after {next(texts)}")
     return tuple(found)
 
 
