@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
-from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCH_SETTINGS, preview_stack
+from modular_framework_benchmark.episodes.ros_stack_launch import LAUNCH_SETTINGS, StackPreview, preview_stack
 from modular_framework_benchmark.episodes.snapshot import PACKAGES
 from modular_framework_benchmark.records.episode import EpisodeSpec
 
@@ -40,11 +40,17 @@ def run_digests(mode: str, episodes: Iterable[EpisodeSpec]) -> dict[str, str]:
     """
     found: dict[str, set[str]] = {f"Python package {name}": {_python_version(name)} for name in PACKAGES}
     stacks = {json.dumps([spec.settings.get(key) for key in LOAD_SETTINGS], sort_keys=True): spec for spec in episodes}
+    packages = set(LIBRARIES)
     for spec in stacks.values():
-        for description, digest in (
-            _launch_digests(spec) if mode == "task" else _package_digests(_named_packages(spec.settings))
-        ):
-            found.setdefault(description, set()).add(digest[:16])
+        if mode == "task":
+            stack = preview_stack(spec.settings)
+            packages |= {node.package for node in stack.preview.nodes}
+            for description, digest in _launch_digests(stack):
+                found.setdefault(description, set()).add(digest[:16])
+        else:
+            packages |= _named_packages(spec.settings)
+    for package in packages:
+        found[f"package {package}"] = {package_source(package)[1][:16]}
     return {description: " ".join(sorted(digests)) for description, digests in sorted(found.items())}
 
 
@@ -58,16 +64,10 @@ def _python_version(name: str) -> str:
 def _named_packages(settings: Mapping[str, Any]) -> set[str]:
     robot, method = settings.get("robot", ""), str(settings.get("method") or "")
     named = {robot if isinstance(robot, str) else "", method.partition(":")[0].partition(".")[0]}
-    return {*LIBRARIES, *named} - {""}
+    return named - {""}
 
 
-def _package_digests(packages: Iterable[str]) -> Iterator[tuple[str, str]]:
-    for package in packages:
-        yield f"package {package}", package_source(package)[1]
-
-
-def _launch_digests(spec: EpisodeSpec) -> Iterator[tuple[str, str]]:
-    stack = preview_stack(spec.settings)
+def _launch_digests(stack: StackPreview) -> Iterator[tuple[str, str]]:
     texts = [str(stack.launch.arguments[name]) for name in sorted(stack.launch.arguments)]
     for name, value in stack.preview.parameters.items():
         yield f"parameter {name}", _digest(json.dumps(value, sort_keys=True, default=str))
@@ -82,7 +82,6 @@ def _launch_digests(spec: EpisodeSpec) -> Iterator[tuple[str, str]]:
         folder = str(stack.launch.arguments.get(name, ""))
         if folder and Path(folder).is_dir():
             yield f"folder {name}", tree_digest([Path(folder)])
-    yield from _package_digests({*LIBRARIES, *(node.package for node in stack.preview.nodes)})
 
 
 def _digest(text: str) -> str:
