@@ -15,6 +15,7 @@ from modular_framework_benchmark.records.used_software import (
     UsedMethod,
     UsedSoftware,
     description_digests,
+    named_solvers,
     solver_substitutions,
 )
 from modular_framework_planning.plan_statistics import PlannerRun
@@ -60,12 +61,6 @@ def running_stack(
     # A sequence has a run for each of its motions.
     runs = [run for plan in plans for run in (plan.get("run"), *plan.get("runs", ())) if run]
     return software.with_plans(PlannerRun(**run) for run in runs)
-
-
-def named_solvers(kinematics: Any) -> list[str]:
-    """Returns the solver of each group in the contents of kinematics.yaml."""
-    groups = kinematics.values() if isinstance(kinematics, Mapping) else ()
-    return [str(group.get("kinematics_solver", "")) for group in groups if isinstance(group, Mapping)]
 
 
 def _value(parameters: Mapping[str, Any], name: str) -> Any:

@@ -161,10 +161,9 @@ class LaunchCheck:
         rest = {name: value for name, value in parameters.items() if name.rpartition("/")[2] not in named}
         return rest | resolved_names(self.launch, self._node)
 
-    def named_solvers(self) -> list[str]:
-        """Returns the kinematics solver of each group in kinematics.yaml."""
-        below, key = f"/{DESCRIPTION}_kinematics/", "/kinematics_solver"
-        return [str(value) for name, value in self.launch.parameters.items() if below in name and name.endswith(key)]
+    def kinematics(self) -> dict[str, Any]:
+        """Returns the contents of kinematics.yaml; empty without a move_group node."""
+        return {} if self._node is None else self.launch.below(f"{self._node.namespace}{DESCRIPTION}_kinematics")
 
     def planner(self) -> ResolvedPlanner | None:
         """Returns the planner of the task, or None if the launch has no planner of that name."""

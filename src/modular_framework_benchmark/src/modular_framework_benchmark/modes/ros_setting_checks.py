@@ -24,7 +24,7 @@ from modular_framework_benchmark.modes.ros_kinematics_runner import (
 from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
 from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
-from modular_framework_benchmark.records.used_software import solver_substitutions, substitution_text
+from modular_framework_benchmark.records.used_software import named_solvers, solver_substitutions, substitution_text
 from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError
@@ -156,7 +156,7 @@ def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
             "nodes": sorted(map(repr, check.launch.nodes)),
             "parameters": {**check.resolved_parameters(), "/planner_name": repr(check.planner())},
         },
-        (*_substitutions(check.registry(), check.planner()), *solver_substitutions(check.named_solvers())),
+        (*_substitutions(check.registry(), check.planner()), *solver_substitutions(named_solvers(check.kinematics()))),
     )
 
 

@@ -124,6 +124,12 @@ def substitution_text(planner: str, constrained: str = CONSTRAINED) -> str:
     return f"{constrained} for {planner}, which cannot keep path constraints"
 
 
+def named_solvers(kinematics: object) -> list[str]:
+    """Returns the solver of each group in the contents of kinematics.yaml."""
+    groups = kinematics.values() if isinstance(kinematics, Mapping) else ()
+    return [str(group.get("kinematics_solver", "")) for group in groups if isinstance(group, Mapping)]
+
+
 def solver_substitutions(named: Iterable[str]) -> tuple[str, ...]:
     """Returns the substitutions of the solvers that kinematics.yaml names, as records and dry runs show them."""
     plugins = sorted(set(named) - {"", NUMERIC, CLOSED_FORM})
