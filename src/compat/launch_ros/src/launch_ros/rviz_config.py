@@ -156,8 +156,8 @@ def _properties(entry: Config) -> Config:
 def ros1_config_file(path: Path) -> Path:
     """Returns a file that RViz of ROS 1 reads: the given one, or its translation in `$ROS_HOME/modular_framework/rviz`.
 
-    What ROS 1 lacks is reported, one line each. A file that is not there, or no configuration, stays as it is: RViz
-    reports it.
+    What ROS 1 lacks is reported, one line each. A missing or invalid file is not translated, since RViz
+    reports its fault.
     """
     try:
         config = yaml.safe_load(path.read_text(encoding="utf-8"))

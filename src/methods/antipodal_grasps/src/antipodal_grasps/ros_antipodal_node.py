@@ -15,7 +15,7 @@ from modular_framework_core.grasp_generation.ros_grasp_generator import run_gras
 
 
 class AntipodalMethod(ParameterisedMethod):
-    """Antipodal grasps; the parameters of :func:`read_antipodal_settings` are read anew for every object."""
+    """Antipodal grasps; the parameters of :func:`read_antipodal_settings` are read again for every object."""
 
     manner = "between two opposite sides"
     declared_in = ("antipodal_grasps", "antipodal_grasp_generator")

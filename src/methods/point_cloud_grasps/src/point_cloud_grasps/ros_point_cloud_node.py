@@ -34,9 +34,9 @@ TOPIC_PARAMETERS = ("~point_cloud_topic", "pointcloud_topic_name")
 
 
 class PointCloudMethod(ParameterisedMethod):
-    """Antipodal grasps on a point cloud, which is received anew for every object.
+    """Antipodal grasps on a point cloud, which is received again for every object.
 
-    Parameters: those of :func:`read_cloud_settings`, read anew for every object; ``~point_cloud_topic`` (empty for the
+    Parameters: those of :func:`read_cloud_settings`, read again for every object; ``~point_cloud_topic`` (empty for the
         topic in ``pointcloud_topic_name``), ``~cloud_timeout`` [s], ``~robot_padding`` [m], ``origin_frame_name``,
         ``robot_description``.
     Subscribers: see :class:`CloudSource`.

@@ -15,7 +15,7 @@ from top_down_grasps.top_down import TopDownGrasp, TopDownSettings, top_down_gra
 
 
 class TopDownMethod(ParameterisedMethod):
-    """Top-down grasps; the parameters of :func:`read_top_down_settings` are read anew for every object."""
+    """Top-down grasps; the parameters of :func:`read_top_down_settings` are read again for every object."""
 
     manner = "from above"
     declared_in = ("top_down_grasps", "top_down_grasp_generator")

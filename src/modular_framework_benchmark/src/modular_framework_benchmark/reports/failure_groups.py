@@ -77,7 +77,7 @@ class FailureGroup:
 
     @property
     def caption(self) -> str:
-        """Returns a caption that tells how many of the episodes are shown."""
+        """Returns a caption with the number of episodes shown."""
         every = counted(self.episodes, "episode")
         return f"All {every}." if len(self.shown) == self.episodes else f"The first {len(self.shown)} of {every}."
 

@@ -92,7 +92,7 @@ def _top_level_spec(name: str) -> ModuleSpec | None:
 
 
 def _folders_of(package: str, spec: ModuleSpec | None) -> Sequence[str] | None:
-    """Returns the folders of a package's modules, or None if only running the package would tell."""
+    """Returns the folders of a package's modules, or None if they are known only after an import."""
     if package in sys.modules:
         return getattr(sys.modules[package], "__path__", None)
     if spec is None or spec.submodule_search_locations is None:

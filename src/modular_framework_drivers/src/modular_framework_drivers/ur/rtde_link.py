@@ -3,7 +3,7 @@
 
 Two processes run ur-rtde (rtde_process.py). A thread starts them, and restarts them after a connection failure; the
 control loop only exchanges datagrams with them. The process that reads the arm detects a silent arm, because a delayed
-control loop cannot tell a silent arm from its own delay.
+control loop cannot distinguish a silent arm from its own delay.
 """
 
 from __future__ import annotations

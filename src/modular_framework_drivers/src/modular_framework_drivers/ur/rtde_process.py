@@ -173,7 +173,7 @@ def command_arm(options: argparse.Namespace, channel: socket.socket) -> None:
     while message := _newest_message(channel):
         if message[:1] == SERVO:
             positions, time_s = read_servo_message(message)
-            # a paused or stopped program accepts no command; the state of the arm tells both cases apart
+            # a paused or stopped program accepts no command; the state of the arm distinguishes them
             if arm.servoJ(positions, 0.0, 0.0, time_s, options.lookahead, options.gain):
                 with contextlib.suppress(BrokenPipeError):  # the parent has ended; the next read detects this
                     _send(channel, ACCEPTED)

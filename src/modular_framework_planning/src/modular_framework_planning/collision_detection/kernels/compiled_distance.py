@@ -2,7 +2,7 @@
 """Lower bounds of the distance between two bodies, compiled: coarse for distant bodies, within 0.1 mm for close bodies.
 
 A body is a sphere tree over triangles, or a solid with a closed-form distance to a point. Every result is a lower
-bound of the true distance; for a bound of 0, the status tells whether the bodies touch or are too close to decide.
+bound of the true distance; for a bound of 0, the status shows whether the bodies touch or are too close to decide.
 """
 
 from __future__ import annotations

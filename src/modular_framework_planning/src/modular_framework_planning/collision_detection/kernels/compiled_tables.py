@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables over two joints that tell whether a pair of links stays apart; cells are filled on first use."""
+"""Tables over two joints that show whether a pair of links stays apart; cells are filled on first use."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class PlannedMotion:
     """Result of one planning attempt.
 
     Attributes:
-        result: Action result; its code tells whether planning succeeded.
+        result: Action result; its code shows whether planning succeeded.
         text: Text for the client.
         execute: Function that executes the plan and may raise PlanningError; None without a plan.
         details: Additional keys for the report of the execution.
