@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import signal
+import statistics
 import subprocess
 import sys
 import time
@@ -75,8 +76,10 @@ def test_the_clock_runs_at_a_hundred_hertz_of_simulated_time_and_in_real_time(si
     until(lambda: len(stamps) > 200, "two seconds of clock")
     subscriber.unregister()
     assert time.monotonic() - begin < 8.0
-    steps = [b - a for a, b in zip(stamps[10:], stamps[11:], strict=False)]
-    assert sum(steps) / len(steps) == pytest.approx(0.01, abs=0.0005)
+    periods = [round((b - a) / 0.01, 6) for a, b in zip(stamps, stamps[1:], strict=False)]
+    # A simulation that was held up catches up faster than it may publish the clock, and leaves messages out.
+    assert all(period == round(period) >= 1 for period in periods)
+    assert statistics.median(periods) == 1
 
 
 def test_the_world_holds_the_models_of_the_file_and_the_robot(simulation: Any) -> None:
