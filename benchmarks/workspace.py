@@ -4,7 +4,8 @@
 - A benchmark that is started without the workspace, as `benchmarks/planning --help` in any shell, starts again by
   `./install.sh exec`, with the workspace's interpreter and packages.
 - The modules of the tests that benchmarks share can be imported.
-- SIGTERM ends a benchmark as an interrupt does. Programs that it started and that still run at its end are killed.
+- SIGTERM ends a benchmark as an interrupt does, with one line. Programs that it started and that still run at its end
+  are killed.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import signal
 import sys
 import uuid
 from pathlib import Path
+from types import TracebackType
 
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = (  # several have a module `conftest`: the first is found
@@ -39,8 +41,17 @@ def _enter() -> None:
     os.environ[MARK] = ("" if outer == _STARTS else outer) + uuid.uuid4().hex
     for number in (signal.SIGINT, signal.SIGTERM):  # a shell that starts it in the background ignores SIGINT
         signal.signal(number, signal.default_int_handler)
+    sys.excepthook = _report
     os.register_at_fork(after_in_child=lambda: signal.signal(signal.SIGTERM, signal.SIG_DFL))
     atexit.register(_kill_what_is_left, os.getpid(), os.environ[MARK])
+
+
+def _report(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Prints one line for an interrupt, and the traceback of any other exception."""
+    if issubclass(kind, KeyboardInterrupt):
+        print("interrupted", file=sys.stderr)
+    else:
+        sys.__excepthook__(kind, error, trace)
 
 
 def _kill_what_is_left(benchmark: int, mark: str) -> None:
