@@ -13,9 +13,12 @@ import pytest
 import yaml
 
 from modular_framework_benchmark.commands import ros_make_problems
+from modular_framework_benchmark.modes import ros_planning_runner
+from modular_framework_benchmark.modes.measured_record import Stopwatch
 from modular_framework_benchmark.modes.ros_kinematics_runner import KinematicsEpisodeRunner
 from modular_framework_benchmark.modes.ros_planning_runner import PlanningEpisodeRunner
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus
+from modular_framework_planning.errors import ErrorCode, PlanningError
 
 ROBOT, GROUP = "panda_hand_moveit_config", "panda_arm"
 
@@ -77,6 +80,36 @@ def test_a_seed_repeats_a_plan_whatever_was_planned_before(
         plan(planning, problems, tmp_path / str(number), seed)
     one, other, again = (pq.read_table(tmp_path / str(number) / "trajectory.parquet") for number in range(3))
     assert one.equals(again) and not one.equals(other)
+
+
+def test_the_start_of_the_planning_process_is_no_part_of_the_first_plan(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = {"s": 0.0}
+
+    class SlowStart:
+        started = False
+
+        def __init__(self, *arguments: object) -> None:
+            """Takes the model and the pipelines, and needs neither."""
+
+        def start(self) -> None:
+            if not self.started:
+                clock["s"] += 100.0
+            self.started = True
+
+        def plan(self, *arguments: object) -> None:
+            self.start()
+            clock["s"] += 1.0
+            raise PlanningError(ErrorCode.TIMED_OUT, "no path found")
+
+        def close(self) -> None:
+            """Has no process."""
+
+    monkeypatch.setattr(ros_planning_runner, "SeededPlanning", SlowStart)
+    monkeypatch.setattr(Stopwatch, "elapsed_s", lambda self: clock["s"])
+    record = plan(PlanningEpisodeRunner(), problems, tmp_path / "episode")
+    assert record.status is EpisodeStatus.TIMED_OUT and record.metrics["planning_time"] == 1.0
 
 
 @pytest.mark.parametrize(

@@ -93,12 +93,14 @@ class PlanningEpisodeRunner(ModelEpisodeRunner[_Prepared]):
         return measured_record(spec, _status(code), code.name, report, folder, watch)
 
     def prepare(self, settings: Mapping[str, Any]) -> _Prepared:
-        """Returns the robot and the planning process."""
+        """Returns the robot and the started planning process, whose start is no part of a plan."""
         robot = self.robot(settings["robot"])
         spec = _pipeline_spec(robot, settings)
         pipeline = spec.build(robot.model, robot.solvers())
         _check_planner(pipeline, str(settings["planner"]))
-        return _Prepared(robot.model, pipeline, SeededPlanning(robot.model, [spec]))
+        seeded = SeededPlanning(robot.model, [spec])
+        seeded.start()
+        return _Prepared(robot.model, pipeline, seeded)
 
     def end(self, prepared: _Prepared) -> None:
         """Ends the planning process."""
