@@ -17,7 +17,13 @@ POLE_RAD = 1e-7  # distance of the pitch from +-pi/2 below which roll and yaw ar
 
 
 def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Returns the unit quaternion of roll, pitch and yaw [rad] (REP 103)."""
+    """Returns the unit quaternion (x, y, z, w) of roll, pitch and yaw (REP 103).
+
+    Args:
+        roll: Angle about x [rad].
+        pitch: Angle about y [rad].
+        yaw: Angle about z [rad].
+    """
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
     cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -30,7 +36,13 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def matrix_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[Vector3, Vector3, Vector3]:
-    """Returns the rows of the rotation matrix of roll, pitch and yaw [rad] (REP 103)."""
+    """Returns the rows of the rotation matrix of roll, pitch and yaw (REP 103).
+
+    Args:
+        roll: Angle about x [rad].
+        pitch: Angle about y [rad].
+        yaw: Angle about z [rad].
+    """
     cr, sr = math.cos(roll), math.sin(roll)
     cp, sp = math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)

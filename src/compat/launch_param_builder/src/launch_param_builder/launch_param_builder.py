@@ -44,7 +44,13 @@ class ParameterBuilder:
     def xacro_parameter(
         self, parameter_name: str, file_path: Path | str, mappings: Mapping[str, Any] | None = None
     ) -> Self:
-        """Adds a parameter with what a xacro file expands to."""
+        """Adds a parameter whose value is the expanded text of a xacro file.
+
+        Args:
+            parameter_name: Name of the parameter.
+            file_path: xacro file, relative to the package.
+            mappings: Arguments of the xacro file.
+        """
         return self.parameter(parameter_name, load_xacro(self._package_path / file_path, mappings))
 
     def parameter(self, parameter_name: str, parameter_value: ParameterValueType) -> Self:

@@ -297,32 +297,72 @@ class PlanningSceneInterface:
 
     @staticmethod
     def make_box(name: str, pose: PoseStamped, size: Vector) -> CollisionObject:
-        """Returns a box, as in `add_box`."""
+        """Returns a box, as in `add_box`.
+
+        Args:
+            name: Name of the object.
+            pose: Pose of the box's centre.
+            size: Lengths of the edges along x, y and z [m].
+        """
         return collision_objects.primitive(name, pose, SolidPrimitive.BOX, size)
 
     @staticmethod
     def make_mesh(name: str, pose: PoseStamped, filename: str, scale: Vector = (1, 1, 1)) -> CollisionObject:
-        """Returns an object with the mesh of a file, as in `add_mesh`."""
+        """Returns an object with the mesh of a file, as in `add_mesh`.
+
+        Args:
+            name: Name of the object.
+            pose: Pose of the mesh's origin.
+            filename: Mesh file.
+            scale: Factors along x, y and z.
+        """
         return collision_objects.mesh(name, pose, filename, scale)
 
     @staticmethod
     def make_sphere(name: str, pose: PoseStamped, radius: float) -> CollisionObject:
-        """Returns a sphere, as in `add_sphere`."""
+        """Returns a sphere, as in `add_sphere`.
+
+        Args:
+            name: Name of the object.
+            pose: Pose of the sphere's centre.
+            radius: Radius [m].
+        """
         return collision_objects.primitive(name, pose, SolidPrimitive.SPHERE, [radius])
 
     @staticmethod
     def make_cylinder(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
-        """Returns a cylinder, as in `add_cylinder`."""
+        """Returns a cylinder, as in `add_cylinder`.
+
+        Args:
+            name: Name of the object.
+            pose: Pose of the cylinder's centre; the axis is z.
+            height: Height [m].
+            radius: Radius [m].
+        """
         return collision_objects.primitive(name, pose, SolidPrimitive.CYLINDER, [height, radius])
 
     @staticmethod
     def make_cone(name: str, pose: PoseStamped, height: float, radius: float) -> CollisionObject:
-        """Returns a cone, as in `add_cone`."""
+        """Returns a cone, as in `add_cone`.
+
+        Args:
+            name: Name of the object.
+            pose: Pose of the cone's centre; the cone stands along z.
+            height: Height [m].
+            radius: Radius of the base [m].
+        """
         return collision_objects.primitive(name, pose, SolidPrimitive.CONE, [height, radius])
 
     @staticmethod
     def make_plane(name: str, pose: PoseStamped, normal: Vector = (0, 0, 1), offset: float = 0) -> CollisionObject:
-        """Returns a plane, as in `add_plane`."""
+        """Returns a plane, as in `add_plane`.
+
+        Args:
+            name: Name of the object.
+            pose: Pose of the frame in which normal and offset are given.
+            normal: Normal of the plane.
+            offset: Constant of the plane normal . p + offset = 0 [m].
+        """
         return collision_objects.plane(name, pose, normal, offset)
 
     def _world(self, components: int) -> list[CollisionObject]:

@@ -181,7 +181,16 @@ class MoveItConfigsBuilder(ParameterBuilder):
         publish_robot_description: bool = False,
         publish_robot_description_semantic: bool = False,
     ) -> Self:
-        """Says what move_group publishes of the planning scene; the robot's descriptions as topics, if wanted."""
+        """Sets which parts of the planning scene move_group publishes.
+
+        Args:
+            publish_planning_scene: Whether to publish changes of the planning scene.
+            publish_geometry_updates: Whether to publish changes of objects and the octomap.
+            publish_state_updates: Whether to publish changes of the robot's state.
+            publish_transforms_updates: Whether to publish changes of fixed transforms.
+            publish_robot_description: Whether to publish the URDF as a topic.
+            publish_robot_description_semantic: Whether to publish the SRDF as a topic.
+        """
         self._configs.planning_scene_monitor = {
             "planning_scene_monitor": {
                 "publish_planning_scene": publish_planning_scene,

@@ -71,6 +71,12 @@ def _moveit1_name(name: str) -> str:
 
 
 def completed(parameters: Mapping[str, Any], source: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
-    """Returns the parameters with those of a source that they lack; of all keys if none are given."""
+    """Returns the parameters, completed by those of a source.
+
+    Args:
+        parameters: Parameters that stay.
+        source: Parameters that are added where `parameters` lacks them.
+        keys: Keys that may be added; empty for all keys.
+    """
     wanted = {key: value for key, value in source.items() if not keys or key in keys}
     return {**wanted, **parameters}

@@ -150,11 +150,23 @@ class MoveGroupInterface:
         return accepted(self._commander.set_joint_value_target, target, value)
 
     def set_joint_value_target_from_pose(self, pose: bytes, link: str, approximate: bool) -> bool:
-        """Sets the joint values that bring a link to a geometry_msgs/Pose."""
+        """Sets the joint values that bring a link to a geometry_msgs/Pose.
+
+        Args:
+            pose: geometry_msgs/Pose in the pose reference frame.
+            link: Link to bring there; empty for the end effector link.
+            approximate: Whether the nearest pose that can be reached is accepted.
+        """
         return accepted(self._commander.set_joint_value_target, read(Pose, pose), link, approximate)
 
     def set_joint_value_target_from_pose_stamped(self, pose: bytes, link: str, approximate: bool) -> bool:
-        """Sets the joint values that bring a link to a geometry_msgs/PoseStamped."""
+        """Sets the joint values that bring a link to a geometry_msgs/PoseStamped.
+
+        Args:
+            pose: geometry_msgs/PoseStamped.
+            link: Link to bring there; empty for the end effector link.
+            approximate: Whether the nearest pose that can be reached is accepted.
+        """
         return accepted(self._commander.set_joint_value_target, read(PoseStamped, pose), link, approximate)
 
     def set_joint_value_target_from_joint_state_message(self, state: bytes) -> bool:
@@ -174,15 +186,37 @@ class MoveGroupInterface:
         return accepted(self._commander.set_pose_targets, poses, end_effector_link)
 
     def set_position_target(self, x: float, y: float, z: float, end_effector_link: str = "") -> bool:
-        """Sets a position target [m]."""
+        """Sets the position target.
+
+        Args:
+            x: Coordinate in the pose reference frame [m].
+            y: Coordinate in the pose reference frame [m].
+            z: Coordinate in the pose reference frame [m].
+            end_effector_link: Link; empty for the end effector link.
+        """
         return accepted(self._commander.set_position_target, [x, y, z], end_effector_link)
 
     def set_rpy_target(self, roll: float, pitch: float, yaw: float, end_effector_link: str = "") -> bool:
-        """Sets an orientation target [rad]."""
+        """Sets the orientation target.
+
+        Args:
+            roll: Angle about x [rad].
+            pitch: Angle about y [rad].
+            yaw: Angle about z [rad].
+            end_effector_link: Link; empty for the end effector link.
+        """
         return accepted(self._commander.set_rpy_target, [roll, pitch, yaw], end_effector_link)
 
     def set_orientation_target(self, x: float, y: float, z: float, w: float, end_effector_link: str = "") -> bool:
-        """Sets an orientation target, a quaternion."""
+        """Sets the orientation target.
+
+        Args:
+            x: Component of the quaternion.
+            y: Component of the quaternion.
+            z: Component of the quaternion.
+            w: Component of the quaternion.
+            end_effector_link: Link; empty for the end effector link.
+        """
         return accepted(self._commander.set_orientation_target, [x, y, z, w], end_effector_link)
 
     # ---------------------------------------------------------------- settings
@@ -247,7 +281,14 @@ class MoveGroupInterface:
         avoid_collisions: bool,
         path_constraints: bytes | None = None,
     ) -> tuple[bytes, float]:
-        """Follows straight lines; returns moveit_msgs/RobotTrajectory and the share that was found, in [0, 1]."""
+        """Returns a moveit_msgs/RobotTrajectory of straight lines and the fraction it covers; -1 after an error.
+
+        Args:
+            waypoints: Poses of the end effector as [x, y, z, qx, qy, qz, qw] or [x, y, z, roll, pitch, yaw] [m, rad].
+            eef_step: Largest distance between two points of the path [m].
+            avoid_collisions: Whether the path must be free of collisions.
+            path_constraints: moveit_msgs/Constraints that each point must satisfy.
+        """
         constraints = None if path_constraints is None else read(Constraints, path_constraints)
         path, share = self._commander.compute_cartesian_path(
             waypoints, eef_step, avoid_collisions=avoid_collisions, path_constraints=constraints
@@ -262,7 +303,15 @@ class MoveGroupInterface:
         acceleration_scaling_factor: float,
         algorithm: str,
     ) -> bytes:
-        """Returns the moveit_msgs/RobotTrajectory with new times."""
+        """Returns the moveit_msgs/RobotTrajectory with new times.
+
+        Args:
+            state: moveit_msgs/RobotState in which the trajectory starts.
+            trajectory: moveit_msgs/RobotTrajectory to time anew.
+            velocity_scaling_factor: Share of the velocity limits, in (0, 1].
+            acceleration_scaling_factor: Share of the acceleration limits, in (0, 1].
+            algorithm: Name of the time parameterisation.
+        """
         return write(
             self._commander.retime_trajectory(
                 read(RobotState, state),
@@ -305,9 +354,21 @@ class MoveGroupInterface:
         return self._commander.place(object_name, list_to_pose(location), plan_only)
 
     def place_poses_list(self, object_name: str, poses: Sequence[bytes], plan_only: bool = False) -> bool:
-        """Places an object at one of some geometry_msgs/PoseStamped."""
+        """Places an object at one of several poses and returns whether that succeeded.
+
+        Args:
+            object_name: Held object.
+            poses: geometry_msgs/PoseStamped each.
+            plan_only: Whether to plan without moving.
+        """
         return self._commander.place(object_name, [read(PoseStamped, pose) for pose in poses], plan_only)
 
     def place_locations_list(self, object_name: str, locations: Sequence[bytes], plan_only: bool = False) -> bool:
-        """Places an object at one of some moveit_msgs/PlaceLocation."""
+        """Places an object at one of several locations and returns whether that succeeded.
+
+        Args:
+            object_name: Held object.
+            locations: moveit_msgs/PlaceLocation each.
+            plan_only: Whether to plan without moving.
+        """
         return self._commander.place(object_name, [read(PlaceLocation, place) for place in locations], plan_only)

@@ -26,7 +26,17 @@ class PlanningSceneInterface:
     def get_known_object_names_in_roi(
         self, minx: float, miny: float, minz: float, maxx: float, maxy: float, maxz: float, with_type: bool = False
     ) -> list[str]:
-        """As get_known_object_names, of the objects in a box [m]."""
+        """Returns the names of the objects in a box of the planning frame.
+
+        Args:
+            minx: Lower bound along x [m].
+            miny: Lower bound along y [m].
+            minz: Lower bound along z [m].
+            maxx: Upper bound along x [m].
+            maxy: Upper bound along y [m].
+            maxz: Upper bound along z [m].
+            with_type: Whether only objects with a type count.
+        """
         return self._scene.get_known_object_names_in_roi(minx, miny, minz, maxx, maxy, maxz, with_type)
 
     def get_object_poses(self, object_ids: Sequence[str]) -> dict[str, bytes]:

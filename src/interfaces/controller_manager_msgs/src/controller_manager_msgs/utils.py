@@ -113,24 +113,48 @@ class ControllerLister:
 
 
 def filter_by_name(ctrl_list: Controllers, ctrl_name: str, match_substring: bool = False) -> list[ControllerState]:
-    """The controllers of that name, or with it in their name."""
+    """Returns the controllers with a name.
+
+    Args:
+        ctrl_list: Controllers to choose from.
+        ctrl_name: Name of the controller.
+        match_substring: Whether a part of the name suffices.
+    """
     return _filter(ctrl_list, lambda controller: _matches(controller.name, ctrl_name, match_substring))
 
 
 def filter_by_type(ctrl_list: Controllers, ctrl_type: str, match_substring: bool = False) -> list[ControllerState]:
-    """The controllers of that type, or with it in their type."""
+    """Returns the controllers of a type.
+
+    Args:
+        ctrl_list: Controllers to choose from.
+        ctrl_type: Type of the controller.
+        match_substring: Whether a part of the type's name suffices.
+    """
     return _filter(ctrl_list, lambda controller: _matches(controller.type, ctrl_type, match_substring))
 
 
 def filter_by_state(ctrl_list: Controllers, ctrl_state: str, match_substring: bool = False) -> list[ControllerState]:
-    """The controllers in that state, or with it in the name of their state."""
+    """Returns the controllers in a state.
+
+    Args:
+        ctrl_list: Controllers to choose from.
+        ctrl_state: State of the controller.
+        match_substring: Whether a part of the state's name suffices.
+    """
     return _filter(ctrl_list, lambda controller: _matches(controller.state, ctrl_state, match_substring))
 
 
 def filter_by_hardware_interface(
     ctrl_list: Controllers, hardware_interface: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """The controllers that claim resources of that hardware interface, or of one with it in its name."""
+    """Returns the controllers that claim resources of a hardware interface.
+
+    Args:
+        ctrl_list: Controllers to choose from.
+        hardware_interface: Name of the hardware interface.
+        match_substring: Whether a part of the name suffices.
+    """
     return _filter(
         ctrl_list,
         lambda controller: any(

@@ -16,7 +16,13 @@ REST_M = 0.001
 
 
 def same_place(one: SceneObject, other: SceneObject, tolerance_m: float) -> bool:
-    """Returns whether two views of an object agree: as many surface points, none farther apart than this [m]."""
+    """Returns whether two views of an object agree: they have the same surface points within a tolerance.
+
+    Args:
+        one: First view.
+        other: Second view.
+        tolerance_m: Largest distance of a point along an axis [m].
+    """
     if one.name != other.name or one.surface.points.shape != other.surface.points.shape:
         return False
     return bool(np.abs(one.surface.points - other.surface.points).max() <= tolerance_m)

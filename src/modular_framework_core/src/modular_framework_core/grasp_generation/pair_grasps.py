@@ -106,7 +106,13 @@ def grasps_on_pairs(pairs: Sequence[ContactPair], query: GraspQuery, settings: P
 def candidates_of(
     grasps: Sequence[PairGrasp], gripper: GripperGeometry, settings: PairGraspSettings
 ) -> list[GraspCandidate]:
-    """Returns grasps in the form that all generators share: all as they are, then all with the hand half turned."""
+    """Returns the candidates of pair grasps: each grasp, then each grasp with the hand turned by 180 degrees.
+
+    Args:
+        grasps: Poses and openings of the hand.
+        gripper: Gripper that grasps.
+        settings: Settings of the search; give the distances of approach and lift.
+    """
     return [
         GraspCandidate(
             grasp.pose.position,

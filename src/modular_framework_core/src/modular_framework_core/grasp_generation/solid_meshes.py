@@ -46,7 +46,13 @@ def outward(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def moved(mesh: TriangleMesh, rotation: Array, translation: Array) -> TriangleMesh:
-    """Returns a mesh after a rotation (3, 3) and a translation (3,) [m]."""
+    """Returns a mesh after a rigid motion.
+
+    Args:
+        mesh: Mesh to move.
+        rotation: Rotation matrix (3, 3).
+        translation: Translation (3,) [m].
+    """
     return TriangleMesh(mesh.vertices @ rotation.T + translation, mesh.triangles)
 
 

@@ -77,6 +77,12 @@ class MutableMatrix:
             del row[index]
 
     def set(self, first: str, second: str, value: bool) -> None:
-        """Sets whether a pair may touch."""
+        """Sets whether a pair may touch.
+
+        Args:
+            first: Name of one link or object.
+            second: Name of the other.
+            value: Whether they may touch.
+        """
         i, j = self.names.index(first), self.names.index(second)
         self.rows[i][j] = self.rows[j][i] = value

@@ -76,7 +76,13 @@ def node_name(node: Node, faults: FaultList) -> str | None:
 
 
 def label(name: str, location: SourceLocation, faults: FaultList) -> None:
-    """Checks the label of a state."""
+    """Checks the label of a state.
+
+    Args:
+        name: Label.
+        location: Place of the label in the task file.
+        faults: List that receives a fault of the label.
+    """
     if not _LABEL.fullmatch(name):
         faults.add(location, f"the label '{name}' must be letters, digits, _ and -, and start with a letter")
 

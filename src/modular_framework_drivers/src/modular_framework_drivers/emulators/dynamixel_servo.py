@@ -68,7 +68,13 @@ def checksum(body: bytes | Iterable[int]) -> int:
 
 
 def packet(servo_id: int, kind: int, parameters: bytes = b"") -> bytes:
-    """A whole packet; `kind` is the instruction, or the error byte of a status packet."""
+    """Returns a packet of Dynamixel protocol 1.0.
+
+    Args:
+        servo_id: Address of the servo.
+        kind: Instruction, or the error byte of a status packet.
+        parameters: Bytes between `kind` and the checksum.
+    """
     body = bytes([servo_id, len(parameters) + 2, kind]) + parameters
     return HEADER + body + bytes([checksum(body)])
 

@@ -225,7 +225,16 @@ class UrEmulator:
     def command_wrench(
         self, fx: float = 0.0, fy: float = 0.0, fz: float = 0.0, tx: float = 0.0, ty: float = 0.0, tz: float = 0.0
     ) -> None:
-        """Set the measured wrench [N, Nm]."""
+        """Sets the measured wrench.
+
+        Args:
+            fx: Force along x [N].
+            fy: Force along y [N].
+            fz: Force along z [N].
+            tx: Torque about x [Nm].
+            ty: Torque about y [Nm].
+            tz: Torque about z [Nm].
+        """
         self.controller.wrench = (float(fx), float(fy), float(fz), float(tx), float(ty), float(tz))
 
     def command_state(self) -> str:

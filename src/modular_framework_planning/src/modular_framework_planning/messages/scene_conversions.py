@@ -222,7 +222,13 @@ def fixed_frames_from(scene: PlanningScene, transforms: Sequence[Any]) -> dict[s
 
 
 def object_to_message(body: core.CollisionObject, frame: str, with_geometry: bool = True) -> CollisionObject:
-    """Writes an object whose pose is given in `frame`."""
+    """Returns the message of an object.
+
+    Args:
+        body: Object.
+        frame: Frame in which the object's pose is given.
+        with_geometry: Whether the message holds shapes and subframes.
+    """
     message = CollisionObject(id=body.name, operation=CollisionObject.ADD)
     message.header.frame_id = frame
     message.pose = pose_message(body.pose)

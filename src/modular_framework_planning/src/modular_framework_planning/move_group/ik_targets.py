@@ -74,7 +74,13 @@ class IkTarget:
         return position, [] if position_only else [OrientationConstraint(link, world, rotation, np.zeros(3), kind)]
 
     def is_reached(self, model: RobotModel, positions: Array, position_only: bool) -> bool:
-        """Returns whether the frame is at its target."""
+        """Returns whether the frame is at its target.
+
+        Args:
+            model: Robot.
+            positions: Joint positions (nq,) [rad or m].
+            position_only: Whether the orientation is free.
+        """
         error = self.target.actInv(model.link_transforms(positions)[self.link] * self.offset)
         rotation_error = 0.0 if position_only else float(np.abs(error.rotation - np.eye(3)).max())
         return max(float(np.abs(error.translation).max()), rotation_error) < POSE_TOLERANCE

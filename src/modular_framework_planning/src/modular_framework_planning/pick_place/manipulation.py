@@ -43,7 +43,13 @@ Posture = Mapping[str, float]
 
 
 def allowing(scene: PlanningScene, links: Iterable[str], others: Iterable[str]) -> PlanningScene:
-    """Returns the scene with contact allowed between each of the links (or bodies) and each of the others."""
+    """Returns the scene with contact allowed between two sets of bodies.
+
+    Args:
+        scene: Scene to start from.
+        links: Links or objects of the first set.
+        others: Links or objects of the second set.
+    """
     acm, names = scene.acm, list(others)
     for link in links:
         for other in names:

@@ -46,7 +46,14 @@ def _max_jerks(trajectory: Trajectory) -> Array:
 
 
 def slowed_to_limits(trajectory: Trajectory, velocity: Array, acceleration: Array, jerk: Array) -> Trajectory:
-    """Returns the trajectory slowed uniformly until it satisfies all limits; arguments of `required_jerk_slowdown`."""
+    """Returns the trajectory, slowed uniformly until it satisfies all limits.
+
+    Args:
+        trajectory: Trajectory to slow.
+        velocity: Limits (n,) [rad/s or m/s].
+        acceleration: Limits (n,) [rad/s^2 or m/s^2].
+        jerk: Limits (n,) [rad/s^3 or m/s^3].
+    """
     usable = 1.0 - MARGIN
     return trajectory.slowed(
         required_jerk_slowdown(trajectory, velocity * usable, acceleration * usable, jerk * usable)

@@ -41,7 +41,14 @@ def gripper_states(sampling: CollisionSampling, gripper: Gripper) -> tuple[float
 
 
 def pad_travel(sampling: CollisionSampling, gripper: Gripper, opened: float, closed: float) -> float:
-    """Returns how far one finger tip moves per unit of the driver between open and closed [m/rad or m/m]."""
+    """Returns how far a finger tip moves per unit of the driver joint [m/rad or m/m].
+
+    Args:
+        sampling: Collision model that measures the gap between the fingers.
+        gripper: Gripper.
+        opened: Position of the driver joint when open [rad or m].
+        closed: Position of the driver joint when closed [rad or m].
+    """
     pairs = _tip_pairs(sampling, gripper, 0.5 * (opened + closed))
     if not pairs or opened == closed:
         return 0.0

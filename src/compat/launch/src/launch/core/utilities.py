@@ -122,6 +122,12 @@ def is_a_subclass(obj: object, entity_type: type) -> bool:
 def ensure_argument_type(argument: Any, types: Any, argument_name: str, caller: str | None = None) -> None:
     """Checks the type of an argument.
 
+    Args:
+        argument: Value to check.
+        types: Type, or types of which the argument may have any.
+        argument_name: Name that the error gives.
+        caller: Name of the function that was called, for the error.
+
     Raises:
         TypeError: It is none of the given types.
     """
