@@ -14,7 +14,7 @@ from reported_experiment import ReportedExperiment
 
 from modular_framework_benchmark.commands.compare_command import main as compare
 from modular_framework_benchmark.commands.report_command import main as report
-from modular_framework_benchmark.episodes.snapshot import COLD_START
+from modular_framework_benchmark.records.results import COLD_START
 from modular_framework_benchmark.results.database import open_database
 from modular_framework_ros.reported_figures import Clock
 
@@ -156,6 +156,13 @@ def test_cold_and_warm_starts_mixed_would_show_a_change_and_a_slower_planner_doe
     assert compare([before, mixed, "--fail-on-regression"]) == 1
     slower = stored_with_block(tmp_path / "slower.db", 2, 0.05)
     assert compare([stored_with_block(tmp_path / "known.db", 5), slower, "--fail-on-regression"]) == 1
+
+
+def test_a_report_says_how_many_episodes_were_the_first_of_their_stack(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    assert report([stored_with_block(tmp_path / "results.db", 5), "--into", str(page)]) == 0
+    count = sum(record.spec.trial % 5 == 0 for record in RUN.records())
+    assert f"{count} of the episodes were the first of their stack" in page.read_text()
 
 
 def test_two_experiments_of_one_database_are_compared_by_name(

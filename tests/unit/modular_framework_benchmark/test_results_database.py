@@ -73,15 +73,16 @@ def test_the_tables_of_results_have_typed_columns(path: Path) -> None:
     with open_database(path, create=True) as database:
         number = database.add_experiment(sample_description(), episodes)
         database.write(number, sample_record(episodes[7], EpisodeStatus.BROKEN, metrics={"planning_time": math.nan}))
-        database.write(number, sample_record(episodes[2]))
+        database.write(number, sample_record(episodes[2], snapshot={"cold_start": True}))
         results = database.load(number)
 
     table = results.episodes
     assert results.planned == 12
     assert list(table["number"]) == [2, 7]
     assert list(table["status"]) == ["succeeded", "broken"]
-    assert list(table["success"]) == [True, False]
-    assert table["success"].dtype == bool
+    for name in ("success", "cold_start"):
+        assert list(table[name]) == [True, False]
+        assert table[name].dtype == bool
     assert list(table["grasp_method"]) == ["antipodal", "antipodal"]
     assert list(table["speed"]) == ["0.50", "0.50"]
     assert table["planning_time"][0] == 0.375

@@ -26,6 +26,7 @@ from modular_framework_benchmark.statistics.analysis import (
     summarise_by_level,
 )
 from modular_framework_benchmark.statistics.comparison import Comparison, Estimate, Verdict
+from modular_framework_ros.reported_figures import Clock
 
 COLLISION = Metric("collision", "execution", MetricKind.RATE, Direction.LOWER)
 CLEARANCE = Metric("clearance", "planning", MetricKind.VALUE, Direction.HIGHER, "m")
@@ -182,6 +183,29 @@ def test_a_time_that_nothing_measured_is_missing_and_not_at_its_limit() -> None:
     in_part = results_of(statuses, (search,), {"search_time": {"A": [np.nan] * 2, "B": [1.0, np.nan]}})
     found = next(each for each in summarise(in_part) if (each.method, each.metric) == ("A", "search_time"))
     assert found.counts.censored == 1 and found.counts.missing == 1  # the failure, and the success without a value
+
+
+@pytest.mark.parametrize("clock", [Clock.WALL, Clock.PROCESSOR, Clock.SIMULATED])
+def test_a_first_episode_of_a_stack_is_not_compared_in_real_time_with_a_later_one(clock: Clock) -> None:
+    first = np.arange(60) % 3 == 0  # of A only: its stack ended after every third episode
+    noise = np.random.default_rng(1).normal(0.0, 0.01, (2, 60))
+    times = {"A": 1.0 + 0.5 * first + noise[0], "B": 1.0 + noise[1]}
+    metric = dataclasses.replace(TIME, clock=clock)
+    results = results_of({name: ["succeeded"] * 60 for name in times}, (metric,), {TIME.name: times})
+    marked = results.episodes.assign(cold_start=[*first, *[False] * 60])
+    found = compare(dataclasses.replace(results, episodes=marked))[1]
+    if clock is Clock.SIMULATED:
+        assert (found.counts.pairs, found.counts.unlike, found.verdict) == (60, 0, Verdict.SECOND_BETTER)
+        return
+    assert (found.counts.pairs, found.counts.unlike, found.counts.missing) == (40, 20, 0)
+    assert found.verdict is Verdict.NOT_SHOWN
+    assert "20 pairs left out because only one episode is the first of its stack" in found.notes
+    both = compare(dataclasses.replace(results, episodes=results.episodes.assign(cold_start=[*first, *first])))[1]
+    assert (both.counts.pairs, both.counts.unlike) == (60, 0)
+    none = compare(
+        dataclasses.replace(results, episodes=results.episodes.assign(cold_start=[True] * 60 + [False] * 60))
+    )
+    assert none[1].verdict is Verdict.NO_DATA and "only one episode is the first of its stack" in none[1].sentence
 
 
 def test_missing_values_are_left_out_and_counted() -> None:

@@ -52,9 +52,7 @@ def _compare(given: argparse.Namespace) -> int:
             *differences_of(before.compared_snapshots, after.compared_snapshots),
             *content_differences(before.results.description, after.results.description),
         )
-        regression = dataclasses.replace(
-            compare_experiments(before.results_by_start, after.results_by_start), differing=differing
-        )
+        regression = dataclasses.replace(compare_experiments(before.results, after.results), differing=differing)
         print(regression_text(regression), end="")
         if given.into is not None:
             write_file(given.into, regression_page(regression, before.database.label, after.database.label).encode())

@@ -37,7 +37,7 @@ def write_page(opened: OpenedExperiment, into: Path) -> str:
         ReportError: The file is not writable.
         ResultsError: The database is unreadable.
     """
-    content = gather(opened.results_by_start, opened.source(into.absolute().parent))
+    content = gather(opened.results, opened.source(into.absolute().parent))
     write_file(into, report_page(content, opened.database.label).encode())
     return answer_text(content)
 
@@ -70,7 +70,7 @@ def _report(given: argparse.Namespace) -> int:
     with open_source(given.database, given.experiment) as opened:
         name = opened.results.description.name
         into = given.into or Path(f"{name}_{figure}.{image_format}" if figure else f"{name}.html")
-        content = gather(opened.results_by_start, opened.source(into.absolute().parent), given.mean_intervals)
+        content = gather(opened.results, opened.source(into.absolute().parent), given.mean_intervals)
         if given.table:
             return _write_table(content, given)
         if figure == "list":

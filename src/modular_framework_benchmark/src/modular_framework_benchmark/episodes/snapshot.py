@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from modular_framework_benchmark.records.results import COLD_START
+
 PACKAGES = ("coal", "eaik", "mujoco", "numba", "numpy", "ompl", "pin", "pybullet", "ruckig", "scipy", "toppra")
 """Packages whose versions affect results."""
 
-COLD_START = "cold_start"
-"""Snapshot part that marks the first episode of a stack."""
 VARYING_PARTS = ("seed", "settings", "parameters", "final_objects", COLD_START)
 """Snapshot parts that differ between episodes by nature."""
 RUN_MARK = "MODULAR_FRAMEWORK_RUN"

@@ -61,6 +61,11 @@ class Metric:
     source: Source = Source.MEASURED
 
     @property
+    def depends_on_machine(self) -> bool:
+        """Returns whether the values are real or processor times, which the first episode of a stack lengthens."""
+        return self.clock in (Clock.WALL, Clock.PROCESSOR)
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Returns the smallest and largest value of an episode, including the limit, in the metric's unit."""
         never_negative = self.kind in (MetricKind.COUNT, MetricKind.TIME)

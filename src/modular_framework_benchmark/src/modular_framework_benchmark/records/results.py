@@ -9,6 +9,9 @@ import pandas as pd
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription
 
+COLD_START = "cold_start"
+"""Snapshot part and column that marks the first episode of a stack."""
+
 
 @dataclass(frozen=True, slots=True)
 class ExperimentResults:
@@ -20,7 +23,8 @@ class ExperimentResults:
             of `EpisodeStatus`), `success` (bool), `outcome`, `cause`, `begun`, `wall_s`, `simulated_s`, `folder`,
             `worker`; a column named after each factor with the labels of the levels; a column named after each metric
             (float, NaN without a value; 0 and 1 for a rate); in the mode `planning` also `drawn_problem`, a text that
-            identifies the problem.
+            identifies the problem. `cold_start` (bool) marks the first episode of a stack; without the column, no
+            episode is marked.
         spans: A row per span, with the columns `number` (of the episode), `kind`, `name`, `started_s`, `ended_s`,
             `outcome`, `failed`, `reason`.
         planned: Total number of episodes, finished or not.

@@ -8,20 +8,17 @@ statistics are those of a comparison of two methods.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 import pandas as pd
 
-from modular_framework_benchmark.episodes.snapshot import COLD_START
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
-from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.statistics.analysis import compare
 from modular_framework_benchmark.statistics.comparison import Comparison, Verdict
 from modular_framework_benchmark.statistics.observations import SUCCESS, metrics_of
-from modular_framework_ros.reported_figures import Clock
 
 SIDE = "side"
 AFTER, BEFORE = "after", "before"
@@ -189,8 +186,6 @@ def _merged(
         sides.append(rows.assign(**{SIDE: side}))
     key = [factor.name for factor in others] + ["trial"]
     sides[1] = _unpair_different_seeds(sides[0], sides[1], key)
-    if all(COLD_START in side for side in sides):
-        sides = _mask_unlike_starts(sides, key, metrics)
     factors = (Factor(SIDE, (AFTER, BEFORE)), *_all_levels(others, sides))
     description = dataclasses.replace(
         before.description,
@@ -204,18 +199,6 @@ def _merged(
     episodes = pd.concat(sides, ignore_index=True)
     finished = all(len(item.episodes) >= item.planned for item in (before, after))
     return ExperimentResults(description, episodes, before.spans.iloc[:0], len(episodes) + (0 if finished else 1))
-
-
-def _mask_unlike_starts(sides: Sequence[pd.DataFrame], key: list[str], metrics: Sequence[Metric]) -> list[pd.DataFrame]:
-    """Returns the episodes of both sides, without real and processor times in pairs of a cold and a warm start."""
-    names = [metric.name for metric in metrics if metric.clock in (Clock.WALL, Clock.PROCESSOR)]
-    starts = [side.set_index(key)[COLD_START] for side in sides]
-    common = []
-    for side, own, other in zip(sides, starts, reversed(starts), strict=True):
-        partners = other.reindex(own.index)
-        unlike = (partners.notna() & (partners != own)).to_numpy()
-        common.append(side.assign(**{name: side[name].mask(unlike) for name in names}))
-    return common
 
 
 def _all_levels(factors: tuple[Factor, ...], sides: list[pd.DataFrame]) -> list[Factor]:

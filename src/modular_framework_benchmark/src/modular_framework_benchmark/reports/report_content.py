@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Metric
-from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.reports.distribution_figures import distribution_figures
 from modular_framework_benchmark.reports.failure_groups import Failures, failures_figure, group_failures
 from modular_framework_benchmark.reports.figure_style import NamedFigure
@@ -68,6 +68,7 @@ class RunFacts:
         workers: Number of workers.
         seeds: Number of distinct seeds.
         trials: Number of distinct trials.
+        cold_starts: Number of episodes that were the first of their stack.
     """
 
     begun: float | None
@@ -76,6 +77,7 @@ class RunFacts:
     workers: int
     seeds: int
     trials: int
+    cold_starts: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +190,7 @@ def _present(*figures: NamedFigure | None) -> list[NamedFigure]:
 def _run_facts(results: ExperimentResults) -> RunFacts:
     episodes = results.episodes
     if episodes.empty:
-        return RunFacts(None, None, 0.0, 0, 0, 0)
+        return RunFacts(None, None, 0.0, 0, 0, 0, 0)
     begun, wall = episodes["begun"].astype(float), episodes["wall_s"].astype(float)
     ended = (begun + wall).max()
     return RunFacts(
@@ -198,6 +200,7 @@ def _run_facts(results: ExperimentResults) -> RunFacts:
         int(episodes["worker"].nunique()),
         int(episodes["seed"].nunique()),
         int(episodes["trial"].nunique()),
+        int(episodes[COLD_START].sum()) if COLD_START in episodes else 0,
     )
 
 

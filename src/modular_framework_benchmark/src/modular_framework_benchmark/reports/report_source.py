@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from modular_framework_benchmark.episodes.snapshot import COLD_START, VARYING_PARTS
+from modular_framework_benchmark.episodes.snapshot import VARYING_PARTS
 from modular_framework_benchmark.records.results import ExperimentResults
 from modular_framework_benchmark.reports.errors import ReportError
 from modular_framework_benchmark.reports.report_content import ReportSource
@@ -39,13 +39,6 @@ class OpenedExperiment:
     def compared_snapshots(self) -> SnapshotValues:
         """Returns the snapshots with the settings, in which two experiments may differ."""
         return self.database.snapshot_values(self.number, [part for part in VARYING_PARTS if part != SETTINGS])
-
-    @property
-    def results_by_start(self) -> ExperimentResults:
-        """Returns the results with the column `cold_start`: whether an episode was the first of its stack."""
-        cold = self.database.flagged_episodes(self.number, COLD_START)
-        episodes = self.results.episodes
-        return replace(self.results, episodes=episodes.assign(**{COLD_START: episodes["number"].isin(cold)}))
 
     def source(self, report_folder: Path) -> ReportSource:
         """Returns the source of a report's further data.

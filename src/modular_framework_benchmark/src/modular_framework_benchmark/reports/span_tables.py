@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from modular_framework_benchmark.episodes.snapshot import COLD_START
 from modular_framework_benchmark.records.episode import EpisodeStatus
-from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.reports.failure_groups import Link, episode_links
 from modular_framework_benchmark.statistics.observations import methods_of
 

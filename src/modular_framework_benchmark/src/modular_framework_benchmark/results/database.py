@@ -326,12 +326,6 @@ class ResultDatabase:
             self._description(connection, number)
             return result_tables.snapshot_values(connection, number, leave_out)
 
-    def flagged_episodes(self, number: int, name: str) -> frozenset[int]:
-        """Returns the numbers of the episodes in whose snapshots the named part is true."""
-        with self._reading() as connection:
-            self._description(connection, number)
-            return result_tables.flagged_episodes(connection, number, name)
-
     def _description(self, connection: Connection, number: int) -> ExperimentDescription:
         if number not in self._descriptions:
             row = connection.execute(select(DESCRIPTIONS.c.content).where(DESCRIPTIONS.c.id == number)).one_or_none()

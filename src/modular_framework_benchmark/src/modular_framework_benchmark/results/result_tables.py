@@ -11,7 +11,7 @@ import pandas as pd
 from sqlalchemy import Connection, Select, case, column, func, select, table
 
 from modular_framework_benchmark.records.experiment import ExperimentDescription
-from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.results.columns import SUCCESS
 from modular_framework_benchmark.results.finished_episodes import STATUS_VALUES
 from modular_framework_benchmark.results.schema import EPISODES, RECORDS, RUNS, SNAPSHOT_VALUES, SPANS
@@ -70,6 +70,7 @@ def load_episodes(connection: Connection, number: int, description: ExperimentDe
     frame |= {name: pd.Series(columns[name], dtype="float64") for name in metrics}
     if "settings" in columns:
         frame["drawn_problem"] = pd.Series([_problem(text) for text in columns["settings"]], dtype="str")
+    frame[COLD_START] = frame["number"].isin(_flagged_episodes(connection, number, COLD_START))
     return pd.DataFrame(frame)
 
 
@@ -167,7 +168,7 @@ def snapshot_values(
     return {name: sorted(values, key=lambda each: -each[1]) for name, values in sorted(found.items())}
 
 
-def flagged_episodes(connection: Connection, number: int, name: str) -> frozenset[int]:
+def _flagged_episodes(connection: Connection, number: int, name: str) -> frozenset[int]:
     """Returns the numbers of the episodes in whose snapshots a part is true.
 
     Args:

@@ -124,6 +124,7 @@ class PairCounts:
         failed: Compared episodes that rank worse than any value.
         broken: Compared episodes that are broken.
         missing: Pairs excluded because an episode has no value of the metric.
+        unlike: Pairs excluded from a real or processor time because only one episode is the first of its stack.
         unmatched: Finished episodes without a finished or planned partner.
         at_random: Whether pairs share only their levels, because no trial occurs in both methods.
     """
@@ -135,6 +136,7 @@ class PairCounts:
     failed: int
     broken: int
     missing: int
+    unlike: int
     unmatched: int
     at_random: bool
 

@@ -67,7 +67,7 @@ def compare_pair(table: EpisodeTable, metric: Metric, first: str, second: str, s
 
 
 def _empty_finding(first: str, second: str, metric: Metric) -> Finding:
-    return Finding(first, second, PairCounts(0, 0, 0, 0, 0, 0, 0, 0, False), metric=metric)
+    return Finding(first, second, PairCounts(0, 0, 0, 0, 0, 0, 0, 0, 0, False), metric=metric)
 
 
 def _compare_pairs(empty: Finding, matched: Pairs, settings: Settings) -> Finding:
@@ -111,6 +111,7 @@ def _counts(matched: Pairs, outcomes: Floats, units: int) -> PairCounts:
         failed=int(sum(np.isinf(side.scores).sum() for side in sides)),
         broken=int(sum(side.broken.sum() for side in sides)),
         missing=matched.missing,
+        unlike=matched.unlike,
         unmatched=matched.unmatched,
         at_random=matched.at_random,
     )

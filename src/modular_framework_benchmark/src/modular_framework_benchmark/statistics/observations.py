@@ -10,6 +10,8 @@ This module defines the value of an episode that failed, timed out, broke or lac
 - Missing: a rate without a value, a metric without a value in any episode, a successful episode without a value.
   Missing values are excluded from the figures and counted.
 
+Real and processor times are compared only between two first episodes of their stacks or two later episodes.
+
 The module also defines the independent units: episodes that share a drawn problem or seed belong to one unit.
 """
 
@@ -25,7 +27,7 @@ from numpy.typing import NDArray
 
 from modular_framework_benchmark.records.episode import EpisodeStatus
 from modular_framework_benchmark.records.experiment import Direction, Factor, Metric, MetricKind
-from modular_framework_benchmark.records.results import ExperimentResults
+from modular_framework_benchmark.records.results import COLD_START, ExperimentResults
 from modular_framework_benchmark.statistics.comparison import EpisodeCounts
 
 SUCCESS = Metric("success", "task", MetricKind.RATE, Direction.HIGHER, description="The episode succeeded.")
@@ -69,6 +71,7 @@ class Pairs:
         first: Observations of the first method.
         second: Observations of the second method, in the order of their partners.
         missing: Number of pairs excluded because a value is missing.
+        unlike: Number of pairs excluded because only one episode is the first of its stack.
         unmatched: Number of episodes without a partner.
         at_random: Whether partners share only the levels of the other factors.
     """
@@ -76,6 +79,7 @@ class Pairs:
     first: Observations
     second: Observations
     missing: int
+    unlike: int
     unmatched: int
     at_random: bool
 
@@ -169,6 +173,8 @@ class EpisodeTable:
         self._succeeded = episodes["success"].to_numpy(bool)
         self._statuses = episodes["status"].to_numpy()
         self._broken = np.asarray(self._statuses == EpisodeStatus.BROKEN.value, dtype=bool)
+        first_of_stack = episodes[COLD_START] if COLD_START in episodes else np.zeros(len(episodes), dtype=bool)
+        self._first_of_stack = np.asarray(first_of_stack, dtype=bool)
         self._strata = _strata(results)
         self._units, self.unit_noun = _units(results, self._strata)
         trials = episodes["trial"].to_numpy(np.int64)
@@ -223,11 +229,16 @@ class EpisodeTable:
             keys = [_order_within(self._strata[of_method]) for of_method in rows]
         _, *places = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
         column = self._column(metric)
-        sides = [column.at_rows(of_method[place]) for of_method, place in zip(rows, places, strict=True)]
-        count = len(sides[0].scores)
-        found = Pairs(sides[0], sides[1], 0, len(rows[0]) + len(rows[1]) - 2 * count, at_random)
-        found = found.selected(~np.isnan(sides[0].scores) & ~np.isnan(sides[1].scores))
-        return dataclasses.replace(found, missing=count - len(found))
+        paired = [of_method[place] for of_method, place in zip(rows, places, strict=True)]
+        sides = [column.at_rows(of_method) for of_method in paired]
+        count = len(paired[0])
+        alike = np.ones(count, dtype=bool)
+        if metric.depends_on_machine:
+            alike = self._first_of_stack[paired[0]] == self._first_of_stack[paired[1]]
+        present = ~np.isnan(sides[0].scores) & ~np.isnan(sides[1].scores)
+        missing, unlike = int(np.sum(~present)), int(np.sum(present & ~alike))
+        found = Pairs(sides[0], sides[1], missing, unlike, len(rows[0]) + len(rows[1]) - 2 * count, at_random)
+        return found.selected(present & alike)
 
     def _column(self, metric: Metric) -> Observations:
         """Returns the observations of a metric in every episode."""

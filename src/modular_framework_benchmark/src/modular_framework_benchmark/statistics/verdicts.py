@@ -106,6 +106,8 @@ def _sentence(finding: Finding, verdict: Verdict, needed: int | None, planned: f
 def _reason(finding: Finding) -> str:
     if finding.counts.missing:
         return f"no pair has both values; {finding.counts.missing} pairs lack a value"
+    if finding.counts.unlike:
+        return f"of each of {finding.counts.unlike} pairs, only one episode is the first of its stack"
     return "no two episodes to compare"
 
 
@@ -165,6 +167,9 @@ def _exclusions(finding: Finding) -> tuple[str, ...]:
         if counts.failed
         else "",
         f"{sentences.count(counts.missing, 'pair')} left out because an episode has no value" if counts.missing else "",
+        f"{sentences.count(counts.unlike, 'pair')} left out because only one episode is the first of its stack"
+        if counts.unlike
+        else "",
         f"{sentences.count(counts.unmatched, 'episode')} without a partner" if counts.unmatched else "",
         f"{counts.pairs} pairs of {sentences.count(counts.units, finding.unit_noun)}; all pairs of a unit count as one"
         if counts.pairs_per_unit > 1.0
