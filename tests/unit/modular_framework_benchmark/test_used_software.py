@@ -15,7 +15,13 @@ from modular_framework_benchmark.episodes.episode_record import EpisodeEnd, make
 from modular_framework_benchmark.episodes.ros_package_sources import package_source, tree_digest
 from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.snapshot import MachineLoad
+from modular_framework_benchmark.metrics.measurements import ComponentReport
+from modular_framework_benchmark.modes.measured_record import Stopwatch, measured_record
 from modular_framework_benchmark.records.episode import EpisodeSpec, EpisodeStatus
+from modular_framework_benchmark.records.used_software import UsedSoftware
+from modular_framework_planning.plan_statistics import PlannerRun
+
+REPLACED = "the named software did not run: planner 'BKPIECEE' was named, and RRTConnect planned"
 
 
 def plan(planner: str, implementation: str, replaced: str = "") -> dict[str, Any]:
@@ -35,7 +41,8 @@ def stack(tmp_path: Path, *plans: dict[str, Any]) -> dict[str, Any]:
 
 
 def record_of(tmp_path: Path, ran: dict[str, Any]) -> Any:
-    end = EpisodeEnd(EpisodeSpec(0, {}, 0, 1, {}), tmp_path, time.time(), time.monotonic(), MachineLoad.now())
+    spec = EpisodeSpec(0, {}, 0, 1, {"metrics": ["success"]})
+    end = EpisodeEnd(spec, tmp_path, time.time(), time.monotonic(), MachineLoad.now())
     return make_record(end.ended(EpisodeStatus.SUCCEEDED, "", {"ran": ran, "task_s": 1.0}))
 
 
@@ -74,16 +81,26 @@ def test_a_documented_substitution_is_recorded_and_the_episode_counts(tmp_path: 
 
 def test_an_episode_in_which_another_planner_ran_is_invalid_and_says_which(tmp_path: Path) -> None:
     record = record_of(tmp_path, stack(tmp_path, plan("RRTConnect", "compiled", replaced="BKPIECEE")))
-    assert record.status is EpisodeStatus.BROKEN
-    assert record.cause == ("the named software did not run: planner 'BKPIECEE' was named, and RRTConnect planned")
+    assert record.status is EpisodeStatus.INVALID
+    assert record.cause == REPLACED
+    assert record.metrics == {"success": None}
+
+
+def test_a_plan_without_simulation_by_another_planner_is_invalid(tmp_path: Path) -> None:
+    run = PlannerRun("ompl", "RRTConnect", {}, (), "compiled", "BKPIECEE")
+    ran = UsedSoftware().with_plans([run])
+    report = ComponentReport("planning", "boxes", True, "", 0.0, 1.0, wall_s=1.0, ran=ran)
+    spec = EpisodeSpec(0, {}, 0, 1, {"metrics": ["success", "planning_time"]})
+    record = measured_record(spec, EpisodeStatus.SUCCEEDED, "SUCCESS", report, tmp_path, Stopwatch())
+    assert (record.status, record.cause) == (EpisodeStatus.INVALID, REPLACED)
+    assert record.metrics == {"success": None, "planning_time": None}
 
 
 def test_a_sequence_that_failed_says_what_planned_its_motions(tmp_path: Path) -> None:
     runs = [plan("LIN", "")["run"], plan("RRTConnect", "compiled", replaced="BKPIECEE")["run"]]
     record = record_of(tmp_path, stack(tmp_path, {"kind": "sequence", "error_code": -1, "runs": runs}))
     assert set(record.snapshot["planners"]) == {"LIN of ompl", "RRTConnect of ompl"}
-    assert record.status is EpisodeStatus.BROKEN
-    assert record.cause == "the named software did not run: planner 'BKPIECEE' was named, and RRTConnect planned"
+    assert (record.status, record.cause) == (EpisodeStatus.INVALID, REPLACED)
 
 
 def test_the_digest_of_a_method_changes_with_its_sources_and_not_with_caches(tmp_path: Path) -> None:

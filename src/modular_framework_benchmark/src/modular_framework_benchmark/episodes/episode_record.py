@@ -90,8 +90,8 @@ def make_record(end: EpisodeEnd) -> EpisodeRecord:
     """Returns the record of an episode whose processes have all ended."""
     wall_s = time.monotonic() - end.begun_monotonic
     software = UsedSoftware.from_parts(end.answer.get("ran", {}))
-    if software.replaced:
-        end = end.broken(f"the named software did not run: {'; '.join(software.replaced)}")
+    if software.invalid_cause:
+        end = end.ended(EpisodeStatus.INVALID, software.invalid_cause, end.answer)
     recording = read_recording(end.folder)
     states = _state_spans(end)
     answer = end.answer

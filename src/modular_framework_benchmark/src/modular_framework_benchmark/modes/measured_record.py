@@ -57,8 +57,10 @@ def measured_record(
         watch: Stopwatch of the episode.
     """
     generation_s = report.wall_s if report.component == "generation" else None
+    invalid_cause = report.ran.invalid_cause
+    status, cause = (EpisodeStatus.INVALID, invalid_cause) if invalid_cause else (status, report.reason)
     measurements = EpisodeMeasurements(
-        spec.settings, status, outcome, report.reason, generation_s=generation_s, reports=(report,), folder=folder
+        spec.settings, status, outcome, cause, generation_s=generation_s, reports=(report,), folder=folder
     )
     try:
         measured = measure(spec.settings.get("metrics", ()), measurements)
@@ -71,11 +73,11 @@ def measured_record(
         spec=spec,
         status=status,
         outcome=outcome,
-        cause=report.reason,
+        cause=cause,
         begun=watch.begun,
         wall_s=watch.elapsed_s(),
         simulated_s=None,
-        metrics=measured.values,
+        metrics={name: None if invalid_cause else value for name, value in measured.values.items()},
         spans=(span,),
         snapshot={
             **versions(),

@@ -69,6 +69,11 @@ class UsedSoftware:
     substitutions: tuple[str, ...] = ()
     replaced: tuple[str, ...] = ()
 
+    @property
+    def invalid_cause(self) -> str:
+        """Returns why an episode that used this software is invalid; "" if the named software ran."""
+        return f"the named software did not run: {'; '.join(self.replaced)}" if self.replaced else ""
+
     def as_json(self) -> dict[str, Any]:
         """Returns the entries of a snapshot."""
         return asdict(self) | {"planners": {name: planner.as_json() for name, planner in self.planners.items()}}
