@@ -12,7 +12,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from modular_framework_urdf.rotations import matrix_from_rpy, quaternion_from_rpy, rpy_from_quaternion
+from modular_framework_urdf.rotations import (
+    matrix_from_rpy,
+    quaternion_from_matrix,
+    quaternion_from_rpy,
+    rpy_from_quaternion,
+)
 
 ANGLE = st.floats(-7.0, 7.0)
 COORDINATE = st.floats(-1.0, 1.0).filter(lambda value: value == 0.0 or abs(value) > 1e-3)
@@ -24,6 +29,19 @@ def test_roll_pitch_and_yaw_are_turns_about_the_fixed_axes(roll: float, pitch: f
     wanted = Rotation.from_euler("xyz", (roll, pitch, yaw))
     assert np.allclose(matrix_from_rpy(roll, pitch, yaw), wanted.as_matrix(), atol=1e-14)
     assert np.allclose(quaternion_from_rpy(roll, pitch, yaw), wanted.as_quat(), atol=1e-14)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.tuples(COORDINATE, COORDINATE, COORDINATE, COORDINATE).filter(any))
+@example((1.0, 0.0, 0.0, 0.0))
+@example((0.0, 1.0, 0.0, 0.0))
+@example((0.0, 0.0, 1.0, 0.0))
+@example((0.5, 0.5, -0.5, 0.5))
+def test_the_quaternion_of_a_matrix_is_scipys(quaternion: tuple[float, float, float, float]) -> None:
+    wanted = Rotation.from_quat(quaternion)
+    found = np.array(quaternion_from_matrix(wanted.as_matrix().tolist()))
+    assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-15)
+    assert np.allclose(found * np.sign(found @ wanted.as_quat()), wanted.as_quat(), atol=1e-14)
 
 
 @settings(max_examples=300, deadline=None)

@@ -35,6 +35,25 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     )
 
 
+def quaternion_from_matrix(rows: Sequence[Sequence[float]]) -> Quaternion:
+    """Returns the unit quaternion of the rows of a rotation matrix; its largest component is positive.
+
+    Divides by the largest component only (Shepperd, 1978), which keeps the precision for every rotation.
+    """
+    trace = rows[0][0] + rows[1][1] + rows[2][2]
+    diagonal = [rows[0][0], rows[1][1], rows[2][2]]
+    vector = [rows[2][1] - rows[1][2], rows[0][2] - rows[2][0], rows[1][0] - rows[0][1]]
+    if trace >= max(diagonal):
+        x, y, z, w = *vector, 1.0 + trace
+    else:
+        largest = diagonal.index(max(diagonal))
+        row = [rows[i][largest] + rows[largest][i] for i in range(3)]
+        row[largest] = 1.0 - trace + 2.0 * diagonal[largest]
+        x, y, z, w = *row, vector[largest]
+    norm = math.hypot(x, y, z, w)
+    return (x / norm, y / norm, z / norm, w / norm)
+
+
 def matrix_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[Vector3, Vector3, Vector3]:
     """Returns the rows of the rotation matrix of roll, pitch and yaw (REP 103).
 

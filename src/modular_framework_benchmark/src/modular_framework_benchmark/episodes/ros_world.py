@@ -13,10 +13,10 @@ import rosgraph
 import rospy
 from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
-from scipy.spatial.transform import Rotation
 from std_srvs.srv import Trigger, TriggerRequest
 
 from modular_framework_ros.calls import call_service, request_service, wait_for_service
+from modular_framework_urdf.rotations import quaternion_from_rpy
 
 SPAWN_SERVICE, REFEREE_SERVICE = "/gazebo/spawn_sdf_model", "/gazebo/referee"
 SIMULATION_NODE, TASK_NODE = "/gazebo", "/task"
@@ -39,7 +39,7 @@ def spawn(entry: dict[str, Any]) -> None:
     """
     proxy = rospy.ServiceProxy(SPAWN_SERVICE, SpawnModel)
     wait_for_service(proxy, SERVICE_TIMEOUT_S)
-    x, y, z, w = Rotation.from_euler("xyz", entry["rpy"]).as_quat()
+    x, y, z, w = quaternion_from_rpy(*entry["rpy"])
     pose = Pose(Point(*entry["position"]), Quaternion(x, y, z, w))
     request = SpawnModel._request_class(entry["name"], _description(entry["model"]), "", pose, "world")
     response = call_service(proxy, request, SERVICE_TIMEOUT_S)

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from modular_framework_simulation.models import sdf_specs as specs
 from modular_framework_simulation.models.mesh_files import load_mesh
 from modular_framework_simulation.models.poses import Pose
-from modular_framework_urdf.rotations import rotate_vector
+from modular_framework_urdf.rotations import quaternion_from_matrix, rotate_vector
 
 Array = NDArray[np.float64]
 
@@ -85,10 +84,10 @@ def along_principal_axes(inertial: specs.Inertial) -> specs.Inertial:
     moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
-    x, y, z, w = Rotation.from_matrix(axes).as_quat().tolist()
+    orientation = quaternion_from_matrix(axes.tolist())
     one, two, three = moments.tolist()
     return specs.Inertial(
-        inertial.pose @ Pose((0.0, 0.0, 0.0), (x, y, z, w)), inertial.mass, (one, 0.0, 0.0, two, 0.0, three)
+        inertial.pose @ Pose((0.0, 0.0, 0.0), orientation), inertial.mass, (one, 0.0, 0.0, two, 0.0, three)
     )
 
 
