@@ -17,15 +17,12 @@ from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
 from modular_framework_ros.action_client import is_connected
-from modular_framework_ros.ros_frozen_nodes import frozen_nodes
+from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 from modular_framework_ros.start_up import WaitReport, wait_for_start
 from modular_framework_ros.stop_requests import stop_requested
 
 POLL_PERIOD_S = 0.01
 STOP_PERIOD_S = 0.05
-
-WATCHED_AFTER_S = 2.0
-"""Wait after which a call checks for frozen nodes [s]."""
 
 CANCEL_WAIT_S = 0.5
 """Maximum wait for the result of a cancelled goal [s]; a task must end within a second of a stop request."""

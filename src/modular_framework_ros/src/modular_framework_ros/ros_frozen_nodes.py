@@ -13,9 +13,11 @@ import time
 import psutil
 import rosgraph
 
-LOOK_PERIOD_S, NODES_PERIOD_S = 1.0, 5.0
+LOOK_PERIOD_S, NODES_PERIOD_S = 0.5, 5.0
 """Period of the process checks, and of the requests for the master's node list [s]."""
 FROZEN_AFTER_S = 2.5
+WATCHED_AFTER_S = 1.0
+"""Duration of a wait before it checks for frozen nodes [s]; most waits end earlier and need no watch."""
 
 
 def frozen_nodes() -> str:

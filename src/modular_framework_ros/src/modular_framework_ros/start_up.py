@@ -9,6 +9,7 @@ from collections.abc import Callable
 import rospy
 
 from modular_framework_ros.declared_parameters import DeclaredParameters
+from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 
 START_TIMEOUT_PARAMETER = "/start_timeout"
 REPORT_PERIOD_S = 10.0
@@ -24,7 +25,7 @@ def start_timeout() -> float:
 
 
 class WaitReport:
-    """Logs a long wait every ten seconds.
+    """Logs a long wait every ten seconds, and frozen nodes at once.
 
     Args:
         what: Name of the missing item, or a function that returns it.
@@ -34,15 +35,21 @@ class WaitReport:
     def __init__(self, what: str | Callable[[], str], timeout_s: float) -> None:
         self._what, self._timeout_s = what, timeout_s
         self._begun_s = self._reported_s = time.monotonic()
+        self._frozen = ""
 
     def remind(self) -> None:
-        """Logs the wait if ten seconds have passed since the last message."""
+        """Logs the wait if ten seconds have passed since the last message, or if a node was found to be frozen."""
         now_s = time.monotonic()
-        if now_s - self._reported_s >= REPORT_PERIOD_S:
-            self._reported_s = now_s
+        frozen = frozen_nodes() if now_s - self._begun_s > WATCHED_AFTER_S else ""
+        if now_s - self._reported_s >= REPORT_PERIOD_S or frozen != self._frozen:
+            self._reported_s, self._frozen = now_s, frozen
             what = self._what if isinstance(self._what, str) else self._what()
             rospy.logwarn(
-                "still waiting for %s after %.0f s (of %.0f s at most)", what, now_s - self._begun_s, self._timeout_s
+                "still waiting for %s after %.0f s (of %.0f s at most)%s",
+                what,
+                now_s - self._begun_s,
+                self._timeout_s,
+                f"; {frozen}" if frozen else "",
             )
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import Any
@@ -12,7 +13,8 @@ from actionlib import CommState
 from rosgraph.names import ns_join
 
 from modular_framework_ros.action_client import SteadyActionClient, is_connected
-from modular_framework_ros.calls import wait_until
+from modular_framework_ros.calls import CallError, call_service, wait_for_service, wait_until
+from modular_framework_ros.ros_frozen_nodes import WATCHED_AFTER_S, frozen_nodes
 from moveit_commander.exception import ServerError
 
 SERVICE_TIMEOUT_S = 5.0
@@ -57,19 +59,17 @@ class Servers:
             timeout_s: Maximum wait for the service [s].
 
         Raises:
-            ServerError: The service is not available in time, or fails.
+            ServerError: The service is not available in time, or fails, or a node is frozen.
         """
-        full_name = self.resolve(name)
+        proxy = rospy.ServiceProxy(self.resolve(name), kind)
         try:
-            rospy.wait_for_service(full_name, timeout_s)
-            return rospy.ServiceProxy(full_name, kind)(request)
-        except rospy.ROSException as error:
-            raise ServerError(
-                f"service {full_name}: waited {timeout_s:g} s, nobody offers it ({error}); does "
-                "move_group run, and does it have this capability?"
-            ) from error
-        except rospy.ServiceException as error:
-            raise ServerError(f"service {full_name} failed: {error}; move_group's log says why") from error
+            wait_for_service(proxy, timeout_s)
+        except CallError as error:
+            raise ServerError(f"{error}; does move_group run, and does it have this capability?") from error
+        try:
+            return call_service(proxy, request, math.inf)
+        except CallError as error:
+            raise ServerError(f"{error}; move_group's log says why") from error
 
     def action(self, name: str, kind: Any, timeout_s: float = ACTION_TIMEOUT_S) -> ActionCaller:
         """Returns the connected client of an action.
@@ -105,6 +105,7 @@ class ActionCaller:
                     f"action {self.name}: Unable to connect to its server within allotted time "
                     f"({timeout_s:g}s); does move_group run, and does it have this capability?"
                 )
+            self._refuse_frozen_nodes(begun)
             time.sleep(POLL_PERIOD_S)
         if not self._settled:
             time.sleep(SETTLE_S)
@@ -118,7 +119,8 @@ class ActionCaller:
         """Sends a goal and returns its result.
 
         Raises:
-            ServerError: The result did not arrive in time (the goal is cancelled), or the server is lost.
+            ServerError: The result did not arrive in time (the goal is cancelled), the server is lost, or a node is
+                frozen (the goal is cancelled, too).
         """
         done = threading.Event()
         self._client.send_goal(goal, done_cb=lambda _status, _result: done.set())
@@ -131,6 +133,7 @@ class ActionCaller:
             if now - begun > timeout_s:
                 self._client.cancel_goal()
                 raise ServerError(f"action {self.name}: no result within {timeout_s:g} s; the goal is cancelled")
+            self._refuse_frozen_nodes(begun)
             if now - seen > SERVER_LOST_S:
                 raise ServerError(
                     f"action {self.name}: its server was lost, or ended the goal without a result, for "
@@ -143,6 +146,11 @@ class ActionCaller:
                 "move_group's log says why"
             )
         return result
+
+    def _refuse_frozen_nodes(self, begun: float) -> None:
+        if time.monotonic() - begun > WATCHED_AFTER_S and (frozen := frozen_nodes()):
+            self._client.cancel_goal()
+            raise ServerError(f"action {self.name} does not answer: {frozen}")
 
     def _ended(self) -> bool:
         """Returns whether the goal has ended on the server while its result has not arrived."""
