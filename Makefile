@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-.PHONY: help build lint unit rostest system test bench requirements
+.PHONY: help build lint unit rostest system test full bench requirements
 help:            ## list what can be made
 	@grep -E '^[a-z]+: *##' $(MAKEFILE_LIST) | sed 's/: *##/\t/' | expand -t 16
 build:           ## set up and build
@@ -12,8 +12,10 @@ rostest:         ## run the tests of nodes
 	./install.sh test rostest
 system:          ## run the tests of whole launches
 	./install.sh test system
-test:            ## run all tests
+test:            ## run the tests that continuous integration runs
 	./install.sh test
+full:            ## run all tests
+	./install.sh test full
 bench:           ## run every benchmark, quickly
 	@for benchmark in benchmarks/*; do [ -x $$benchmark ] && ./install.sh exec $$benchmark --quick || exit 1; done
 requirements:    ## compile requirements.txt from requirements.in

@@ -16,7 +16,8 @@ usage: ./install.sh [COMMAND]
   (none)               set the framework up: Debian packages, Python environment, build
   run [ARG:=VALUE..]   set up, then run the simulated pick; arguments are those of start_framework.launch
   experiment FILE      set up, then run an experiment and write its report; options are those of run_experiment
-  test [--repeat N] [SUITE]  set up, then run the tests: lint, unit, rostest, system, all (the default) or one suite
+  test [--repeat N] [SUITE]  set up, then run the tests: all (the default), full (with further robots and scenarios),
+                       lint, unit, rostest, system or one suite
   shell                set up, then open a shell with everything sourced
   exec COMMAND..       set up, then run a command with everything sourced, e.g. a benchmark
   packages             only install the Debian packages and the Python environment

@@ -1,15 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tests of every kind ask the machine."""
+"""What tests of every kind ask the machine, and the selection of tests for the short run."""
 
 from __future__ import annotations
 
 import os
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parent))
+from full_only import LEAVE_OUT, read_full_only, split_items  # noqa: E402
+
 CONTROL_LOOP = 80
 MOST_URGENT = 99
+
+
+@pytest.hookimpl(tryfirst=True)  # before a -k deselects tests
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves out the tests that only `./install.sh test full` runs, if tests/run requests this."""
+    if LEAVE_OUT not in os.environ:
+        return
+    try:
+        items[:], left_out = split_items(items, read_full_only())
+    except ValueError as error:
+        raise pytest.UsageError(str(error)) from None
+    config.hook.pytest_deselected(items=left_out)
 
 
 @pytest.fixture(scope="session")

@@ -3,15 +3,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import signal
-import sys
 import threading
 import time
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -37,21 +33,6 @@ def test_every_module_is_run_by_one_test_file(package: Path) -> None:
 
 def test_there_are_suites() -> None:
     assert len(PACKAGES) >= 10
-
-
-@pytest.fixture(scope="module")
-def runner() -> Iterator[ModuleType]:
-    """The script tests/run as a module."""
-    loader = SourceFileLoader("tests_run", str(ROSTEST.parent / "run"))
-    spec = importlib.util.spec_from_loader(loader.name, loader)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, loader.name, module)
-        patch.syspath_prepend(ROSTEST.parent)
-        patch.setattr(sys, "dont_write_bytecode", True)
-        loader.exec_module(module)
-        yield module
 
 
 def test_every_suite_is_run_once_in_its_lane(runner: ModuleType) -> None:
@@ -128,27 +109,6 @@ def test_options_for_pytest_come_after_those_of_the_environment(
     assert runner.pytest_options(["-k", "one or two"]) == "--color=yes -x -k 'one or two'"
     monkeypatch.delenv("PYTEST_ADDOPTS")
     assert runner.pytest_options(["-x"]) == "-x"
-
-
-@pytest.fixture
-def scripted(runner: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A kind of suites that run in a moment: a steady one, and one that fails in its second run only."""
-    paths = [tmp_path / name for name in ("steady.py", "flaky.py")]
-    for path in paths:
-        path.write_text(
-            "from pathlib import Path\n"
-            "def test_it():\n"
-            "    runs = Path(__file__).with_suffix('.runs')\n"
-            "    runs.write_text(runs.read_text() + 'x' if runs.exists() else 'x')\n"
-            f"    assert {path.name!r} == 'steady.py' or runs.read_text() != 'xx', 'the second run'\n"
-        )
-    suites = [runner.Suite(f"unit/{path.stem}", path) for path in paths]
-    monkeypatch.setattr(runner, "suites_of", lambda kind: suites if kind == "unit" else [])
-    monkeypatch.setattr(runner, "ROOT", tmp_path)
-    monkeypatch.setattr(runner, "LOGS", tmp_path / "logs")
-    monkeypatch.setattr(runner.subprocess, "run", lambda *_, **__: None)  # no loops to compile
-    monkeypatch.setenv("PYTEST_ADDOPTS", "-p no:cacheprovider")
-    return tmp_path
 
 
 def test_repeated_suites_end_with_their_failures_counted_by_test(
