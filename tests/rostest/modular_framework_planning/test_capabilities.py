@@ -44,6 +44,7 @@ def test_an_unknown_capability_is_a_warning_with_the_list_of_known_ones(session:
         line for line in session.log().splitlines() if "nobody/Nothing" in line and "unknown capability" in line
     )
     assert "/move_group/capabilities" in warning and "move_group/MoveGroupMoveAction" in warning
+    assert "did you mean 'move_group/MoveGroupMoveAction'?" in session.log()
 
 
 def test_the_tf_publisher_publishes_objects_and_their_subframes() -> None:

@@ -309,8 +309,8 @@ CASES = [
     in_parameters("/move_group/planning_pipelines/omple/planner_configs/RRT/range", 1.0, "no pipeline 'omple'.*'ompl'"),
     in_parameters("/move_group/longest_valid_segment_fraction", 0.1, "no node of the launch reads"),
     in_parameters("/move_group/default_planning_pipeline", "omple", "no pipeline 'omple'.*did you mean 'ompl'"),
-    in_parameters(f"{PIPELINE}/request_adapters", "AddTimeOptimal", "AddTimeOptimal' is not known; allowed:"),
-    in_parameters(f"{PIPELINE}/planning_plugin", "ompl_interface/OMPL", "allowed: ompl_interface/OMPLPlanner"),
+    in_parameters(f"{PIPELINE}/request_adapters", "AddTimeOptimal", "did you mean '.*/AddTimeOptimalParam"),
+    in_parameters(f"{PIPELINE}/planning_plugin", "ompl_interface/OMPL", "did you mean 'ompl_interface/OMPLPlanner'"),
     in_parameters(f"{PIPELINE}/jiggle_fraction", 3, "is 3; allowed: a number, at least 0 and at most 1"),
     in_parameters(f"{PIPELINE}/path_tolerance", -1, "is -1; allowed: a number, at least 0"),
     in_parameters(f"{PIPELINE}/resample_dt", 0, "is 0; allowed: a number, at least 0.004"),
@@ -406,7 +406,10 @@ CASES = [
     in_experiment(PLANNING, ("planner_parameters",), {"range": "far"}, "'range' is 'far'.*a number of at least 0"),
     in_experiment(PLANNING, ("parameters",), {f"{PIPELINE}/plannr_configs/RRT/range": 1.0}, "'planner_configs'"),
     in_experiment(
-        PLANNING, ("parameters",), {f"{PIPELINE}/request_adapters": "AddTimeOptimal"}, "AddTimeOptimal' is not known"
+        PLANNING,
+        ("parameters",),
+        {f"{PIPELINE}/request_adapters": "AddTimeOptimal"},
+        "did you mean '.*/AddTimeOptimalParam",
     ),
     in_experiment(PLANNING, ("parameters",), {f"{PIPELINE}/search_thread": 2}, "did you mean 'search_threads'"),
     in_experiment(

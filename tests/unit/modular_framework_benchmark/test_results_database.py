@@ -241,7 +241,7 @@ def test_one_database_holds_several_experiments(path: Path) -> None:
         assert database.load(first).episodes.empty
         assert list(database.load(second).episodes["reached"]) == [0.5]
         with pytest.raises(
-            UnknownExperimentError, match="has no experiment 'pick'; allowed: picks, reaches; do you mean"
+            UnknownExperimentError, match="has no experiment 'pick'; allowed: picks, reaches; did you mean"
         ):
             database.find("pick")
         with pytest.raises(UnknownExperimentError, match="no experiment number 7"):

@@ -449,3 +449,5 @@ def test_controllers_that_packages_offer_are_found_by_their_name() -> None:
         types.create("lab/Raiser")
     with pytest.raises(ControllerError, match="unknown controller type 'lab/None'; known types: .*lab/Waver"):
         types.create("lab/None")
+    with pytest.raises(ControllerError, match="did you mean 'lab/Waver'"):
+        types.create("lab/Wavr")

@@ -191,6 +191,7 @@ def test_a_planner_of_ones_own_is_named_by_module_and_class(model: RobotModel, p
     ("names", "part"),
     [
         ("default_planner_request_adapters/AddEverything", "default_planner_request_adapters/FixWorkspaceBounds"),
+        ("default_planer_request_adapters/AddTimeOptimalParam", "mean '.*_adapters/AddTimeOptimalParameterization'"),
         ("no_module/Adapter", "module/Class"),
         ("json/JSONDecoder", "no method adapt_and_plan"),
     ],
@@ -205,6 +206,7 @@ def test_an_unknown_adapter_is_refused_with_the_list(names: str, part: str) -> N
     ("plugin", "part"),
     [
         ("chomp_interface/CHOMPPlanner", "ompl_interface/OMPLPlanner"),
+        ("ompl_interface::OMPL", "did you mean 'ompl_interface/OMPLPlanner'"),
         ("Nothing", "module/Class"),
         ("json/JSONDecoder", "no method plan"),
         ("this_module_is_missing/Planner", "this_module_is_missing"),

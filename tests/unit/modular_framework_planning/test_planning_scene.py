@@ -57,6 +57,8 @@ def test_move_append_and_remove_do_what_they_say(model: RobotModel) -> None:
     assert not scene.without_object("b").objects
     with pytest.raises(UnknownNameError, match="known: b"):
         scene.without_object("c")
+    with pytest.raises(UnknownNameError, match="did you mean 'b'"):
+        scene.without_object("B")
 
 
 def test_an_attached_object_follows_its_link_and_stays_where_it_is_put_down(model: RobotModel) -> None:

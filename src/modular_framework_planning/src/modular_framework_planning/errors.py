@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 
 from modular_framework_planning.contacts import Contact
 from modular_framework_planning.plan_statistics import PlanStatistics
+from modular_framework_ros.allowed_names import nearest
 
 
 class ErrorCode(IntEnum):
@@ -87,7 +88,8 @@ class UnknownNameError(PlanningError):
     """A group, joint, link, frame or object of that name does not exist."""
 
     def __init__(self, code: ErrorCode, kind: str, name: str, allowed: object) -> None:
-        names = ", ".join(sorted(str(item) for item in allowed)) if hasattr(allowed, "__iter__") else str(allowed)
-        super().__init__(code, f"{kind} '{name}' does not exist; known: {names or 'none'}")
+        names = sorted(str(item) for item in allowed) if isinstance(allowed, Iterable) else [str(allowed)]
+        known = ", ".join(names) or "none"
+        super().__init__(code, f"{kind} '{name}' does not exist; known: {known}{nearest(name, names)}")
         self.kind = kind
         self.name = name

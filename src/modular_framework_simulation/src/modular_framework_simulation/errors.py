@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The errors this package raises, so that the ROS interface can turn every one of them into a status message."""
 
+from modular_framework_ros.allowed_names import nearest
+
 LONGEST_NAME = 100
 """Characters of a name that a message shows at most."""
 LONGEST_LIST = 50
@@ -37,7 +39,9 @@ class UnknownEntityError(SimulationError):
     """
 
     def __init__(self, kind: str, name: str, known: list[str]) -> None:
-        super().__init__(f"there is no {kind} '{_shown(name)}' in the simulated world; known: {_listed(known)}")
+        super().__init__(
+            f"there is no {kind} '{_shown(name)}' in the simulated world; known: {_listed(known)}{nearest(name, known)}"
+        )
         self.kind = kind
         self.name = name
 

@@ -30,9 +30,10 @@ from modular_framework_benchmark.experiments.setting_checks import CheckedSettin
 from modular_framework_benchmark.experiments.setting_trees import check_references, location_below
 from modular_framework_benchmark.records.experiment import ExperimentDescription, Factor, Metric
 from modular_framework_core.files.atomic_files import read_text
-from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault, closest
+from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
 from modular_framework_core.files.located_yaml import Mapping, Scalar, loads
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, value_of
+from modular_framework_ros.allowed_names import closest
 
 REQUIRED = ("experiment", "mode", "factors", "compare")
 OPTIONAL = (

@@ -11,9 +11,9 @@ from typing import Any
 
 from modular_framework_benchmark.experiments.reading import Reading
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
-from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar
 from modular_framework_core.task_constructor.key_spelling import corrected_keys
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.reported_figures import Clock
 
 OWN_KEYS = ("function", "name", "unit", "better", "kind", "limit", "component", "description", "lowest", "highest")

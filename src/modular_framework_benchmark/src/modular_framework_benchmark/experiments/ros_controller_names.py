@@ -12,7 +12,6 @@ import rospkg
 
 from modular_framework_control.controller_manager.controller_types import BUILT_IN_TYPES, ControllerTypes
 from modular_framework_control.hardware_interface.plugins import ROBOT_HW_BASE, PluginIndex
-from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.robot_controllers_spawner import (
     ControllerFile,
     ControllerFileError,
@@ -20,6 +19,7 @@ from modular_framework_core.launching.robot_controllers_spawner import (
 )
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview
+from modular_framework_ros.allowed_names import listing, nearest
 
 SPAWNER, CONTROLLER_FILE, ARGUMENTS = "robot_controllers_spawner", "controller_file", "arguments"
 JOINT_KEYS = (

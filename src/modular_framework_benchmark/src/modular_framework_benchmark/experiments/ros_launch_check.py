@@ -18,7 +18,7 @@ from modular_framework_benchmark.experiments.ros_move_group_names import (
 from modular_framework_benchmark.experiments.ros_pipeline_names import PipelineNames, unknown_name
 from modular_framework_benchmark.experiments.ros_robot_names import RobotNames, robot_names
 from modular_framework_core.files import default_folders
-from modular_framework_core.files.faults import TaskFault, listing, nearest
+from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.launching.launch_values import CONFIGURATION
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchPreview, leaves, preview_launch
@@ -32,6 +32,7 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
     ResolvedPlanner,
     UnknownNameError,
 )
+from modular_framework_ros.allowed_names import listing, nearest
 
 MOVE_GROUP, DESCRIPTION = "move_group", "robot_description"
 PIPELINES = "planning_pipelines"

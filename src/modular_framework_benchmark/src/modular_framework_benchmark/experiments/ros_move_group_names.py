@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.ros_declared_names import DeclaredNames, LaunchFault
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError
@@ -16,7 +15,8 @@ from modular_framework_planning.move_group.plugin_names import (
     OPTIONAL_CAPABILITIES,
     SIMPLE_MANAGER,
 )
-from modular_framework_planning.planning_interface.collision_detectors import COLLISION_DETECTORS, collision_detector
+from modular_framework_planning.planning_interface.collision_detectors import collision_detector
+from modular_framework_ros.allowed_names import listing, nearest
 
 DETECTOR, MANAGER = "collision_detector", "moveit_controller_manager"
 CAPABILITY_PARAMETERS = ("capabilities", "disable_capabilities")
@@ -35,7 +35,7 @@ def move_group_faults(names: DeclaredNames, given: Mapping[str, Any]) -> Iterato
         try:
             collision_detector(value)
         except ModelError as error:
-            yield LaunchFault(name, f"parameter '{name}': {error}{nearest(value, COLLISION_DETECTORS)}")
+            yield LaunchFault(name, f"parameter '{name}': {error}")
     for name, value in names.naming(MANAGER):
         if value.replace("::", "/") not in CONTROLLER_MANAGERS:
             hint = f"{listing(CONTROLLER_MANAGERS)}{nearest(value, CONTROLLER_MANAGERS)}"

@@ -13,7 +13,6 @@ import rospkg
 
 from modular_framework_benchmark.experiments.resource_lookup import UnresolvedReference
 from modular_framework_core.files.default_folders import API_PACKAGE, SCRIPTS_FOLDER
-from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.launch_arguments import (
     ArgumentError,
     argument_values,
@@ -21,6 +20,7 @@ from modular_framework_core.launching.launch_arguments import (
     known_arguments,
 )
 from modular_framework_core.launching.launch_values import file_faults
+from modular_framework_ros.allowed_names import listing, nearest
 
 
 class RosResourceLookup:

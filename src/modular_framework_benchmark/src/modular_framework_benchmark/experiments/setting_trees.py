@@ -7,8 +7,9 @@ import re
 from collections.abc import Iterator
 from collections.abc import Mapping as Map
 
-from modular_framework_core.files.faults import FaultList, SourceLocation, listing, nearest
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
+from modular_framework_ros.allowed_names import listing, nearest
 
 _REFERENCE = re.compile(r"\$(\$|[A-Za-z_][A-Za-z0-9_-]*)")
 

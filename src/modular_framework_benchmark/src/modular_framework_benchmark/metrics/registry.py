@@ -7,7 +7,6 @@ import importlib.util
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 from modular_framework_benchmark.metrics import execution, generation, grasp, kinematics, planning, task
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements
 from modular_framework_benchmark.records.experiment import Direction, Metric, MetricKind
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.reported_figures import Clock, Source
 
 MetricFunction = Callable[[EpisodeMeasurements], float | None]
@@ -135,10 +135,9 @@ def find_metric(name: str) -> RegisteredMetric:
     """
     if name in METRICS:
         return METRICS[name]
-    similar = get_close_matches(name, METRICS, n=1)
     raise MetricError(
-        f"there is no metric '{name}'{f'; did you mean {similar[0]!r}' if similar else ''}; allowed: "
-        f"{', '.join(METRICS)}, or FILE.py:FUNCTION for a user's function"
+        f"there is no metric '{name}'; {listing(METRICS)}, or FILE.py:FUNCTION for a user's function"
+        f"{nearest(name, METRICS)}"
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from modular_framework_benchmark.modes.errors import ModeError
-from modular_framework_core.files.faults import listing, nearest
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.parameter_declarations import NodeDeclaration
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from modular_framework_benchmark.modes.errors import ModeError
 from modular_framework_benchmark.modes.parameters import parameters_below
-from modular_framework_core.files.faults import nearest
 from modular_framework_core.launching.ros_launch_preview import leaves
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_ros.parameter_declarations import existing_declaration
 
 NODE = "/move_group/"

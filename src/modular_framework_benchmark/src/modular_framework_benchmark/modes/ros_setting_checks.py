@@ -25,7 +25,6 @@ from modular_framework_benchmark.modes.ros_model_runner import ModelEpisodeRunne
 from modular_framework_benchmark.modes.ros_planning_parameters import pipeline_parameters
 from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, PlanningEpisodeRunner
 from modular_framework_benchmark.records.used_software import named_solvers, solver_substitutions, substitution_text
-from modular_framework_core.files.faults import listing, nearest
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.planning_pipeline.planner_registry import (
@@ -33,6 +32,7 @@ from modular_framework_planning.planning_pipeline.planner_registry import (
     ResolvedPlanner,
     UnknownNameError,
 )
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_urdf.urdf_reader import read_urdf
 
 NODE = LaunchedNode("modular_framework_planning", "move_group", "/move_group", "/")

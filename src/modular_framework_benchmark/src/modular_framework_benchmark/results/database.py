@@ -8,7 +8,6 @@ resumed from the database.
 from __future__ import annotations
 
 import contextlib
-import difflib
 import logging
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -54,6 +53,7 @@ from modular_framework_benchmark.results.schema import (
 )
 from modular_framework_benchmark.results.schema_upgrade import stored_version, upgrade
 from modular_framework_benchmark.results.unwritten_records import keep_record, waiting_records
+from modular_framework_ros.allowed_names import nearest
 
 _LOG = logging.getLogger(__name__)
 _ATTEMPTS = 10
@@ -214,10 +214,9 @@ class ResultDatabase:
         with self._reading() as connection:
             known = dict(connection.execute(select(DESCRIPTIONS.c.name, DESCRIPTIONS.c.id)).all())
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
             raise UnknownExperimentError(
                 f"{self.label} has no experiment {name!r}; allowed: {', '.join(sorted(known)) or 'none, it is empty'}"
-                + (f"; do you mean {near[0]!r}?" if near else "")
+                + nearest(name, known)
             )
         return int(known[name])
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from modular_framework_control.controller_interface.controller import Controller, ControllerError
 from modular_framework_control.hardware_interface.plugins import CONTROLLER_BASE, PluginError, PluginIndex
+from modular_framework_ros.allowed_names import nearest
 
 BASE_CLASS = CONTROLLER_BASE
 
@@ -99,7 +100,8 @@ class ControllerTypes:
         if type_name not in self._plugins:
             faults = "".join(f"; {fault}" for fault in self._plugins.faults)
             raise ControllerError(
-                f"unknown controller type '{type_name}'; known types: {', '.join(self.names)}{faults}"
+                f"unknown controller type '{type_name}'; known types: {', '.join(self.names)}"
+                f"{nearest(type_name, self.names)}{faults}"
             )
         try:
             controller: Controller = self._plugins.load(type_name, Controller)()

@@ -20,6 +20,7 @@ from modular_framework_control.hardware_interface.handles import (
     PosVelJointHandle,
     SpeedScalingHandle,
 )
+from modular_framework_ros.allowed_names import nearest
 
 
 class HardwareInterfaceError(Exception):
@@ -211,8 +212,10 @@ def interface_from_name(type_name: str) -> type[AnyInterface]:
     """
     full_name = type_name if "/" in type_name else f"hardware_interface/{type_name}"
     if full_name not in INTERFACES_BY_NAME:
-        known = ", ".join(sorted(INTERFACES_BY_NAME))
-        raise HardwareInterfaceError(f"unknown hardware interface '{type_name}'; known: {known}")
+        known = sorted(INTERFACES_BY_NAME)
+        raise HardwareInterfaceError(
+            f"unknown hardware interface '{type_name}'; known: {', '.join(known)}{nearest(full_name, known)}"
+        )
     return INTERFACES_BY_NAME[full_name]
 
 

@@ -22,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_urdf import xml_text
 
 EXPORT_TAG = "modular_framework_control"
@@ -112,8 +113,8 @@ class PluginIndex:
             faults = f"; faulty descriptions: {'; '.join(self._faults)}" if self._faults else ""
             raise PluginError(
                 f"no package of this workspace offers a {self._base} named {name!r}; known: "
-                f"{', '.join(self.names) or 'none'}{faults}. A package offers one by <export>"
-                f'<{EXPORT_TAG} plugin="${{prefix}}/plugins.xml"/></export> in its package.xml'
+                f"{', '.join(self.names) or 'none'}{nearest(name, self.names)}{faults}. A package offers one by "
+                f'<export><{EXPORT_TAG} plugin="${{prefix}}/plugins.xml"/></export> in its package.xml'
             )
         if plugin.is_cpp:
             raise _cpp_error(plugin, expected)

@@ -46,8 +46,8 @@ from modular_framework_core.commander.results import ExecutionResult, IkResult, 
 from modular_framework_core.commander.robot_groups import Group, RobotModelError, read_group
 from modular_framework_core.commander.ros_joint_monitor import JointMonitor
 from modular_framework_core.commander.ros_planning_reports import PlanningReports
-from modular_framework_core.files.faults import listing, nearest
 from modular_framework_ros.action_client import SteadyActionClient
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.calls import (
     CallError,
     call_service,

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
+
+from modular_framework_ros.allowed_names import listing, nearest
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -112,25 +113,3 @@ class FaultList:
         """Raises ``TaskFault`` with all faults, if any."""
         if self._faults:
             raise TaskFault(self._faults)
-
-
-def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
-    """Returns the allowed names as ``allowed: a, b``, or ``empty`` if there are none."""
-    names = list(dict.fromkeys(allowed))
-    return f"allowed: {', '.join(names)}" if names else empty
-
-
-def closest(found: str, allowed: Iterable[str]) -> str | None:
-    """Returns the allowed name that is closest to a name or contains it, or None."""
-    by_lower = {str(name).lower(): str(name) for name in allowed}
-    wanted = str(found).lower()
-    matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.65)
-    if not matches and len(wanted) >= 3:
-        matches = [name for name in by_lower if wanted in name or (len(name) >= 3 and name in wanted)][:1]
-    return by_lower[matches[0]] if matches else None
-
-
-def nearest(found: str, allowed: Iterable[str]) -> str:
-    """Returns ``; did you mean 'x'?`` for the closest allowed name, or ""."""
-    name = closest(found, allowed)
-    return f"; did you mean '{name}'?" if name is not None else ""

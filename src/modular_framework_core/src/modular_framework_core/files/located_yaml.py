@@ -12,8 +12,9 @@ from typing import Any, Union
 import yaml
 
 from modular_framework_core.files.atomic_files import read_text
-from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault, listing, nearest
+from modular_framework_core.files.faults import Fault, FaultList, SourceLocation, TaskFault
 from modular_framework_core.files.shallow_yaml import MAX_DEPTH
+from modular_framework_ros.allowed_names import listing, nearest
 
 MAX_NODES = 500_000
 """Maximum number of values after alias expansion, which can grow exponentially."""

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from modular_framework_core.files.faults import listing, nearest
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.parameter_declarations import Declaration, NodeDeclaration
 
 

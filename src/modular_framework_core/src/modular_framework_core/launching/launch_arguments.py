@@ -12,8 +12,8 @@ import roslaunch.core
 import roslaunch.substitution_args
 import roslaunch.xmlloader
 
-from modular_framework_core.files.faults import nearest
 from modular_framework_core.launching.launch_values import value_faults
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_urdf import xml_text
 
 BOOLEANS = ("true", "false", "1", "0")

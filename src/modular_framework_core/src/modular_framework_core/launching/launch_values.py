@@ -16,8 +16,9 @@ import yaml
 
 from modular_framework_core.files import default_folders, located_yaml, shallow_yaml
 from modular_framework_core.files.atomic_files import read_text
-from modular_framework_core.files.faults import FaultList, TaskFault, listing, nearest
+from modular_framework_core.files.faults import FaultList, TaskFault
 from modular_framework_core.task_constructor.header_fields import module_name_fault
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_ros.parameter_declarations import node_declaration
 from modular_framework_urdf import xml_text
 

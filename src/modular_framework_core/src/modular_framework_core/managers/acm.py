@@ -11,9 +11,9 @@ import threading
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from modular_framework_core.files.faults import nearest
 from modular_framework_core.managers.collision_matrix import AcmError, CollisionMatrix, MutableMatrix
 from modular_framework_core.task_runner.manipulator_links import manipulator_links
+from modular_framework_ros.allowed_names import nearest
 
 LINK_SEPARATOR = "__"
 DEFAULT_LINK = "link"

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
 
-from modular_framework_core.files.faults import nearest
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_urdf.urdf_reader import read_urdf
 
 Bounds = tuple[float, float]

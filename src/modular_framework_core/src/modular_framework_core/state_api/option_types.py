@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Union
 
-from modular_framework_core.files.faults import nearest
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
 from modular_framework_core.state_api.option_limits import Length, Limits
+from modular_framework_ros.allowed_names import nearest
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ from collections.abc import Container, Iterable
 from collections.abc import Mapping as MappingABC
 from dataclasses import dataclass
 
-from modular_framework_core.files.faults import FaultList, SourceLocation, closest
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
+from modular_framework_ros.allowed_names import closest
 
 
 @dataclass(frozen=True, slots=True)

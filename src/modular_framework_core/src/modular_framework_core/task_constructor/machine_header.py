@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from modular_framework_core.files.faults import FaultList, SourceLocation, listing
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, kind_of
 from modular_framework_core.task_constructor import header_fields, machine_checks
 from modular_framework_core.task_constructor.key_spelling import corrected_keys, value_of
@@ -11,6 +11,7 @@ from modular_framework_core.task_constructor.machine_checks import ChildLinks
 from modular_framework_core.task_constructor.machine_keys import SHARED_USERDATA, machine_keys, required_keys
 from modular_framework_core.task_constructor.state_catalogue import StateCatalogue
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue, TemplateSource
+from modular_framework_ros.allowed_names import listing
 
 DEFAULT_OUTCOMES = ("success", "fail")
 MANAGER_KINDS = ("joint_state", "trajectory", "pose", "robot_pose", "plan", "grasp")

@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from modular_framework_core.files.faults import closest, listing, nearest
 from modular_framework_core.task_constructor.known_names import JOINT_STATES_FILE, TRAJECTORIES_FILE, mapping_in_file
+from modular_framework_ros.allowed_names import closest, listing, nearest
 
 
 def named_joint_faults(folder: Path, joints: Collection[str]) -> Iterator[str]:

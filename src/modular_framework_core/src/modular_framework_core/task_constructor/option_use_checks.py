@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from modular_framework_core.files.faults import FaultList, SourceLocation, listing, nearest
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence
 from modular_framework_core.state_api.option_types import option_fault
 from modular_framework_core.state_api.option_uses import (
@@ -22,6 +22,7 @@ from modular_framework_core.state_api.option_uses import (
 from modular_framework_core.task_constructor.known_names import KnownNames
 from modular_framework_core.task_constructor.task_spec import MachineSpec, StateSpec
 from modular_framework_core.task_constructor.userdata_checks import declared_keys
+from modular_framework_ros.allowed_names import listing, nearest
 
 _PLURALS = {"trajectory": "trajectories"}
 _NON_MESSAGE_KINDS = {"posture": "posture", "group": "planning group", "planner": "planner"}

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import difflib
 
-from modular_framework_core.files.faults import FaultList, SourceLocation, listing, nearest
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping, Node, Scalar, Sequence, kind_of
+from modular_framework_ros.allowed_names import listing, nearest
 
 PREFIX = "params."
 MIN_SIMILARITY = 0.75

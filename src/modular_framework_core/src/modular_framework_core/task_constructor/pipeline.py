@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from modular_framework_core.files import default_folders
-from modular_framework_core.files.faults import TaskFault, nearest
+from modular_framework_core.files.faults import TaskFault
 from modular_framework_core.task_constructor import generator, task_graph
 from modular_framework_core.task_constructor.explanation import explain, explain_template
 from modular_framework_core.task_constructor.generator import GenerationError
@@ -21,6 +21,7 @@ from modular_framework_core.task_constructor.task_builder import load_task
 from modular_framework_core.task_constructor.task_graph import FORMATS, GraphError
 from modular_framework_core.task_constructor.task_spec import TaskSpec
 from modular_framework_core.task_constructor.template_catalogue import TemplateCatalogue
+from modular_framework_ros.allowed_names import nearest
 
 
 def check_task(

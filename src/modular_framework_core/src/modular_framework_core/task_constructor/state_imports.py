@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
-from modular_framework_core.files.faults import nearest
+from modular_framework_ros.allowed_names import nearest
 
 _PATH_CHANGES = ("sys.path", "sys.modules", "sys.meta_path", "addsitedir", "__path__")
 """Words in a file that suggest a changed import path at run time."""

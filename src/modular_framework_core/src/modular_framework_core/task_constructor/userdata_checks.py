@@ -7,10 +7,11 @@ import difflib
 from collections import Counter
 from collections.abc import Iterable
 
-from modular_framework_core.files.faults import FaultList, listing, nearest
+from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping, Node
 from modular_framework_core.task_constructor import header_fields
 from modular_framework_core.task_constructor.task_spec import ChildSpec, MachineSpec, StateSpec
+from modular_framework_ros.allowed_names import listing, nearest
 
 MIN_SIMILARITY = 0.75
 """An io key of only one state counts as misspelt above this similarity to a template's key, 0 to 1."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_ros.allowed_names import nearest
 
 NUMERIC, CLOSED_FORM, CLOSED_FORM_AND_SEARCH = "numeric", "closed form", "closed form and search"
 """Inverse kinematics methods. The last one searches over the value of a joint of a redundant chain."""
@@ -51,9 +52,10 @@ def is_known_solver(name: str) -> bool:
 
 def unknown_solver_text(name: str) -> str:
     """Returns the error message for a name that `is_known_solver` rejects."""
+    known = (NUMERIC, *PLUGINS)
     return (
-        f"there is no kinematics_solver '{name}'; allowed: {', '.join((NUMERIC, *PLUGINS))}, or PACKAGE/CLASS of "
-        "another plugin"
+        f"there is no kinematics_solver '{name}'; allowed: {', '.join(known)}, or PACKAGE/CLASS of another plugin"
+        f"{nearest(name, known)}"
     )
 
 

@@ -10,6 +10,7 @@ import rospy
 
 from modular_framework_planning.move_group.capabilities.capability import MoveGroupCapability
 from modular_framework_planning.move_group.node_parameters import parameter
+from modular_framework_ros.allowed_names import nearest
 
 PIPELINES = "~planning_pipelines"
 
@@ -47,7 +48,9 @@ def chosen_capabilities(table: Sequence[Capability]) -> list[type[MoveGroupCapab
     known = list(dict.fromkeys(item.name for item in table))
     for where, name in (*wanted, *disabled):
         if name not in known:
-            rospy.logwarn("%s: unknown capability '%s'; known: %s", where, name, ", ".join(known))
+            rospy.logwarn(
+                "%s: unknown capability '%s'; known: %s%s", where, name, ", ".join(known), nearest(name, known)
+            )
     enabled, removed = ({name for _, name in items} for items in (wanted, disabled))
     return [item.build for item in table if (item.default or item.name in enabled) and item.name not in removed]
 

@@ -16,6 +16,7 @@ from modular_framework_planning.planning_interface.collision_detectors import (
     is_detector_name,
 )
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_ros.parameter_search import nearest_parameter
 
 DESCRIPTION = "robot_description"
@@ -87,10 +88,11 @@ def collision_detector_name() -> str:
         return ""
     if "/" not in name and not is_detector_name(name):
         rospy.logerr(
-            "parameter %s: collision_detector '%s' is not known; allowed: %s and module/Class; %s is used",
+            "parameter %s: collision_detector '%s' is not known; allowed: %s and module/Class%s; %s is used",
             found,
             name,
             ", ".join(COLLISION_DETECTORS),
+            nearest(name, COLLISION_DETECTORS),
             DEFAULT_COLLISION_DETECTOR,
         )
         return ""

@@ -10,6 +10,7 @@ from modular_framework_planning.collision_detection.exact_collision_checker impo
 from modular_framework_planning.errors import ModelError
 from modular_framework_planning.planning_interface.collision_checker import CollisionCheckerFactory
 from modular_framework_planning.planning_interface.plugin_classes import plugin_class
+from modular_framework_ros.allowed_names import nearest
 
 DEFAULT_COLLISION_DETECTOR = "FCL"
 # All MoveIt names select the exact checker.
@@ -39,6 +40,7 @@ def collision_detector(name: str = DEFAULT_COLLISION_DETECTOR) -> CollisionCheck
         ModelError: The class does not exist or lacks methods; lists the allowed names.
     """
     allowed = f"allowed: {', '.join(COLLISION_DETECTORS)} and module/Class with the methods of CollisionChecker"
+    allowed += nearest(name, COLLISION_DETECTORS)
     if is_detector_name(name):
         return DETECTORS_BY_NAME[(name or DEFAULT_COLLISION_DETECTOR).lower()]
     kind: CollisionCheckerFactory = plugin_class(name, f"collision_detector '{name}'", allowed)

@@ -42,6 +42,7 @@ from modular_framework_planning.planning_pipeline.path_search import PathSearch
 from modular_framework_planning.planning_pipeline.trajectory_validator import TrajectoryValidator
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
+from modular_framework_ros.allowed_names import nearest
 
 RESERVED_S, RESERVED_FRACTION = 0.25, 0.2  # part of the allowed time reserved for repair, timing and validation
 RESERVED_IMPROVING_S = 1.0  # more for planners that improve their path, because they always use all of their time
@@ -306,11 +307,12 @@ class PlanningPipeline:
             planner_id, parameters = self._configuration(without_group(default), group)
             replaced = requested
             LOGGER.warning(
-                "planner_id '%s': pipeline '%s' has no such planner; allowed: %s; group '%s' uses "
+                "planner_id '%s': pipeline '%s' has no such planner; allowed: %s%s; group '%s' uses "
                 "the default planner '%s'",
                 requested,
                 self.name,
                 ", ".join(allowed),
+                nearest(planner_id, allowed),
                 group,
                 planner_id or allowed[0],
             )
@@ -319,7 +321,7 @@ class PlanningPipeline:
             raise PlanningError(
                 ErrorCode.PLANNING_FAILED,
                 f"planner_id '{requested}': pipeline '{self.name}' has no planner '{planner_id}'; "
-                f"allowed: {', '.join(allowed)}",
+                f"allowed: {', '.join(allowed)}{nearest(planner_id, allowed)}",
             )
         return planner_id, parameters, replaced
 

@@ -12,6 +12,7 @@ from modular_framework_planning.errors import ModelError, PlanningError
 from modular_framework_planning.planning_interface.planner_configurations import resolve_configuration, without_group
 from modular_framework_planning.planning_pipeline.pipeline_spec import PipelineSpec, pipelines_of, read_pipeline_spec
 from modular_framework_planning.planning_pipeline.plugins import make_adapters, planner_class
+from modular_framework_ros.allowed_names import listing, nearest
 
 
 class UnknownNameError(Exception):
@@ -24,7 +25,7 @@ class UnknownNameError(Exception):
     """
 
     def __init__(self, what: str, name: str, known: tuple[str, ...]) -> None:
-        super().__init__(f"there is no {what} '{name}'; allowed: {', '.join(known)}")
+        super().__init__(f"there is no {what} '{name}'; {listing(known)}{nearest(name, known)}")
         self.what, self.name, self.known = what, name, known
 
 

@@ -12,6 +12,7 @@ from modular_framework_planning.planning_interface.planning_request import Pipel
 from modular_framework_planning.planning_interface.plugin_classes import plugin_class
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.robot_model.robot_model import RobotModel
+from modular_framework_ros.allowed_names import closest, nearest
 
 PACKAGE = "modular_framework_planning"
 PLANNERS = {
@@ -69,6 +70,7 @@ def planner_class(plugin: str) -> Any:
     """Returns the planner class of a planning_plugin; raises ModelError as `make_planner` does."""
     name = plugin.replace("::", "/")
     allowed = f"allowed: {', '.join(sorted(PLANNERS))} and module/Class of a class with a method plan(problem)"
+    allowed += nearest(name, PLANNERS)
     planner_type = plugin_class(PLANNERS.get(name, name), f"planning_plugin '{plugin}'", allowed)
     if not callable(getattr(planner_type, "plan", None)):
         raise ModelError(f"planning_plugin '{plugin}': class {planner_type.__name__} has no method plan; {allowed}")
@@ -84,21 +86,27 @@ def make_adapters(names: str = DEFAULT_ADAPTERS) -> tuple[RequestAdapter, ...]:
     Raises:
         ModelError: A name is unknown; lists the allowed names.
     """
-    allowed = (
-        f"allowed: {', '.join(f'{MOVEIT_ADAPTERS}/{name}' for name in sorted({*ADAPTERS, *NOT_NEEDED}))} and "
-        "module/Class of a class with a method adapt_and_plan"
-    )
     result = []
     for name in names.split():
         short = name.removeprefix(f"{MOVEIT_ADAPTERS}/")
         if short in NOT_NEEDED:
             continue
+        allowed = _allowed_adapters(name)
         path = f"{PACKAGE}.planning_pipeline.adapters.{_snake_case(short)}/{short}" if short in ADAPTERS else name
         adapter = plugin_class(path, f"request_adapters: '{name}'", allowed)()
         if not callable(getattr(adapter, "adapt_and_plan", None)):
             raise ModelError(f"request_adapters: '{name}' has no method adapt_and_plan; {allowed}")
         result.append(adapter)
     return tuple(result)
+
+
+def _allowed_adapters(name: str) -> str:
+    """Returns the allowed names, and the adapter most similar to a name."""
+    known = sorted({*ADAPTERS, *NOT_NEEDED})
+    meant = closest(name.rpartition("/")[2], known)  # the common first part would make all names similar
+    hint = f"; did you mean '{MOVEIT_ADAPTERS}/{meant}'?" if meant else ""
+    names = ", ".join(f"{MOVEIT_ADAPTERS}/{item}" for item in known)
+    return f"allowed: {names} and module/Class of a class with a method adapt_and_plan{hint}"
 
 
 def _snake_case(name: str) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modular_framework_core.files.faults import FaultList, closest, listing, nearest
+from modular_framework_core.files.faults import FaultList
 from modular_framework_core.files.located_yaml import Mapping
 from modular_framework_core.files.located_yaml import Sequence as YamlSequence
 from modular_framework_planning.trajectory_execution.controllers import ACTION_KINDS, FAKE_KINDS, GRIPPER, TRAJECTORY
+from modular_framework_ros.allowed_names import closest, listing, nearest
 from modular_framework_setup.checks.controller_records import (
     HardwareController,
     Located,

@@ -6,7 +6,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from modular_framework_core.files.faults import FaultList, SourceLocation, nearest
+from modular_framework_core.files.faults import FaultList, SourceLocation
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_setup.config_files.config_package import ConfigPackage
 from modular_framework_setup.config_files.description_files import add_xml_error
 from modular_framework_urdf import xml_text

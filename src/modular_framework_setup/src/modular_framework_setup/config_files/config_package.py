@@ -12,9 +12,10 @@ from pathlib import Path
 
 import rospkg
 
-from modular_framework_core.files.faults import FaultList, SourceLocation, closest, nearest
+from modular_framework_core.files.faults import FaultList, SourceLocation
 from modular_framework_core.files.located_yaml import Mapping as YamlMapping
 from modular_framework_core.files.located_yaml import Scalar
+from modular_framework_ros.allowed_names import closest, nearest
 from modular_framework_setup.config_files.yaml_files import load_yaml
 from modular_framework_setup.errors import NoConfigPackageError
 from modular_framework_urdf import xml_text

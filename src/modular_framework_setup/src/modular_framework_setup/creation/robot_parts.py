@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from modular_framework_core.files.faults import listing, nearest
+from modular_framework_ros.allowed_names import listing, nearest
 from modular_framework_setup.config_files.robot_tree import RobotTree
 from modular_framework_setup.errors import CreationError
 from modular_framework_urdf.robot import Joint

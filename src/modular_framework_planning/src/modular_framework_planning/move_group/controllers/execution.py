@@ -40,6 +40,7 @@ from modular_framework_planning.move_group.plugin_names import (
 from modular_framework_planning.trajectory_execution.controllers import FAKE_KINDS, GRIPPER, choose_controllers
 from modular_framework_planning.trajectory_execution.execution_settings import ExecutionSettings
 from modular_framework_planning.trajectory_execution.path_watch import PathWatch
+from modular_framework_ros.allowed_names import nearest
 from modular_framework_ros.calls import wait_until
 
 SETTLE_TIMEOUT_S = 1.0
@@ -363,5 +364,5 @@ def _load_manager(timeout_s: float, monitor: SceneMonitor) -> ControllerManager:
             return RosControlControllers(listed_controllers(), namespace, may_switch, timeout_s)
     raise ModelError(
         f"parameter {rospy.resolve_name('~moveit_controller_manager')}: unknown '{name}'; known: "
-        f"{', '.join(CONTROLLER_MANAGERS)}"
+        f"{', '.join(CONTROLLER_MANAGERS)}{nearest(name, CONTROLLER_MANAGERS)}"
     )

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import ompl.geometric as og
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_ros.allowed_names import listing, nearest
 
 # Maximum length of an edge [rad or m]. OMPL's default, a fifth of the extent of the space, makes most edges too long to
 # be free. Tuned for RRTConnect with weighted lengths on MotionBenchMaker's problems: among 0.35, 0.5 and 0.7, 0.5 has
@@ -142,11 +142,9 @@ def parameter_faults(planner_id: str, settings: Mapping[str, object]) -> list[st
         elif key in known:
             faults += _unreadable(key, known[key][1], value)
         elif key not in GENERAL_KEYS:
-            similar = difflib.get_close_matches(key, (*known, *GENERAL_KEYS), n=1)
+            allowed = sorted((*known, *GENERAL_KEYS))
             faults.append(
-                f"{planner_id} has no setting '{key}'; it is ignored; allowed: "
-                f"{', '.join(sorted((*known, *GENERAL_KEYS)))}"
-                + "".join(f"; did you mean '{name}'?" for name in similar)
+                f"{planner_id} has no setting '{key}'; it is ignored; {listing(allowed)}{nearest(key, allowed)}"
             )
         elif faulty := _unreadable(key, GENERAL_KEYS[key], value):
             faults += faulty

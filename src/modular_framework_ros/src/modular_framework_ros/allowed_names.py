@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Texts of messages that refuse a name: the allowed names and the one that was probably meant."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+MAX_NAME_LENGTH = 100
+"""Longer names get no suggestion, which would take a time that grows with the square of their length."""
+
+
+def listing(allowed: Iterable[str], empty: str = "none is allowed here") -> str:
+    """Returns the allowed names as ``allowed: a, b``, or ``empty`` if there are none."""
+    names = list(dict.fromkeys(allowed))
+    return f"allowed: {', '.join(names)}" if names else empty
+
+
+def closest(found: str, allowed: Iterable[str]) -> str | None:
+    """Returns the allowed name that is closest to a name or contains it, or None."""
+    wanted = str(found).lower()
+    if len(wanted) > MAX_NAME_LENGTH:
+        return None
+    by_lower = {text.lower(): text for text in map(str, allowed) if len(text) <= MAX_NAME_LENGTH}
+    matches = difflib.get_close_matches(wanted, list(by_lower), n=1, cutoff=0.65)
+    if not matches and len(wanted) >= 3:
+        matches = [name for name in by_lower if wanted in name or (len(name) >= 3 and name in wanted)][:1]
+    return by_lower[matches[0]] if matches else None
+
+
+def nearest(found: str, allowed: Iterable[str]) -> str:
+    """Returns ``; did you mean 'x'?`` for the closest allowed name, or ""."""
+    name = closest(found, allowed)
+    return f"; did you mean '{name}'?" if name is not None else ""
