@@ -21,6 +21,7 @@ from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_resources import no_packages
+from modular_framework_simulation.physics.engine_choice import MUJOCO, PYBULLET
 from modular_framework_simulation.physics.physics_settings import PhysicsSettings
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody
@@ -99,9 +100,10 @@ class TestMockByPositionVelocityAndAcceleration(TestMock):
     interface = "PosVelAccJointInterface"
 
 
-class TestPyBullet(RobotHWConformance):
+class SimulatedSuite(RobotHWConformance):
     """A lift and a turntable in the simulated world, which take positions, velocities and efforts."""
 
+    engine: str
     settle_s = 0.6
     test_the_constructor_needs_no_arguments = None  # type: ignore[assignment]  # the simulation makes it, not a `type`
 
@@ -110,7 +112,7 @@ class TestPyBullet(RobotHWConformance):
     @pytest.fixture(autouse=True)
     def world_of_it(self, tmp_path: Path) -> Iterator[None]:
         self._parts = ConvexParts(tmp_path)
-        self._world = PhysicsWorld(PhysicsSettings(), self._parts, (0.0, 0.0, -9.81))
+        self._world = PhysicsWorld(PhysicsSettings(), self._parts, (0.0, 0.0, -9.81), engine=self.engine)
         yield
         self._world.close()
 
@@ -130,6 +132,18 @@ class TestPyBullet(RobotHWConformance):
     def advance(self, period_s: float) -> None:
         for _ in range(round(period_s / self._world.settings.time_step_s)):
             self._world.step()
+
+
+class TestPyBullet(SimulatedSuite):
+    """The simulated robot in the default engine."""
+
+    engine = PYBULLET
+
+
+class TestMujoco(SimulatedSuite):
+    """The simulated robot in the other engine."""
+
+    engine = MUJOCO
 
 
 class TestSlidingGripper(TestMock):

@@ -31,11 +31,13 @@ from modular_framework_simulation.models.mesh_files import ConvexParts
 from modular_framework_simulation.models.poses import Pose
 from modular_framework_simulation.models.robot_description import read_robot
 from modular_framework_simulation.models.sdf_resources import no_packages
+from modular_framework_simulation.physics.engine_choice import ENGINES
 from modular_framework_simulation.physics.physics_world import PhysicsWorld
 from modular_framework_simulation.physics.robot_body import RobotBody, Role
 from modular_framework_simulation.physics.simulated_robot_hw import SimulatedRobotHW
 
 Script = Callable[[float], None]
+EVERY_ENGINE = pytest.mark.parametrize("engine", ENGINES)
 
 
 def with_ros2_control(joints: str, plugin: str = "gz_ros2_control/GazeboSimSystem") -> str:
@@ -114,6 +116,7 @@ def test_an_unknown_interface_in_a_transmission_is_refused(world: PhysicsWorld, 
         Lifter(world, convex_parts, "WishInterface")
 
 
+@EVERY_ENGINE
 def test_a_joint_tracks_a_moving_command_within_a_millimetre(lifter: Lifter) -> None:
     worst = 0.0
 
@@ -126,6 +129,7 @@ def test_a_joint_tracks_a_moving_command_within_a_millimetre(lifter: Lifter) -> 
     assert worst < 0.001
 
 
+@EVERY_ENGINE
 def test_a_robot_that_moves_when_the_end_is_asked_for_is_held_until_it_stands(lifter: Lifter) -> None:
     def rise(time_s: float) -> None:
         if not lifter.commander.resets:
@@ -141,12 +145,14 @@ def test_a_robot_that_moves_when_the_end_is_asked_for_is_held_until_it_stands(li
     assert lifter.states["lift"].position == pytest.approx(before, abs=0.01)
 
 
+@EVERY_ENGINE
 def test_a_joint_holds_against_gravity(lifter: Lifter) -> None:
     lifter.run(2.0)
     assert lifter.states["lift"].position == pytest.approx(0.1, abs=1e-4)
     assert lifter.states["lift"].effort == pytest.approx(2.2 * 9.81, rel=0.02)
 
 
+@EVERY_ENGINE
 def test_a_command_beyond_the_limits_is_cut_and_the_velocity_limit_kept(lifter: Lifter) -> None:
     too_early = []
 
@@ -159,12 +165,14 @@ def test_a_command_beyond_the_limits_is_cut_and_the_velocity_limit_kept(lifter: 
     assert not any(too_early)
 
 
+@EVERY_ENGINE
 def test_the_second_finger_does_what_the_first_does(lifter: Lifter) -> None:
     lifter.run(0.3, lambda _time_s: setattr(lifter.commands["slide_1"], "command", 0.03))
     assert lifter.robot.roles["slide_2"] is Role.COUPLED
     assert lifter.states["slide_2"].position == pytest.approx(0.03, abs=1e-3)
 
 
+@EVERY_ENGINE
 def test_a_velocity_joint_runs_at_the_commanded_velocity(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
     lifter = Lifter(world, convex_parts, "VelocityJointInterface")
     lifter.hardware.get(VelocityJointInterface).handles[0].command = 0.2
@@ -172,6 +180,7 @@ def test_a_velocity_joint_runs_at_the_commanded_velocity(world: PhysicsWorld, co
     assert lifter.states["lift"].position == pytest.approx(0.3, abs=0.003)
 
 
+@EVERY_ENGINE
 def test_an_effort_joint_accelerates_as_newton_says(world: PhysicsWorld, convex_parts: ConvexParts) -> None:
     lifter = Lifter(world, convex_parts, "EffortJointInterface")
     mass = 2.2
@@ -180,6 +189,7 @@ def test_an_effort_joint_accelerates_as_newton_says(world: PhysicsWorld, convex_
     assert lifter.states["lift"].velocity == pytest.approx(0.5, rel=0.05)
 
 
+@EVERY_ENGINE
 def test_a_starting_controller_takes_a_joint_over_without_a_jump(lifter: Lifter) -> None:
     lifter.run(0.2)
     claim = InterfaceResources(PositionJointInterface.type_name, ("lift",))
@@ -229,6 +239,7 @@ def test_less_effort_grips_less(lifter: Lifter) -> None:
     assert forces == pytest.approx([5.0, 10.0], rel=0.1)
 
 
+@EVERY_ENGINE
 def test_reset_puts_the_robot_back_and_restarts_the_controllers_once(lifter: Lifter) -> None:
     lifter.move_lift(0.4, 0.8)
     lifter.loop.reset_all()
@@ -348,6 +359,7 @@ def test_a_faulty_robot_description_is_refused(urdf: str, said: str, tmp_path: P
         read_robot(urdf, no_packages, ConvexParts(tmp_path), False)
 
 
+@EVERY_ENGINE
 def test_a_joint_that_fell_behind_catches_up_no_faster_than_its_limit(lifter: Lifter) -> None:
     begin, behind, fastest = lifter.world.time_ns * 1e-9, 0.0, 0.0
     lift = lifter.commands["lift"]
