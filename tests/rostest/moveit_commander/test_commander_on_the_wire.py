@@ -576,6 +576,14 @@ def link_in(trajectory: RobotTrajectory, point: int) -> pin.SE3:
     return transform(pose_of("eg_manipulator", state).pose)
 
 
+def tip_speeds(trajectory: RobotTrajectory) -> np.ndarray:
+    """Mean speeds of the tool's tip between the points of a trajectory [m/s]."""
+    points = trajectory.joint_trajectory.points
+    places = np.array([(link_in(trajectory, index) * TIP_IN_LINK).translation for index in range(len(points))])
+    times = np.array([point.time_from_start.to_sec() for point in points])
+    return np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(times)
+
+
 def test_a_subframe_is_an_end_effector_of_every_call(arm: MoveGroupCommander, tool: str) -> None:
     above = deepcopy(GOAL)
     above.position.z += 0.04
@@ -604,9 +612,14 @@ def test_a_subframe_is_an_end_effector_of_every_call(arm: MoveGroupCommander, to
     assert found[0] != NEAR and found[0] == pytest.approx(found[1], abs=1e-3), "as near as the link that holds the tool"
     arm.set_end_effector_link(tool)
     arm.limit_max_cartesian_link_speed(0.05)
-    trajectory, fraction = arm.compute_cartesian_path([message(places[1] * TIP_IN_LINK)], 0.01)
+    turned = pin.SE3(places[0].rotation @ pin.exp3(np.array([0.4, 0.0, 0.0])), places[0].translation)
+    trajectory, fraction = arm.compute_cartesian_path([message(turned * TIP_IN_LINK)], 0.01)
+    assert fraction == 1.0 and link_in(trajectory, -1).isApprox(turned, 2e-3)
+    assert 0.04 < tip_speeds(trajectory).max() <= 0.05 * 1.01, "the link that holds the tool is slower"
+    arm.set_pose_target(message(turned * TIP_IN_LINK))
+    success, trajectory, _, _ = arm.plan()
     arm.clear_max_cartesian_link_speed()
-    assert fraction == 1.0 and link_in(trajectory, -1).isApprox(places[1], 2e-3)
+    assert success and tip_speeds(trajectory).max() <= 0.05 * 1.01
 
 
 def test_a_subframe_is_kept_within_path_constraints(arm: MoveGroupCommander, tool: str) -> None:

@@ -21,6 +21,7 @@ import pinocchio as pin  # noqa: E402
 from moveit_commander.trajectory_timing import Limits, distinct, retime  # noqa: E402
 
 from modular_framework_planning.cartesian.cartesian_path import straight_line  # noqa: E402
+from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool  # noqa: E402
 from modular_framework_planning.robot_model.robot_model import RobotModel  # noqa: E402
 from modular_framework_planning.trajectory_processing.compiled_timing import max_blends  # noqa: E402
@@ -71,8 +72,15 @@ def with_slow_link(model: RobotModel, path: np.ndarray, limits: Limits) -> Traje
         limits.velocity,
         limits.acceleration,
     )
+    flange = model.pin_model.frames[model.frame_ids["flange"]]
     return with_limited_link_speed(
-        model, motion, lambda values: values, "flange", 0.1, limits.velocity, limits.acceleration
+        model,
+        motion,
+        lambda values: values,
+        FrameOnRobot("flange", int(flange.parentJoint), flange.placement),
+        0.1,
+        limits.velocity,
+        limits.acceleration,
     )
 
 

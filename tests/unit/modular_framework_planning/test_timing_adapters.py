@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from modular_framework_planning.errors import ErrorCode, PlanningError
+from modular_framework_planning.geometry.shapes import Box
 from modular_framework_planning.kinematics.inverse_kinematics import KinematicsPool
 from modular_framework_planning.planning_interface.planner_interface import PlannedPath, PlanningProblem
 from modular_framework_planning.planning_interface.planning_request import (
@@ -33,7 +34,12 @@ from modular_framework_planning.planning_pipeline.adapters.limit_max_cartesian_l
 )
 from modular_framework_planning.planning_pipeline.adapters.request_adapter import RequestAdapter
 from modular_framework_planning.planning_pipeline.pipeline import PlanningPipeline
-from modular_framework_planning.planning_scene.planning_scene import empty_scene
+from modular_framework_planning.planning_scene.planning_scene import (
+    AttachedObject,
+    CollisionObject,
+    PlanningScene,
+    empty_scene,
+)
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.jerk_limits import (
     along_straight_lines,
@@ -57,11 +63,18 @@ class OverTwoPoints:
         return PlannedPath(np.array([START, *BETWEEN, GOAL]), keep_shape=True)
 
 
+def start_scene(model: RobotModel) -> PlanningScene:
+    """A scene with nothing in it but the robot at the start."""
+    joints = dict(zip(model.group(GROUP).joints, START, strict=True))
+    return empty_scene(model, model.merge(model.default_positions(), joints))
+
+
 def planned(
     model: RobotModel,
     adapters: Sequence[RequestAdapter],
     parameters: dict[str, object] | None = None,
     planner: object = None,
+    scene: PlanningScene | None = None,
     **request: object,
 ) -> PlanningAnswer:
     settings = PipelineSettings(
@@ -69,10 +82,9 @@ def planned(
     )
     pipeline = PlanningPipeline(model, KinematicsPool(model), settings, planner or OverTwoPoints(), adapters)
     joints = model.group(GROUP).joints
-    scene = empty_scene(model, model.merge(model.default_positions(), dict(zip(joints, START, strict=True))))
     return pipeline.plan(
         PlanningRequest(
-            scene,
+            scene or start_scene(model),
             GROUP,
             (JointGoal(dict(zip(joints, GOAL, strict=True))),),
             # a slow motion is long to check on a busy machine
@@ -181,8 +193,10 @@ def test_every_way_of_smoothing_keeps_the_limits_of_random_motions() -> None:
         assert np.allclose(straight.sample(straight.sample_times())[0][0], vertices[0])
 
 
-def speeds_by_difference(model: RobotModel, motion: Trajectory, link: str) -> np.ndarray:
-    """Speed of a link from its positions a tenth of a millisecond apart, at 1 ms samples."""
+def speeds_by_difference(
+    model: RobotModel, motion: Trajectory, link: str, point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> np.ndarray:
+    """Speed of a point of a link from its positions a tenth of a millisecond apart, at 1 ms samples."""
     times, step = motion.sample_times(0.001)[:-1], 1e-4
     data, frame = model.pin_model.createData(), model.frame_ids[link]
 
@@ -191,7 +205,7 @@ def speeds_by_difference(model: RobotModel, motion: Trajectory, link: str) -> np
         for values in motion.sample(moments)[0]:
             positions = model.merge(model.default_positions(), dict(zip(motion.joint_names, values, strict=True)))
             pin.framesForwardKinematics(model.pin_model, data, positions)
-            result.append(data.oMf[frame].translation.copy())
+            result.append(data.oMf[frame].act(np.array(point)))
         return np.array(result)
 
     return np.linalg.norm(places(times + step) - places(times), axis=1) / step
@@ -232,6 +246,30 @@ def test_speed_limit_of_the_tip_and_what_is_refused(model: RobotModel) -> None:
         with pytest.raises(PlanningError, match=text) as caught:
             planned(model, adapters, **request)
         assert caught.value.code == code
+
+
+@pytest.mark.parametrize(
+    ("name", "point"), [("stick", (0.0, 0.1, 0.1)), ("stick/end", (0.0, 0.5, 0.1)), ("/stick/end", (0.0, 0.5, 0.1))]
+)
+def test_the_speed_limit_is_that_of_a_held_object_or_its_subframe(
+    model: RobotModel, name: str, point: tuple[float, float, float]
+) -> None:
+    palm = "ezgripper_palm_link"
+    turn = pin.SE3(pin.exp3(np.array([0.0, 0.0, np.pi / 2])), np.array([0.0, 0.1, 0.1]))
+    stick = CollisionObject(
+        "stick",
+        turn,
+        ((Box(0.02, 0.02, 0.02), pin.SE3.Identity()),),
+        {"end": pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.0]))},
+    )
+    held = start_scene(model).with_attached(AttachedObject(stick, palm, frozenset({palm})))
+    adapters = [LimitMaxCartesianLinkSpeed(), AddTimeOptimalParameterization()]
+    motion = planned(model, adapters, scene=held, max_cartesian_speed=0.2, cartesian_speed_limited_link=name).trajectory
+    speeds = speeds_by_difference(model, motion, palm, point)
+    assert speeds.max() <= 0.2
+    assert np.quantile(speeds, 0.6) > 0.7 * 0.2, "only as slow as needed"
+    with pytest.raises(PlanningError, match="cartesian_speed_limited_link 'stick/edn'.*did you mean 'stick/end'"):
+        planned(model, adapters, scene=held, max_cartesian_speed=0.2, cartesian_speed_limited_link="stick/edn")
 
 
 def nearest(motion: Trajectory, values: np.ndarray) -> np.ndarray:

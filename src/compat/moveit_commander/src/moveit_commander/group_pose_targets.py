@@ -111,9 +111,8 @@ class GroupPoseTargets(GroupJointTargets):
         )
 
     def _limited_link(self) -> str:
-        """Returns the speed-limited link; "" without a limit, and for the tip while it is a held object."""
-        tip = self._end_effector_link if self._end_effector_link in self._model.links else ""
-        return (self._speed_limited_link or tip) if self._speed_limit > 0.0 else ""
+        """Returns the speed-limited link, held object or subframe; "" without a limit."""
+        return (self._speed_limited_link or self._end_effector_link) if self._speed_limit > 0.0 else ""
 
     def _goals(self) -> list[Constraints]:
         """Returns the goal constraints; the k-th goal contains the k-th pose of every link."""

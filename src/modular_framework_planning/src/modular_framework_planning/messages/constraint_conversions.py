@@ -19,6 +19,7 @@ from modular_framework_planning.constraints.constraint_kinds import (
     PositionConstraint,
 )
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+from modular_framework_planning.constraints.robot_frames import frame_on_robot, require_holding_link
 from modular_framework_planning.errors import ErrorCode, GeometryError, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.regions import (
     BoxSolid,
@@ -117,38 +118,6 @@ def result_messages(results: Sequence[ConstraintResult]) -> list[ConstraintEvalR
     return [ConstraintEvalResult(result=item.satisfied, distance=item.distance) for item in results]
 
 
-def frame_on_robot(scene: PlanningScene, name: str) -> FrameOnRobot:
-    """Returns a frame that moves with the robot (link, attached object) or is fixed (any other frame).
-
-    Raises:
-        UnknownNameError: The frame does not exist.
-    """
-    name = name.removeprefix("/")
-    pose = scene.frame_transform(name)
-    holder = holding_link(scene, name)
-    if not holder:
-        return FrameOnRobot(name or scene.model.planning_frame, 0, pose)
-    frame = scene.model.pin_model.frames[scene.model.frame_ids[holder]]
-    placement = frame.placement * scene.frame_transform(holder).actInv(pose)
-    return FrameOnRobot(name, int(frame.parentJoint), placement)
-
-
-def holding_link(scene: PlanningScene, name: str) -> str:
-    """Returns the link that a frame is fixed to: the link itself, or the link that holds the object; else empty."""
-    if scene.model.has_link(name):
-        return name
-    if name in scene.objects:
-        return ""
-    return next(
-        (
-            item.link
-            for held, item in scene.attached.items()
-            if name == held or (name.startswith(f"{held}/") and name.removeprefix(f"{held}/") in item.body.subframes)
-        ),
-        "",
-    )
-
-
 class _Reader:
     """Reads the constraints of one message."""
 
@@ -191,12 +160,8 @@ class _Reader:
 
     def _link(self, name: str, where: str) -> FrameOnRobot:
         name = (name or self._tip).removeprefix("/")
-        scene = self._scene
-        if not holding_link(scene, name):
-            raise UnknownNameError(
-                ErrorCode.INVALID_LINK_NAME, f"{where}: link", name, [*scene.model.frame_ids, *scene.attached]
-            )
-        return frame_on_robot(scene, name)
+        require_holding_link(self._scene, name, f"{where}: link")
+        return frame_on_robot(self._scene, name)
 
     def position(self, message: Any, where: str) -> PositionConstraint:
         """Reads a PositionConstraint."""

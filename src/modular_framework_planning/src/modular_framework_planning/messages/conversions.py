@@ -13,10 +13,11 @@ from moveit_msgs.msg import RobotState, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
+from modular_framework_planning.constraints.robot_frames import holding_link
 from modular_framework_planning.contacts import ATTACHED, LINK, WORLD
 from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
 from modular_framework_planning.geometry.spatial import Array
-from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message
 from modular_framework_planning.messages.multi_dof import (
     multi_dof_message,
     multi_dof_trajectory,

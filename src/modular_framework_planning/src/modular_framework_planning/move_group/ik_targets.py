@@ -19,11 +19,11 @@ from modular_framework_planning.constraints.constraint_kinds import (
     PositionConstraint,
 )
 from modular_framework_planning.constraints.kinematic_constraints import KinematicConstraints
-from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.constraints.robot_frames import frame_on_robot, require_holding_link
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.regions import SphereSolid
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics, KinematicsPool
-from modular_framework_planning.messages.constraint_conversions import frame_on_robot, holding_link
 from modular_framework_planning.messages.poses import stamped_in_scene
 from modular_framework_planning.planning_scene.planning_scene import PlanningScene
 from modular_framework_planning.robot_model.robot_model import JointGroup, RobotModel
@@ -133,9 +133,7 @@ def _target(scene: PlanningScene, group: JointGroup, link_name: str, pose: Any) 
             f"no link is given, and group '{group.name}' has no tip link; list one link per pose of "
             f"pose_stamped_vector in ik_link_names ({_ends(scene.model, _subgroups(scene.model, group))})",
         )
-    link = holding_link(scene, name)
-    if not link:
-        raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", name, [*scene.model.frame_ids, *scene.attached])
+    link = require_holding_link(scene, name, "link")
     return IkTarget(link, scene.frame_transform(link).actInv(scene.frame_transform(name)), target)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
+from modular_framework_planning.constraints.constraint_kinds import FrameOnRobot
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing.time_parameterization import (
@@ -24,28 +25,33 @@ MAX_SLOWED_PERIOD_S = 2.5 * MAX_PERIOD_S
 
 
 def link_speeds(
-    model: RobotModel, trajectory: Trajectory, full_positions: Callable[[Array], Array], link: str, times: Array
+    model: RobotModel,
+    trajectory: Trajectory,
+    full_positions: Callable[[Array], Array],
+    frame: FrameOnRobot,
+    times: Array,
 ) -> Array:
-    """Returns the speeds of a link's origin, shape (m,) [m/s].
+    """Returns the speeds of a frame's origin, shape (m,) [m/s].
 
     Args:
         model: Robot model.
         trajectory: Trajectory of the moving joints.
         full_positions: Returns the positions of the whole robot for a joint vector.
-        link: Name of the link.
+        frame: A link, a held object or its subframe.
         times: Sample times, shape (m,) [s].
     """
     positions, velocities, _, _ = trajectory.sample(times)
     indices = [model.index[name] for name in trajectory.joint_names]
-    data, frame = model.pin_model.createData(), model.frame_ids[link]
+    data = model.pin_model.createData()
     result = np.empty(len(times))
     for index, (values, rates) in enumerate(zip(positions, velocities, strict=True)):
         all_rates = np.zeros(len(model.joint_names))
         all_rates[indices] = rates
         for follower, leader, multiplier, _ in model.mimics:
             all_rates[follower] = multiplier * all_rates[leader]
-        jacobian = pin.computeFrameJacobian(
-            model.pin_model, data, full_positions(values), frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        pin.computeJointJacobians(model.pin_model, data, full_positions(values))
+        jacobian = pin.getFrameJacobian(
+            model.pin_model, data, frame.joint, frame.placement, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
         result[index] = np.linalg.norm(jacobian[:3] @ all_rates)
     return result
@@ -98,7 +104,7 @@ def with_limited_link_speed(
     model: RobotModel,
     trajectory: Trajectory,
     full_positions: Callable[[Array], Array],
-    link: str,
+    frame: FrameOnRobot,
     max_speed: float,
     velocity: Array,
     acceleration: Array,
@@ -109,7 +115,7 @@ def with_limited_link_speed(
         model: Robot model.
         trajectory: Trajectory of the moving joints.
         full_positions: Returns the positions of the whole robot for a joint vector.
-        link: Name of the link.
+        frame: A link, a held object or its subframe.
         max_speed: Speed limit, above 0 [m/s].
         velocity: Joint velocity limits, shape (joints,) [rad/s or m/s].
         acceleration: Joint acceleration limits, shape (joints,) [rad/s^2 or m/s^2].
@@ -118,10 +124,10 @@ def with_limited_link_speed(
         return trajectory
     speed_limit = max_speed * (1.0 - MARGIN)
     times = trajectory.sample_times(min(SAMPLE_PERIOD_S, trajectory.duration_s / 20.0))
-    slowing = link_speeds(model, trajectory, full_positions, link, times) / speed_limit
+    slowing = link_speeds(model, trajectory, full_positions, frame, times) / speed_limit
     if slowing.max() <= 1.0:
         return trajectory
     slowed = _slowed_smoothly(trajectory, times, slowing)
-    excess = float(link_speeds(model, slowed, full_positions, link, slowed.sample_times()).max()) / speed_limit
+    excess = float(link_speeds(model, slowed, full_positions, frame, slowed.sample_times()).max()) / speed_limit
     factor = max(excess, required_slowdown(slowed, velocity * (1.0 - MARGIN), acceleration * (1.0 - MARGIN)))
     return slowed.slowed(max(factor, 1.0))

@@ -18,10 +18,11 @@ from modular_framework_planning.cartesian.cartesian_path import (
     no_objection,
     straight_line,
 )
-from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.constraints.robot_frames import frame_on_robot, require_holding_link
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array, Transform
 from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
-from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message
 from modular_framework_planning.messages.conversions import scene_with_state, state_message, trajectory_message
 from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.messages.poses import transform_from_pose
@@ -38,11 +39,12 @@ from modular_framework_planning.trajectory_processing.trajectory import Trajecto
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Lines:
-    """A parsed request; `offset` is the pose, in the frame of `link`, of the frame that follows the lines."""
+    """A parsed request; `offset` is the pose of `follower`, which follows the lines, in the frame of `link`."""
 
     scene: PlanningScene
     group: JointGroup
     solver: InverseKinematics
+    follower: str
     link: str
     offset: Transform
     waypoints: tuple[Transform, ...]
@@ -105,18 +107,14 @@ class CartesianPathService(ServiceCapability):
             self._context.monitor.wait_for_state()
         scene = scene_with_state(self._context.monitor.snapshot(), request.start_state, "start_state")
         name = (request.link_name or group.tip_link).removeprefix("/")
-        link = holding_link(scene, name)
-        if not link:
-            raise UnknownNameError(
-                ErrorCode.INVALID_LINK_NAME, "link_name", name, [*scene.model.frame_ids, *scene.attached]
-            )
+        link = require_holding_link(scene, name, "link_name")
         offset = scene.frame_transform(link).actInv(scene.frame_transform(name))
         checker = None
         if request.avoid_collisions:
             checker = self._context.pipeline("").checker(scene, group, scene.positions)
         motion_checker = checker or self._context.new_checker(scene, group.indices)
         motion = MotionChecker(motion_checker, group.indices, scene.positions)
-        return _Lines(scene, group, solver, link, offset, _waypoints(scene, name, request), motion, checker)
+        return _Lines(scene, group, solver, name, link, offset, _waypoints(scene, name, request), motion, checker)
 
     def _objection(self, lines: _Lines, request: Any) -> Objection:
         """Returns a check of a step that finds violated path constraints, then collisions."""
@@ -146,11 +144,11 @@ class CartesianPathService(ServiceCapability):
         trajectory = time_line(lines.group.joints, found.rows, velocity, acceleration, is_free)
         if request.max_cartesian_speed <= 0.0:
             return trajectory
-        link = request.cartesian_speed_limited_link or lines.link
-        if not model.has_link(link):
-            raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "cartesian_speed_limited_link", link, model.frame_ids)
+        name = request.cartesian_speed_limited_link or lines.follower
+        require_holding_link(lines.scene, name, "cartesian_speed_limited_link")
+        frame = frame_on_robot(lines.scene, name)
         return with_limited_link_speed(
-            model, trajectory, lines.motion.full_positions, link, request.max_cartesian_speed, velocity, acceleration
+            model, trajectory, lines.motion.full_positions, frame, request.max_cartesian_speed, velocity, acceleration
         )
 
 

@@ -17,11 +17,12 @@ from moveit_msgs.srv import (
     GetPositionIKResponse,
 )
 
+from modular_framework_planning.constraints.robot_frames import require_holding_link
 from modular_framework_planning.contacts import describe_contacts
-from modular_framework_planning.errors import ErrorCode, PlanningError, UnknownNameError
+from modular_framework_planning.errors import ErrorCode, PlanningError
 from modular_framework_planning.geometry.spatial import Array
 from modular_framework_planning.kinematics.solution_choice import clearest, first_free
-from modular_framework_planning.messages.constraint_conversions import constraints_from_message, holding_link
+from modular_framework_planning.messages.constraint_conversions import constraints_from_message
 from modular_framework_planning.messages.conversions import scene_with_state, state_message
 from modular_framework_planning.messages.multi_dof import names_joints
 from modular_framework_planning.messages.poses import pose_message
@@ -132,9 +133,7 @@ class KinematicsService(MoveGroupCapability):
             scene = self._scene(request.robot_state)
             base = scene.frame_transform(request.header.frame_id)
             for link in request.fk_link_names:
-                if not holding_link(scene, link):
-                    known = [*scene.model.frame_ids, *scene.attached]
-                    raise UnknownNameError(ErrorCode.INVALID_LINK_NAME, "link", link, known)
+                require_holding_link(scene, link, "link")
                 stamped = PoseStamped(pose=pose_message(base.actInv(scene.frame_transform(link))))
                 stamped.header.frame_id = request.header.frame_id or scene.model.planning_frame
                 stamped.header.stamp = rospy.Time.now()
