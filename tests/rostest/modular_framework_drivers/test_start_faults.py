@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import collections
-import contextlib
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -56,9 +55,13 @@ GRIPPER_CASES: dict[str, tuple[Callable[[DynamixelLine], object], int, str]] = {
         57600,
         "servo 1 is model 12; expected 310 (MX-64)",
     ),
-    "port_in_use": (lambda line: None, 57600, "cannot be opened: another program uses it"),
+    "port_in_use": (
+        lambda line: serial.Serial(str(line.link), exclusive=True),
+        57600,
+        "cannot be opened: another program uses it",
+    ),
 }
-"""What is wrong with a gripper at the start, the baud rate of its driver, and the text that says so."""
+"""Function that spoils a gripper before the start and returns what to keep, baud rate of the driver, and fault text."""
 
 
 class Drivers:
@@ -87,22 +90,21 @@ def drivers(
     ros_session: Any, ros_launch: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Drivers]:
     made, arms = Drivers(ros_session), [EmulatedArm() for _ in CASES]
-    lines, nodes, taken = {}, [], contextlib.ExitStack()
+    lines, nodes, kept = [], [], []
     for name, (spoil, baudrate, _) in GRIPPER_CASES.items():
         port = tmp_path_factory.mktemp(name) / "gripper"
-        lines[name] = DynamixelLine([Finger(DynamixelServo(), FingerModel())], port)
-        lines[name].connect()
-        spoil(lines[name])
-        if name == "port_in_use":
-            taken.enter_context(serial.Serial(str(port), exclusive=True))
+        line = DynamixelLine([Finger(DynamixelServo(), FingerModel())], port)
+        line.connect()
+        lines.append(line)
+        kept.append(spoil(line))
         nodes.append(NODE.format(name=name, type="EzGripperRobotHW", address="nowhere", port=port, baudrate=baudrate))
     for (name, (command, arguments, _)), arm in zip(CASES.items(), arms, strict=True):
         arm.command(command, **arguments)
         nodes.append(NODE.format(name=name, type="UrArmRobotHW", address=arm.address, port="none", baudrate=57600))
     ros_launch(f"<launch>{''.join(nodes)}{SPAWNER}</launch>")
     yield made
-    taken.close()
-    for device in (*arms, *lines.values()):
+    kept.clear()
+    for device in (*arms, *lines):
         device.close()
 
 
