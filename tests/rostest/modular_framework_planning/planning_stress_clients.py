@@ -240,6 +240,7 @@ def stress(session: Any, seconds: float, clients: int = 8, step: float = 0.02) -
     unanswered = asking.run(clients)
     rss_start, rss_end, slope = memory.stop()
     judge = Judge(robot_checker(), {name: value for name, value in arm.positions.items() if name not in ARM}, step)
+    arm.close()
     wrong = [text for answer in asking.answers if (text := judge.fault(answer, world))]
     took = sorted(item.ended - item.begun for item in asking.answers)
     flips = world.histories[FLIPPER]

@@ -71,6 +71,7 @@ class FakeArm:
             auto_start=False,
         )
         self._server.start()
+        self._servers = [self._server]
         self.durations_s: list[float] = []  # of the motions it was given
         self.grips: list[float] = []
         if with_gripper:
@@ -78,12 +79,15 @@ class FakeArm:
                 "ezgripper_controller/gripper_cmd", GripperCommandAction, self._grip, auto_start=False
             )
             self._gripper.start()
+            self._servers.append(self._gripper)
         self._timer = rospy.Timer(rospy.Duration(0.02), self._publish)
 
     def close(self) -> None:
-        """Ends its joint states."""
+        """Ends its joint states and controllers, which would publish while rospy closes the topics."""
         self._timer.shutdown()
         self._timer.join(1.0)
+        for server in self._servers:
+            server.action_server.stop()
 
     def settle(self) -> None:
         """Returns when the node knows where the robot is."""
