@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import atexit
+import multiprocessing
 import os
 import signal
 import sys
@@ -39,8 +40,11 @@ def _enter() -> None:
         os.execv(ROOT / "install.sh", ["install.sh", "exec", *sys.argv])
     sys.path += [str(ROOT / path) for path in SHARED]
     os.environ[MARK] = ("" if outer == _STARTS else outer) + uuid.uuid4().hex
-    for number in (signal.SIGINT, signal.SIGTERM):  # a shell that starts it in the background ignores SIGINT
-        signal.signal(number, signal.default_int_handler)
+    if multiprocessing.current_process().name == "MainProcess":
+        for number in (signal.SIGINT, signal.SIGTERM):  # a shell that starts it in the background ignores SIGINT
+            signal.signal(number, signal.default_int_handler)
+    else:  # a spawned process, which the benchmark ends
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.excepthook = _report
     os.register_at_fork(after_in_child=lambda: signal.signal(signal.SIGTERM, signal.SIG_DFL))
     atexit.register(_kill_what_is_left, os.getpid(), os.environ[MARK])

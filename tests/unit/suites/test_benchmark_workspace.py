@@ -31,6 +31,23 @@ time.sleep(600)
 """
 """The worker has no time to end what it started."""
 
+SPAWNS = """
+import workspace
+import multiprocessing, time
+
+def work(ready):
+    ready.set()
+    time.sleep(600)
+
+if __name__ == "__main__":
+    context = multiprocessing.get_context("spawn")
+    ready = context.Event()
+    context.Process(target=work, args=(ready,), daemon=True).start()
+    ready.wait()
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
 
 @pytest.mark.parametrize("program", [STARTS_A_PROGRAM, HAS_A_WORKER], ids=["itself", "a worker"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -46,6 +63,25 @@ def test_what_a_benchmark_started_ends_with_it(number: signal.Signals, program: 
         child = psutil.Process(int(benchmark.stdout.readline()))
         benchmark.send_signal(number)
     assert psutil.wait_procs([child], 30.0) == ([child], [])
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_spawned_process_ends_without_a_traceback(number: signal.Signals, tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(SPAWNS)
+    with subprocess.Popen(
+        [sys.executable, program],
+        env={**os.environ, "PYTHONPATH": f"{ROOT / 'benchmarks'}:{os.environ['PYTHONPATH']}"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as benchmark:
+        assert benchmark.stdout is not None
+        if benchmark.stdout.readline() == "ready\n":
+            os.killpg(benchmark.pid, number)
+        printed = benchmark.communicate(timeout=60.0)[1]
+    assert printed == "interrupted\n"
 
 
 def test_help_needs_no_sourced_shell() -> None:
