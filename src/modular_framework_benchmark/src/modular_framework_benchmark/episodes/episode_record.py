@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from modular_framework_benchmark.episodes.hand_track import hand_link, hand_track
-from modular_framework_benchmark.episodes.snapshot import COLD_START, MachineLoad, machine, reference_s, versions
+from modular_framework_benchmark.episodes.snapshot import MachineLoad, machine, reference_s, versions
 from modular_framework_benchmark.metrics.measurements import EpisodeMeasurements, JointSamples, ObjectTrack, Shake
 from modular_framework_benchmark.metrics.recording_files import (
     objects_of,
@@ -23,6 +23,7 @@ from modular_framework_benchmark.metrics.recording_files import (
 )
 from modular_framework_benchmark.metrics.registry import measure
 from modular_framework_benchmark.records.episode import EpisodeRecord, EpisodeSpec, EpisodeStatus, Span
+from modular_framework_benchmark.records.results import COLD_START
 from modular_framework_benchmark.records.used_software import UsedSoftware
 
 TASK_RECORDS = "task_records"

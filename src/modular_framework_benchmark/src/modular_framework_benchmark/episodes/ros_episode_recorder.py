@@ -33,7 +33,7 @@ from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, InterferenceError, WorldError, judge, spawn
-from modular_framework_benchmark.episodes.snapshot import COLD_START
+from modular_framework_benchmark.records.results import COLD_START
 from modular_framework_core.task_runner.ros_episode import (
     GENERATE_SERVICE,
     EpisodeError,
