@@ -19,6 +19,10 @@ from ros_session import until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty, EmptyRequest
 
+from modular_framework_control.ros.controller_manager_client import (
+    ControllerManagerClient,
+    ControllerManagerClientError,
+)
 from modular_framework_core.commander.arm_commander import ArmCommander
 from modular_framework_core.srv import ListMessages, ListMessagesRequest
 from modular_framework_ros.calls import CallError, request_service
@@ -86,7 +90,7 @@ class Wait:
     def _run(self) -> None:
         try:
             self._said = str(self._wait())
-        except (CallError, MoveItCommanderException) as error:
+        except (CallError, ControllerManagerClientError, MoveItCommanderException) as error:
             self._said = str(error)
 
     def says(self, node: str) -> None:
@@ -125,6 +129,7 @@ WAITS: dict[str, tuple[str, Callable[[ArmCommander, MoveGroupCommander], Any]]] 
         "/managers",
         lambda commander, arm: request_service("list_grasps", ListMessages, ListMessagesRequest(), 60.0),
     ),
+    "a service of the controllers": ("/gazebo", lambda commander, arm: ControllerManagerClient().list_controllers()),
     "a service of the simulation": (
         "/gazebo",
         lambda commander, arm: request_service("gazebo/pause_physics", Empty, EmptyRequest(), 60.0),

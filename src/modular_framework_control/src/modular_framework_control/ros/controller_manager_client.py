@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from controller_manager_msgs.srv import (
     UnloadController,
 )
 
+from modular_framework_ros.calls import CallError, call_service
 from modular_framework_ros.node_handle import join_names
 
 
@@ -115,9 +117,9 @@ class ControllerManagerClient:
         if self._timeout_s > 0.0:
             self._wait_for(proxy, name)
         try:
-            return proxy(*arguments)
-        except rospy.ServiceException as error:
-            raise ControllerManagerClientError(f"service {name} failed: {error}") from error
+            return call_service(proxy, service_class._request_class(*arguments), math.inf)
+        except CallError as error:
+            raise ControllerManagerClientError(str(error)) from error
 
     def _wait_for(self, proxy: rospy.ServiceProxy, name: str) -> None:
         begun_s = deadline_s = time.monotonic()
