@@ -6,6 +6,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from sample_experiment import sample_description, sample_episodes, sample_record
 
 from modular_framework_benchmark.commands.compare_command import main as compare
+from modular_framework_benchmark.commands.report_command import main as report
 from modular_framework_benchmark.episodes.snapshot import RUN_MARK, MachineLoad, reference_s
 from modular_framework_benchmark.reports.report_source import open_source
 from modular_framework_benchmark.reports.run_record import recorded_values, warnings_of
@@ -31,7 +33,8 @@ SNAPSHOT: dict[str, Any] = {
 }
 
 
-def stored(path: Path, **changes: Any) -> str:
+def stored(path: Path, others_shares: Sequence[float] = (), **changes: Any) -> str:
+    """Stores an experiment of 8 episodes whose snapshots have the changes, and each its own load by others."""
     description = sample_description()
     metrics = tuple(
         replace(each, clock=Clock.WALL) if each.name == "planning_time" else each for each in description.metrics
@@ -40,8 +43,15 @@ def stored(path: Path, **changes: Any) -> str:
     with open_database(path, create=True) as database:
         number = database.add_experiment(replace(description, metrics=metrics), episodes)
         for spec in episodes:
-            database.write(number, sample_record(spec, snapshot={**SNAPSHOT, **changes}))
+            load = {"others_share": others_shares[spec.number]} if others_shares else {}
+            database.write(number, sample_record(spec, snapshot={**SNAPSHOT, **changes, **load}))
     return str(path)
+
+
+def page_text(path: str) -> str:
+    page = Path(path).with_suffix(".html")
+    assert report([path, "--into", str(page)]) == 0
+    return page.read_text()
 
 
 def warnings(path: str) -> str:
@@ -124,8 +134,11 @@ def test_a_report_warns_of_a_load_of_faults_of_metrics_and_of_killed_tries(tmp_p
     assert "8 attempts ended without a record, and the episodes ran again: begun 2026-11-26 on lab-1" in text
 
 
-def test_a_quiet_machine_gives_no_warning(tmp_path: Path) -> None:
-    assert warnings(stored(tmp_path / "results.db", others_share=0.02)) == ""
+def test_a_quiet_machine_gives_no_warning_and_the_report_shows_its_load(tmp_path: Path) -> None:
+    path = stored(tmp_path / "results.db", [0.02, 0.02, 0.02, 0.02, 0.02, 0.03, 0.08, 0.08])
+    assert warnings(path) == ""
+    assert "load by other processes: 2 % of the machine, at most 8 %" in page_text(path)
+    assert "load by other processes" not in page_text(stored(tmp_path / "unknown.db"))
 
 
 def test_the_load_counts_other_processes_and_not_those_of_the_run(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import Enum
@@ -21,6 +22,7 @@ from modular_framework_benchmark.reports.run_record import (
     RecordedValue,
     SnapshotValues,
     commands_to_repeat,
+    others_fractions,
     recorded_values,
     warnings_of,
 )
@@ -69,6 +71,8 @@ class RunFacts:
         seeds: Number of distinct seeds.
         trials: Number of distinct trials.
         cold_starts: Number of episodes that were the first of their stack.
+        others_median: Fraction of the machine that other processes used during an episode, median; None if unknown.
+        others_max: Maximum of this fraction; None if unknown.
     """
 
     begun: float | None
@@ -78,6 +82,8 @@ class RunFacts:
     seeds: int
     trials: int
     cold_starts: int
+    others_median: float | None
+    others_max: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,8 +159,8 @@ def gather(results: ExperimentResults, source: ReportSource, mean_intervals: boo
         progress_figure(results.episodes, results.planned),
     )
     return ReportContent(
-        description, results.planned, len(results.episodes), _run_facts(results), analysis, metrics, levels, spans,
-        chosen, failures, tuple(figures), recorded, warnings_of(results, recorded, source.snapshots),
+        description, results.planned, len(results.episodes), _run_facts(results, source.snapshots), analysis, metrics,
+        levels, spans, chosen, failures, tuple(figures), recorded, warnings_of(results, recorded, source.snapshots),
         commands_to_repeat(results, recorded, source.database),
     )  # fmt: skip
 
@@ -187,12 +193,13 @@ def _present(*figures: NamedFigure | None) -> list[NamedFigure]:
     return [figure for figure in figures if figure is not None]
 
 
-def _run_facts(results: ExperimentResults) -> RunFacts:
+def _run_facts(results: ExperimentResults, snapshots: SnapshotValues) -> RunFacts:
     episodes = results.episodes
     if episodes.empty:
-        return RunFacts(None, None, 0.0, 0, 0, 0, 0)
+        return RunFacts(None, None, 0.0, 0, 0, 0, 0, None, None)
     begun, wall = episodes["begun"].astype(float), episodes["wall_s"].astype(float)
     ended = (begun + wall).max()
+    others = others_fractions(snapshots)
     return RunFacts(
         float(begun.min()) if math.isfinite(begun.min()) else None,
         float(ended) if math.isfinite(ended) else None,
@@ -201,6 +208,8 @@ def _run_facts(results: ExperimentResults) -> RunFacts:
         int(episodes["seed"].nunique()),
         int(episodes["trial"].nunique()),
         int(episodes[COLD_START].sum()) if COLD_START in episodes else 0,
+        statistics.median(others) if others else None,
+        max(others, default=None),
     )
 
 

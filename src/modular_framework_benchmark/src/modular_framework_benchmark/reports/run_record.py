@@ -134,13 +134,19 @@ def _incidents(snapshots: SnapshotValues) -> Iterator[str]:
         yield f"{counted(len(tries), 'attempt')} ended without a record, and the episodes ran again: {tries[0]}."
 
 
+def others_fractions(snapshots: SnapshotValues) -> list[float]:
+    """Returns the fraction of the machine that other processes used during each episode that recorded the load."""
+    recorded = snapshots.get("others_share", ())
+    return [float(value) for value, episodes in recorded for _ in range(episodes)]
+
+
 def _load_warning(results: ExperimentResults, snapshots: SnapshotValues) -> Iterator[str]:
-    fractions = [(float(value), episodes) for value, episodes in snapshots.get("others_share", ())]
-    busy = sum(episodes for fraction, episodes in fractions if fraction > MAX_OTHERS_FRACTION)
+    fractions = others_fractions(snapshots)
+    busy = sum(fraction > MAX_OTHERS_FRACTION for fraction in fractions)
     names = [metric.name for metric in results.description.metrics if metric.clock is Clock.WALL]
     if busy and names:
         yield (
-            f"{counted(busy, 'episode')} ran beside other processes that used up to {100 * max(fractions)[0]:.0f} % of "
+            f"{counted(busy, 'episode')} ran beside other processes that used up to {100 * max(fractions):.0f} % of "
             f"the machine, which lengthens real times ({', '.join(names)})."
         )
 
