@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 from misspelt_names import (
     CASES,
     GENERATOR,
@@ -25,6 +26,7 @@ from misspelt_names import (
     TASK,
     Case,
     changed,
+    checks,
     experiment_faults,
     in_config,
     in_controllers,
@@ -33,6 +35,12 @@ from misspelt_names import (
     in_script,
     write_problem,
 )
+
+from modular_framework_benchmark.commands.mode_runners import known_metrics
+from modular_framework_benchmark.experiments.design import plan_episodes
+from modular_framework_benchmark.experiments.design_text import design_text
+from modular_framework_benchmark.experiments.experiment_file import read_experiment
+from modular_framework_benchmark.experiments.ros_resource_lookup import RosResourceLookup
 
 
 @pytest.mark.parametrize("case", CASES[::3], ids=lambda case: f"{case.place} {case.wrong}"[:60])
@@ -148,6 +156,31 @@ def test_all_faults_of_modes_without_simulation_are_listed_at_once(
     write_problem(tmp_path)
     faults = experiment_faults(content, tmp_path)
     assert all(word in faults for word in words), faults
+
+
+@pytest.mark.parametrize(
+    ("solvers", "fault"),
+    [
+        (("", "closed form"), "the levels 'a' and 'b' of factor 'solver' run the same"),
+        (("", "numeric"), ""),
+        (("closed form", "numeric"), ""),
+    ],
+)
+def test_two_solvers_that_resolve_to_the_same_method_are_refused_as_equal(
+    solvers: tuple[str, str], fault: str, tmp_path: Path
+) -> None:
+    levels = {label: {"solver": solver} for label, solver in zip("ab", solvers, strict=True)}
+    content = KINEMATICS | {"group": "panda_arm", "factors": {"solver": levels}, "compare": "solver"}
+    faults = experiment_faults(content, tmp_path)
+    assert fault in faults and bool(fault) == bool(faults), faults
+
+
+@pytest.mark.parametrize("content", [KINEMATICS, GRASPS], ids=lambda content: content["mode"])
+def test_the_dry_run_of_a_mode_with_inverse_kinematics_shows_the_substituted_plugin(content: dict) -> None:
+    text = yaml.safe_dump(content)
+    found = read_experiment(text, Path("experiment.yaml"), RosResourceLookup(), known_metrics(), checks())
+    line = "substitution: the framework's inverse kinematics for kdl_kinematics_plugin/KDLKinematicsPlugin"
+    assert design_text(found, plan_episodes(found)).splitlines().count(f"  {line}") == 1
 
 
 def test_mode_planning_takes_the_parameters_that_it_reads(tmp_path: Path) -> None:

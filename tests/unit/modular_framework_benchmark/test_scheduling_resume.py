@@ -219,7 +219,7 @@ def test_the_design_is_shown_without_running_it(here: Path, capsys: pytest.Captu
     assert "plans: 120 episodes = 3 combinations x 40 trials; mode planning" in output
     assert "planner: RRTConnect, PRM, BKPIECE  (compared)" in output
     for planner in ("RRTConnect", "PRM", "BKPIECE"):
-        text = f"substitution: CBiRRT for {planner}, which cannot keep path constraints, in requests that have them"
+        text = f"substitution: CBiRRT for {planner}, which cannot keep path constraints\n"
         assert output.count(text) == 1
     assert not (here / "plans.db").exists()
 

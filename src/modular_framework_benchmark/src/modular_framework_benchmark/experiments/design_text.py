@@ -35,7 +35,7 @@ def design_text(experiment: Experiment, episodes: Sequence[EpisodeSpec]) -> str:
             f"{experiment.trials} trials; mode {description.mode}",
             *factors,
             f"  metrics: {', '.join(metric.name for metric in description.metrics)}",
-            *(f"  substitution: {text}, in requests that have them" for text in experiment.substitutions),
+            *(f"  substitution: {text}" for text in experiment.substitutions),
             f"  at most {max_hours:.1f} h: {description.time_limit_s:g} s an episode, workers: {experiment.workers}",
             f"number  trial        seed  {header}".rstrip(),
             *(row.rstrip() for row in rows),

@@ -62,7 +62,7 @@ class Experiment:
         workers: Number of episodes that run in parallel.
         record: Whether an episode keeps each kind of file: `log`, `trajectories`, `bag`, `video`.
         files: SHA-256 digests of the other files that determine the episodes, keyed by portable file name.
-        substitutions: Substitutions of planners by others that some requests need, known in advance.
+        substitutions: Substitutions of named planners and solvers, known in advance.
     """
 
     description: ExperimentDescription

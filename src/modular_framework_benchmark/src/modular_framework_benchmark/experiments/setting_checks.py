@@ -28,7 +28,7 @@ class CheckedSettings:
     Attributes:
         faults: Faults of the settings.
         resolved: Description of the execution as JSON values; equal if the settings execute the same.
-        substitutions: Substitutions of planners by others that some requests need, known in advance.
+        substitutions: Substitutions of named planners and solvers, known in advance.
     """
 
     faults: tuple[SettingFault, ...]

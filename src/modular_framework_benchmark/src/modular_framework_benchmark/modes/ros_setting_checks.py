@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -27,6 +28,7 @@ from modular_framework_benchmark.modes.ros_planning_runner import PLUGINS, Plann
 from modular_framework_benchmark.records.used_software import named_solvers, solver_substitutions, substitution_text
 from modular_framework_core.launching.ros_launch_preview import LaunchedNode, LaunchPreview, leaves
 from modular_framework_planning.errors import ModelError, PlanningError
+from modular_framework_planning.kinematics.inverse_kinematics import InverseKinematics
 from modular_framework_planning.planning_pipeline.planner_registry import (
     PlannerRegistry,
     ResolvedPlanner,
@@ -104,7 +106,19 @@ def check_kinematics(runner: KinematicsEpisodeRunner, settings: Mapping[str, Any
         faults += _faults_of([(("group",), lambda: _check_chain(robot, group))])
     if robot is not None and not faults and _is_whole("kinematics", settings):
         faults += _faults_of([(("group",), lambda: runner.prepared(settings))])
-    return CheckedSettings(tuple(faults), None if faults else dict(settings))
+        if not faults:
+            return _checked_solver(runner.prepared(settings), settings)
+    return CheckedSettings(tuple(faults), None)
+
+
+def _checked_solver(solver: InverseKinematics, settings: Mapping[str, Any]) -> CheckedSettings:
+    """Returns the settings of the mode `kinematics` with the method that solves in place of the named solver."""
+    resolved = repr(dataclasses.replace(solver.settings, solver=solver.method))
+    return CheckedSettings(
+        (),
+        {**_plain(settings, "parameters"), "solver": resolved},
+        solver_substitutions([solver.settings.solver]),
+    )
 
 
 def check_grasps(runner: GraspEpisodeRunner, settings: Mapping[str, Any]) -> CheckedSettings:
@@ -128,7 +142,10 @@ def check_grasps(runner: GraspEpisodeRunner, settings: Mapping[str, Any]) -> Che
         faults += _faults_of([(("gripper_joint",), lambda: check_joint(robot))])
     if robot is not None and not faults and _is_whole("grasps", settings):
         faults += _faults_of([(("gripper_joint",), lambda: runner.prepared(settings))])
-    return CheckedSettings(tuple(faults), None if faults else dict(settings))
+        if not faults:
+            named = runner.prepared(settings).solver.settings.solver
+            return CheckedSettings((), dict(settings), solver_substitutions([named]))
+    return CheckedSettings(tuple(faults), None)
 
 
 def check_task(settings: Mapping[str, Any]) -> CheckedSettings:
