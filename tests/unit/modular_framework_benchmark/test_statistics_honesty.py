@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections import Counter
 from pathlib import Path
@@ -10,7 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from modular_framework_benchmark.statistics.rates import paired_interval, paired_p_value
+
 sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
+import enumerated_outcomes as enumerated  # noqa: E402
 import statistics_conditions as conditions  # noqa: E402
 
 EXPERIMENTS = 40
@@ -40,3 +44,30 @@ def test_a_rule_that_claims_too_much_and_an_interval_that_holds_too_little_are_f
     assert [each.passed for each in conditions.rows_of(coverage, Counter({"rate/held": 350, "rate/missed": 50}))] == [
         False
     ]
+
+
+def test_the_enumerated_coverage_and_false_claims_are_sums_over_the_outcomes() -> None:
+    pairs, won, lost = 7, 0.3, 0.15
+    point = int(np.flatnonzero((enumerated.grid() == (won, lost)).all(axis=1))[0])
+    outcomes = enumerated.outcomes_of(pairs)
+    ends, chances = enumerated.intervals_of(outcomes), enumerated.probabilities_of(outcomes)
+    coverage = claims = 0.0
+    for item, (low, high) in zip(outcomes, ends, strict=True):
+        ties = pairs - item.won - item.lost
+        ways = math.comb(pairs, item.won) * math.comb(pairs - item.won, item.lost)
+        chance = ways * won**item.won * lost**item.lost * (1.0 - won - lost) ** ties
+        interval, p_value = paired_interval(item), paired_p_value(item)
+        assert (low, high) == pytest.approx((interval.low, interval.high), abs=1e-9)
+        coverage += chance * (interval.low <= won - lost <= interval.high)
+        claims += chance * (p_value <= 0.05 and interval.high < 0.0)
+    assert enumerated.covered(ends, chances)[point] == pytest.approx(coverage)
+    assert enumerated.false_claims(outcomes, ends, chances)[point] == pytest.approx(claims)
+
+
+@pytest.mark.parametrize("pairs", [6, 11, 16])
+def test_enumerated_claims_and_intervals_keep_their_bounds(pairs: int) -> None:
+    figures = enumerated.figures_of(pairs)
+    assert figures["false claims"].probability <= 0.05
+    assert figures["win difference"].probability >= 0.92
+    assert figures["rate"].probability >= 0.95
+    assert max(figures[alone].probability for alone in ("Tango alone", "Wilson")) < 0.90

@@ -14,7 +14,7 @@ from statsmodels.stats.proportion import proportion_confint
 from modular_framework_benchmark.statistics.comparison import Interval
 
 MAX_OUTSIDE = 3
-"""Number of units outside the most frequent outcome up to which Tango's interval covers too little (down to 85 %)."""
+"""Number of units outside the most frequent outcome up to which Tango's interval covers too little (down to 83 %)."""
 
 
 @dataclass(frozen=True, slots=True)
