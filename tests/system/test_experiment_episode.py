@@ -71,7 +71,8 @@ def _process_in_task(node: str) -> int:
 def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_stack_that_is_kept(
     runner: TaskEpisodeRunner, tmp_path: Path
 ) -> None:
-    cold = run(runner, tmp_path / "cold", PICK | {"record": {"bag": True, "video": True}})
+    enough_for_two_runs = {"time_limit": 2.0 * ENOUGH_S}
+    cold = run(runner, tmp_path / "cold", PICK | enough_for_two_runs | {"record": {"bag": True, "video": True}})
     warm = run(runner, tmp_path / "warm", PICK)
     assert cold.status is EpisodeStatus.SUCCEEDED, f"{cold.cause}\n{(tmp_path / 'cold/log.txt').read_text()}"
     assert cold.outcome == "successful_pipeline" and cold.simulated_s is not None
@@ -95,8 +96,10 @@ def test_an_episode_is_judged_by_the_world_measured_and_the_same_again_on_the_st
     assert warm.status is EpisodeStatus.SUCCEEDED, f"{warm.cause}\n{(tmp_path / 'warm/log.txt').read_text()}"
     assert warm.snapshot["final_objects"] == cold.snapshot["final_objects"]
     assert cold.snapshot["cold_start"] and "cold_start" not in warm.snapshot
-    generations = [(tmp_path / name / "log.txt").read_text().count(" were stored.") for name in ("cold", "warm")]
-    assert generations == [2, 1]  # once to warm up, and then once in each episode
+    logs = [(tmp_path / name / "log.txt").read_text() for name in ("cold", "warm")]
+    assert [log.count(" were stored.") for log in logs] == [2, 1]  # generated once to warm up, then in each episode
+    assert [log.count("state MoveLift ended with") for log in logs] == [2, 1]  # all plans and motions warm up, too
+    assert len(list((tmp_path / "cold/task_records").iterdir())) == 1
     for record in (cold, warm):
         assert (record.metrics["method_processor_time"] or 0.0) > 0.0
         assert (record.metrics["generation_time"] or 0.0) < (record.metrics["task_wall_time"] or 0.0)

@@ -29,7 +29,7 @@ from modular_framework_benchmark.records.used_software import UsedSoftware
 TASK_RECORDS = "task_records"
 PARTS = (("start", "up"), ("begin", "ready"), ("task", "task"), ("check", "checked"), ("record", "recorded"))
 """Parts of an episode in their order, with the moment that ends each."""
-SNAPSHOT_KEYS = ("shake_fault", "video_fault", "recording_fault", "world_digest", COLD_START)
+SNAPSHOT_KEYS = ("shake_fault", "video_fault", "recording_fault", "world_digest")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,7 @@ class EpisodeEnd:
         answer: Answer of the recorder.
         stop_s: Duration of the shutdown of the stack [s].
         target: Name of the object in the success criteria; "" for none.
+        is_cold: Whether the episode is the first of its stack.
     """
 
     spec: EpisodeSpec
@@ -59,6 +60,7 @@ class EpisodeEnd:
     answer: Mapping[str, Any] = field(default_factory=dict)
     stop_s: float = 0.0
     target: str = ""
+    is_cold: bool = False
 
     def broken(self, cause: str) -> EpisodeEnd:
         """Returns the end of an episode that could not run."""
@@ -77,6 +79,10 @@ class EpisodeEnd:
     def with_target(self, target: str) -> EpisodeEnd:
         """Returns this end with the name of the object in the success criteria."""
         return replace(self, target=target)
+
+    def first_of_stack(self, is_cold: bool) -> EpisodeEnd:
+        """Returns this end with the mark of the first episode of a stack."""
+        return replace(self, is_cold=is_cold)
 
     def with_video_fault(self, fault: str) -> EpisodeEnd:
         """Returns this end with the reason for a missing video; "" if there is a video."""
@@ -153,6 +159,7 @@ def _snapshot(end: EpisodeEnd, faults: Mapping[str, str]) -> dict[str, Any]:
         "parameters": end.answer.get("parameters_digest", ""),
         "final_objects": end.answer.get("final", {}),
         **{key: end.answer[key] for key in SNAPSHOT_KEYS if end.answer.get(key)},
+        **({COLD_START: True} if end.is_cold else {}),
         **({"metric_faults": dict(faults)} if faults else {}),
     }
 

@@ -33,7 +33,6 @@ from modular_framework_benchmark.episodes.ros_running_stack import running_stack
 from modular_framework_benchmark.episodes.ros_samples import Samples
 from modular_framework_benchmark.episodes.ros_shake import ShakeError, shake
 from modular_framework_benchmark.episodes.ros_world import SPAWN_SERVICE, InterferenceError, WorldError, judge, spawn
-from modular_framework_benchmark.records.results import COLD_START
 from modular_framework_core.task_runner.ros_episode import (
     GENERATE_SERVICE,
     EpisodeError,
@@ -99,7 +98,6 @@ class EpisodeRecorder:
         self._aborted = aborted
         self._samples = Samples()
         self._time = SimulatedTime()
-        self._warm = False
 
     def connect(self) -> None:
         """Waits for the master and registers a node."""
@@ -116,7 +114,6 @@ class EpisodeRecorder:
         rate_hz = _joint_state_rate_hz() if self._time.enabled and request.controllers else None
         self._samples.connect()
         folder = Path(request.folder)
-        answer[COLD_START] = not self._warm
         with self._bag(folder, request.bag), self._time.held("episode"):
             try:
                 with stoppable(self._aborted.is_set):
@@ -172,10 +169,6 @@ class EpisodeRecorder:
                 spawn(entry)
             answer["interventions"] = judge().number
 
-        if self._time.enabled and not self._warm:
-            begin_episode(spawn_all, SETTLE_S)  # excludes the one-time loading of nodes from the episode
-            generate_grasps()
-            self._warm = True
         answer["processor_before_s"] = processor_time_s(request.method_nodes)
         if self._time.enabled:
             begin_episode(spawn_all, SETTLE_S)
