@@ -53,6 +53,7 @@ class FakeCamera:
         turn.x, turn.y, turn.z, turn.w = Rotation.from_matrix(AXES).as_quat()
         self._static.sendTransform(found)
         self._publisher = rospy.Publisher(TOPIC, PointCloud2, queue_size=1)
+        self._seen: tuple[object, np.ndarray] = ((), np.empty(0))
         threading.Thread(target=self._run, daemon=True).start()
 
     @property
@@ -70,7 +71,10 @@ class FakeCamera:
         for item in self.scene.objects:
             at = item.pose.position
             shapes.append(Box(tuple(item.primitives[0].dimensions), (at.x, at.y, at.z)))
-        points = self.change(image(shapes))
+        key = [(shape.size, shape.centre) for shape in shapes]
+        if key != self._seen[0]:  # to draw an image takes as long as the method needs to find grasps in it
+            self._seen = (key, image(shapes))
+        points = self.change(self._seen[1])
         cloud = PointCloud2(height=points.shape[0], width=points.shape[1], point_step=12, row_step=12 * points.shape[1])
         cloud.header.stamp, cloud.header.frame_id = stamp, self.frame
         cloud.fields = [PointField(name, 4 * place, PointField.FLOAT32, 1) for place, name in enumerate("xyz")]
