@@ -92,32 +92,26 @@ def finished(folder: Path) -> int:
     return 0
 
 
-def test_an_experiment_whose_every_episode_broke_compares_nothing(folder: Path) -> None:
-    process = start(folder, "run_experiment", "experiment.yaml", runner="BrokenRunner")
-    printed, errors = process.communicate(timeout=300)
-    assert process.returncode == 1, errors
-    assert "so nothing is compared; the most frequent (120 of 120): the runner raised ValueError" in errors
+def test_an_experiment_whose_every_episode_broke_compares_nothing(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "experiment.yaml").write_text(TEXT.replace("trials: 40", "trials: 5"))
+    assert run_experiment(["experiment.yaml", "--runner", "fake_runners:BrokenRunner"]) == 1
+    printed, errors = capsys.readouterr()
+    assert "so nothing is compared; the most frequent (15 of 15): the runner raised ValueError" in errors
     assert "report: " in printed and "no difference" not in printed
 
 
-def test_a_disk_limit_ends_the_command_cleanly_and_it_can_go_on(folder: Path) -> None:
-    process = start(folder, "run_experiment", "experiment.yaml", "--disk-limit", "1e-6", runner="QuickRunner")
-    printed, errors = process.communicate(timeout=300)
-    assert process.returncode == 1, errors
+def test_a_disk_limit_ends_the_command_cleanly_and_it_can_go_on(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    quick = ["--runner", "fake_runners:QuickRunner"]
+    assert run_experiment(["experiment.yaml", "--disk-limit", "1e-6", *quick]) == 1
+    errors = capsys.readouterr().err
     assert "stopped: the next episode would exceed --disk-limit 1e-06" in errors and "To continue: rosrun" in errors
-    assert 0 < finished(folder) < 120
-    process = start(folder, "resume", "plans.db", runner="QuickRunner")
-    printed, errors = process.communicate(timeout=300)
-    assert process.returncode == 0 and finished(folder) == 120, errors
-    assert "--disk-limit is 0; allowed: more than 0 [GB]" in refused(folder, "--disk-limit", "0")
-
-
-def refused(folder: Path, *arguments: str) -> str:
-    """What a command says that ends with exit code 2."""
-    process = start(folder, "resume", "plans.db", *arguments)
-    _, errors = process.communicate(timeout=300)
-    assert process.returncode == 2, errors
-    return errors
+    assert 0 < finished(here) < 120
+    assert resume(["plans.db", *quick]) == 0 and finished(here) == 120
+    capsys.readouterr()
+    assert resume(["plans.db", *quick, "--disk-limit", "0"]) == 2
+    assert "--disk-limit is 0; allowed: more than 0 [GB]" in capsys.readouterr().err
 
 
 def test_kills_at_random_moments_lose_nothing_and_run_nothing_twice(folder: Path) -> None:
