@@ -7,9 +7,12 @@ with compiled loops: numba does not notice that a function which it inlined from
 
 from __future__ import annotations
 
+import fcntl
+import functools
 import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
 
 def cache_folder() -> Path:
@@ -24,6 +27,28 @@ def cache_folder() -> Path:
 def cache_is_empty() -> bool:
     """Whether nothing has been compiled yet."""
     return not any(Path(os.environ["NUMBA_CACHE_DIR"]).rglob("*.nbi"))
+
+
+def make_saves_exclusive() -> None:
+    """Lets only one process at a time write to the cache.
+
+    To save a loop, numba reads an index, changes it and writes it back. Two processes that save the same loop for other
+    argument types would overwrite each other's entries.
+    """
+    from numba.core.caching import IndexDataCacheFile  # imported here, see above
+
+    cache_file: Any = IndexDataCacheFile
+    save = cache_file.save
+
+    @functools.wraps(save)
+    def save_exclusively(file: Any, key: Any, data: Any) -> None:
+        lock = Path(os.environ["NUMBA_CACHE_DIR"]) / "lock"
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        with lock.open("w") as held:
+            fcntl.flock(held, fcntl.LOCK_EX)
+            save(file, key, data)
+
+    cache_file.save = save_exclusively
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))

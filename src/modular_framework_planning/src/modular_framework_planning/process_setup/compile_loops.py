@@ -4,10 +4,13 @@
 Each loop is called the way the product calls it, with a robot and a scene small enough to cost nothing: what is in the
 cache already is only loaded. To be run once after the build:
 python3 -m modular_framework_planning.process_setup.compile_loops
+Two processes then share the compilation. They compile few loops twice: kinematics that the collision loops inline.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -20,6 +23,7 @@ from modular_framework_planning.collision_detection.kernels.compiled_triangles i
 from modular_framework_planning.constraints import constrained_motion
 from modular_framework_planning.geometry.shapes import Box, Mesh, Shape, Sphere
 from modular_framework_planning.kinematics import compiled_kinematics
+from modular_framework_planning.numba_cache import cache_is_empty, make_saves_exclusive
 from modular_framework_planning.octomap.encoding import read_stream, write_binary, write_full
 from modular_framework_planning.octomap.octree import Octree
 from modular_framework_planning.octomap.voxel_map import VoxelMap, empty_map
@@ -34,6 +38,8 @@ from modular_framework_planning.planning_scene.planning_scene import (
 from modular_framework_planning.robot_model.robot_model import RobotModel
 from modular_framework_planning.trajectory_processing import compiled_polylines, path_shortening, time_parameterization
 
+COLLISIONS = "collisions"
+"""Argument of the second process."""
 LINKS = 4
 MOTION_STEP = 0.05  # [rad]
 TETRAHEDRON = np.array(
@@ -50,16 +56,46 @@ TETRAHEDRON = np.array(
 def compile_all() -> float:
     """Compiles every loop, or loads it from the cache; returns how long that took [s]."""
     begun = time.monotonic()
+    robot = _robot()
+    _compile_motions(robot)
+    _compile_collisions(robot)
+    return time.monotonic() - begun
+
+
+def compile_in_two_processes() -> float:
+    """Does what `compile_all` does, with the collision loops in a second process; returns how long that took [s].
+
+    Raises:
+        subprocess.CalledProcessError: The second process failed; its output has the reason.
+    """
+    begun = time.monotonic()
+    make_saves_exclusive()
+    with subprocess.Popen([sys.executable, "-m", f"{__package__}.compile_loops", COLLISIONS]) as collisions:
+        try:
+            _compile_motions(_robot())
+            code = collisions.wait()
+        finally:
+            collisions.kill()
+    if code:
+        raise subprocess.CalledProcessError(code, collisions.args)
+    compile_all()  # loads, so that the cache is known to be complete
+    return time.monotonic() - begun
+
+
+def _compile_motions(robot: RobotModel) -> None:
+    """Compiles kinematics, timing and constraints."""
     compiled_kinematics.warm_up()
     compiled_polylines.warm_up()
     time_parameterization.warm_up()
-    robot = _robot()
     constrained_motion.warm_up(robot)
+
+
+def _compile_collisions(robot: RobotModel) -> None:
+    """Compiles what needs a scene: maps, collision checks and the searches that use them."""
     build_sphere_tree(TETRAHEDRON)
     _check_motions(_scene(robot, _voxels()))
     links = bodies_in_scene(empty_scene(robot), robot.default_positions())  # boxes: a mesh needs an import of 0.3 s
     self_filter_of(RegionCache(), links, 1.0, 0.0).hides(np.ones((2, 3)), np.zeros(3))
-    return time.monotonic() - begun
 
 
 def _robot() -> RobotModel:
@@ -122,10 +158,15 @@ def _check_motions(scene: PlanningScene) -> None:
     path_shortening.warm_up(checker.compiled_world, scene.positions)
 
 
-def main() -> None:
-    """Compiles and says how long it took."""
-    print(f"compiled loops are ready after {compile_all():.1f} s")
+def main(arguments: list[str]) -> None:
+    """Compiles everything and prints the duration, or compiles the collision loops as the second process."""
+    if arguments == [COLLISIONS]:
+        make_saves_exclusive()
+        _compile_collisions(_robot())
+    else:
+        took_s = compile_in_two_processes() if cache_is_empty() else compile_all()
+        print(f"compiled loops are ready after {took_s:.1f} s")
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
