@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-TESTS = Path(__file__).parent
+TESTS = Path(__file__).resolve().parent  # as tests/run resolves the paths of suites
 LEAVE_OUT = "LEAVE_OUT_FULL_ONLY"
 """Environment variable by which tests/run tells the conftest module to leave out the tests."""
 
